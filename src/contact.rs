@@ -1,0 +1,177 @@
+//! Contact constraints: where the gap is, which way it pushes, under which law.
+
+mod linear_rows;
+
+pub use linear_rows::{GapOffset, LinearRows};
+
+use crate::error::Result;
+use crate::real::Real;
+
+/// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ContactId {
+    /// Index of the constraint in the simulation.
+    pub constraint: usize,
+    /// Feature of the body (a node, a row), given by the constraint.
+    pub feature: usize,
+    /// The candidate opposite of it, given by the constraint.
+    pub candidate: usize,
+}
+
+impl std::fmt::Display for ContactId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}.{}", self.constraint, self.feature, self.candidate)
+    }
+}
+
+/// The law of one contact row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ContactLaw {
+    /// Unilateral and rigid, at position level: g ≥ 0, λ ≥ 0, λ g = 0. Compression is positive.
+    Rigid,
+    /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multiplier).
+    Equality,
+}
+
+/// The parts of the gap rates that do not come from v and a: ġ = G v + `rate`, g̈ = G a + `acceleration`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GapRates<T> {
+    /// ∂g/∂t at fixed u (length/time).
+    pub rate: T,
+    /// Ġ v + ∂ġ/∂t at fixed u, v, a (length/time²).
+    pub acceleration: T,
+}
+
+/// A constraint `g(t, u) ≥ 0` (or = 0) on the displacements, with as many rows as it has candidates.
+///
+/// In this version gaps are affine in u: `g = G u + g0(t)`, with G fixed between two calls of [`search`](Self::search).
+/// Evaluations are pure. Signs: g > 0 is open; the contact force on the system is Gᵀ λ, λ > 0 in compression.
+pub trait ContactConstraint<T: Real>: Send {
+    /// The largest number of candidates there can ever be: memory is reserved for it.
+    fn max_candidates(&self) -> usize;
+
+    /// The largest number of entries all rows of G together can ever have.
+    fn max_entries(&self) -> usize;
+
+    /// Checks the constraint against the size of the system, once, at build.
+    ///
+    /// # Errors
+    ///
+    /// Whatever is wrong with it, for instance [`Error::MissingDof`](crate::Error::MissingDof).
+    fn check(&self, dofs: usize) -> Result<()>;
+
+    /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change.
+    ///
+    /// Returns whether candidates or G changed since the last call.
+    ///
+    /// # Errors
+    ///
+    /// The host's own, as [`Error::Host`](crate::Error::Host).
+    fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
+        let _ = (t, u, v);
+        Ok(Candidates::Unchanged)
+    }
+
+    /// Number of candidates now.
+    fn candidates(&self) -> usize;
+
+    /// (feature, candidate) of a row: what identifies it from step to step.
+    fn identity(&self, row: usize) -> (usize, usize);
+
+    /// The law of a row.
+    fn law(&self, row: usize) -> ContactLaw;
+
+    /// Appends the rows of G, one [`ContactJacobian::push`] a candidate.
+    fn jacobian(&self, out: &mut ContactJacobian<T>);
+
+    /// The gaps at t and u, one a candidate (length).
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
+
+    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: none.
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+        let _ = (t, u, v);
+        out.fill(GapRates::default());
+    }
+}
+
+/// What a search found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Candidates {
+    /// The same candidates with the same rows of G.
+    Unchanged,
+    /// Other candidates or other rows.
+    Changed,
+}
+
+/// The rows of G, stored row by row.
+///
+/// ```
+/// use contact_dynamics::contact::ContactJacobian;
+/// let mut g = ContactJacobian::default();
+/// g.push(&[(0, -1.0), (2, 1.0)]); // g = u2 − u0
+/// assert_eq!(g.product(0, &[1.0, 5.0, 4.0]), 3.0);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactJacobian<T> {
+    pointers: Vec<usize>,
+    dofs: Vec<usize>,
+    weights: Vec<T>,
+}
+
+impl<T> Default for ContactJacobian<T> {
+    fn default() -> Self {
+        Self { pointers: vec![0], dofs: Vec::new(), weights: Vec::new() }
+    }
+}
+
+impl<T: Real> ContactJacobian<T> {
+    pub(crate) fn with_capacity(rows: usize, entries: usize) -> Self {
+        let mut pointers = Vec::with_capacity(rows + 1);
+        pointers.push(0);
+        Self { pointers, dofs: Vec::with_capacity(entries), weights: Vec::with_capacity(entries) }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.pointers.truncate(1);
+        self.dofs.clear();
+        self.weights.clear();
+    }
+
+    /// Appends a row of (dof, weight) pairs.
+    pub fn push(&mut self, entries: &[(usize, T)]) {
+        for &(dof, weight) in entries {
+            self.dofs.push(dof);
+            self.weights.push(weight);
+        }
+        self.pointers.push(self.dofs.len());
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.pointers.len() - 1
+    }
+
+    /// The (dof, weight) pairs of a row.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        let range = self.pointers[row]..self.pointers[row + 1];
+        self.dofs[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
+    }
+
+    /// `G_row · x`.
+    pub fn product(&self, row: usize, x: &[T]) -> T {
+        self.row(row).map(|(dof, weight)| weight * x[dof]).sum()
+    }
+
+    /// `Σ_j |G_row,j| |x_j|`: the scale of the rounding in [`product`](Self::product).
+    pub(crate) fn magnitude(&self, row: usize, x: &[T]) -> T {
+        self.row(row).map(|(dof, weight)| (weight * x[dof]).abs()).sum()
+    }
+
+    /// `x += c G_rowᵀ`.
+    pub(crate) fn scatter(&self, row: usize, c: T, x: &mut [T]) {
+        for (dof, weight) in self.row(row) {
+            x[dof] += c * weight;
+        }
+    }
+}

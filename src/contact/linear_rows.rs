@@ -1,0 +1,192 @@
+//! Contact rows with constant G: gap = G u + g0(t).
+
+use super::{ContactConstraint, ContactJacobian, ContactLaw, GapRates};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use faer::sparse::SparseRowMatRef;
+
+type OffsetFunction<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
+
+/// The part g0 of a gap that does not depend on u: constant, or a function of time with its first two derivatives.
+pub enum GapOffset<'a, T> {
+    /// A constant initial gap (length).
+    Constant(T),
+    /// g0, ġ0, g̈0 at t; a moving obstacle, or an imposed approach.
+    Moving(OffsetFunction<'a, T>),
+}
+
+impl<T: Real> std::fmt::Debug for GapOffset<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Constant(gap) => f.debug_tuple("Constant").field(gap).finish(),
+            Self::Moving(_) => f.write_str("Moving"),
+        }
+    }
+}
+
+impl<'a, T> GapOffset<'a, T> {
+    /// An offset that moves: the closure returns g0, ġ0, g̈0 at t.
+    pub fn moving(offset: impl FnMut(f64) -> [T; 3] + Send + 'a) -> Self {
+        Self::Moving(Box::new(offset))
+    }
+}
+
+impl<T: Real> From<T> for GapOffset<'_, T> {
+    fn from(gap: T) -> Self {
+        Self::Constant(gap)
+    }
+}
+
+/// Any number of rows `g = G u + g0(t)` with constant G.
+///
+/// ```
+/// use contact_dynamics::LinearRows;
+/// use contact_dynamics::contact::GapOffset;
+///
+/// let contact = LinearRows::new()
+///     // Dof 4 of the left body pushes dof 5 of the right one; 0.01 apart at u = 0.
+///     .unilateral(&[(4, -1.0), (5, 1.0)], 0.01)
+///     // Dof 9 above a table that rises with speed 0.1.
+///     .unilateral(&[(9, 1.0)], GapOffset::moving(|t| [0.5 - 0.1 * t, -0.1, 0.0]))
+///     // Dofs 0 and 7 tied.
+///     .equality(&[(0, 1.0), (7, -1.0)], 0.0);
+/// assert_eq!(contact.len(), 3);
+/// ```
+#[derive(Debug)]
+pub struct LinearRows<'a, T: Real> {
+    jacobian: ContactJacobian<T>,
+    laws: Vec<ContactLaw>,
+    offsets: Vec<GapOffset<'a, T>>,
+}
+
+impl<T: Real> Default for LinearRows<'_, T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'a, T: Real> LinearRows<'a, T> {
+    /// No rows yet.
+    pub fn new() -> Self {
+        Self { jacobian: ContactJacobian::default(), laws: Vec::new(), offsets: Vec::new() }
+    }
+
+    /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the number of gaps is not the number of rows.
+    pub fn from_matrix(g: SparseRowMatRef<'_, usize, T>, gaps: &[T]) -> Result<Self> {
+        if gaps.len() != g.nrows() {
+            return Err(Error::Dimension { what: "the vector of gaps", expected: g.nrows(), found: gaps.len() });
+        }
+        Ok(gaps.iter().enumerate().fold(Self::new(), |rows, (i, &gap)| {
+            let columns = g.col_idx_of_row_raw(i).iter().copied();
+            let entries: Vec<_> = columns.zip(g.val_of_row(i).iter().copied()).collect();
+            rows.unilateral(&entries, gap)
+        }))
+    }
+
+    /// Adds a row with `G u + g0 ≥ 0`, given by its (dof, weight) pairs.
+    #[must_use]
+    pub fn unilateral(self, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        self.row(ContactLaw::Rigid, entries, offset)
+    }
+
+    /// Adds a row with `G u + g0 = 0`.
+    #[must_use]
+    pub fn equality(self, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        self.row(ContactLaw::Equality, entries, offset)
+    }
+
+    /// Adds a row under any law.
+    #[must_use]
+    pub fn row(mut self, law: ContactLaw, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        self.jacobian.push(entries);
+        self.laws.push(law);
+        self.offsets.push(offset.into());
+        self
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.laws.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.laws.is_empty()
+    }
+}
+
+impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
+    fn max_candidates(&self) -> usize {
+        self.laws.len()
+    }
+
+    fn max_entries(&self) -> usize {
+        self.jacobian.dofs.len()
+    }
+
+    fn check(&self, dofs: usize) -> Result<()> {
+        if let Some(&dof) = self.jacobian.dofs.iter().find(|&&dof| dof >= dofs) {
+            return Err(Error::MissingDof { what: "a contact row", dof, dofs });
+        }
+        if let Some(index) = self.jacobian.weights.iter().position(|w| !w.is_finite()) {
+            let value = self.jacobian.weights[index].value();
+            return Err(Error::NotFinite { what: "the weights of the contact rows", index, value });
+        }
+        for (index, offset) in self.offsets.iter().enumerate() {
+            match offset {
+                GapOffset::Constant(gap) if !gap.is_finite() => {
+                    return Err(Error::NotFinite { what: "the gaps of the contact rows", index, value: gap.value() });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn candidates(&self) -> usize {
+        self.laws.len()
+    }
+
+    fn identity(&self, row: usize) -> (usize, usize) {
+        (row, 0)
+    }
+
+    fn law(&self, row: usize) -> ContactLaw {
+        self.laws[row]
+    }
+
+    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+        for row in 0..self.len() {
+            let range = self.jacobian.pointers[row]..self.jacobian.pointers[row + 1];
+            out.dofs.extend_from_slice(&self.jacobian.dofs[range.clone()]);
+            out.weights.extend_from_slice(&self.jacobian.weights[range]);
+            out.pointers.push(out.dofs.len());
+        }
+    }
+
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
+        for (row, (offset, gap)) in self.offsets.iter_mut().zip(out).enumerate() {
+            let g0 = match offset {
+                GapOffset::Constant(g0) => *g0,
+                GapOffset::Moving(f) => f(t)[0],
+            };
+            *gap = self.jacobian.product(row, u) + g0;
+        }
+    }
+
+    fn rates(&mut self, t: f64, _u: &[T], _v: &[T], out: &mut [GapRates<T>]) {
+        for (offset, out) in self.offsets.iter_mut().zip(out) {
+            *out = match offset {
+                GapOffset::Constant(_) => GapRates::default(),
+                GapOffset::Moving(f) => {
+                    let [_, rate, acceleration] = f(t);
+                    GapRates { rate, acceleration }
+                }
+            };
+        }
+    }
+}

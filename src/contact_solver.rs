@@ -1,0 +1,115 @@
+//! The complementarity problem of a step, and the seam for its solvers.
+
+mod active_set;
+
+pub use active_set::ActiveSet;
+
+use crate::real::Real;
+
+/// What the multiplier of a row may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// 0 ≤ y ⊥ λ ≥ 0.
+    NonNegative,
+    /// y = 0, λ of either sign.
+    Free,
+}
+
+/// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
+///
+/// W is the Delassus operator (symmetric, positive definite on independent rows). y has the unit of a gap, and so have the
+/// tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactProblem<'a, T> {
+    /// W, column-major, size × size.
+    pub delassus: &'a [T],
+    /// q: y at λ = 0.
+    pub offset: &'a [T],
+    /// What each multiplier may be.
+    pub bounds: &'a [Bound],
+    /// For each row, the size of y that is rounding.
+    pub tolerance: &'a [T],
+}
+
+impl<T: Real> ContactProblem<'_, T> {
+    /// Number of rows.
+    pub fn size(&self) -> usize {
+        self.offset.len()
+    }
+
+    /// Entry (i, j) of W.
+    pub fn delassus(&self, i: usize, j: usize) -> T {
+        self.delassus[i + j * self.size()]
+    }
+
+    /// `y_i = (W λ + q)_i`.
+    pub fn gap(&self, i: usize, multipliers: &[T]) -> T {
+        multipliers.iter().enumerate().fold(self.offset[i], |y, (j, &lambda)| y + self.delassus(i, j) * lambda)
+    }
+
+    /// The row that misses complementarity most, and by how much (unit of y): max over `|min(y_i, W_ii λ_i)|`, or `|y_i|` for free rows.
+    pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
+        let miss = |i: usize| {
+            let y = self.gap(i, multipliers);
+            match self.bounds[i] {
+                Bound::Free => y.abs(),
+                Bound::NonNegative => y.min(self.delassus(i, i) * multipliers[i]).abs(),
+            }
+        };
+        (0..self.size()).map(|i| (i, miss(i))).fold((0, T::zero()), |worst, x| if x.1 > worst.1 { x } else { worst })
+    }
+}
+
+/// Why a contact problem was not solved; rows count within the problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactFailure<T> {
+    /// A row that would have to be active depends linearly on the other active ones.
+    Dependent {
+        /// The row.
+        row: usize,
+    },
+    /// The iteration limit was reached.
+    NotConverged {
+        /// Iterations spent.
+        iterations: usize,
+        /// The worst row.
+        row: usize,
+        /// Its residual, in the unit of y.
+        residual: T,
+    },
+}
+
+/// A solver of [`ContactProblem`]s.
+///
+/// ```
+/// use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+///
+/// let mut solver: Box<dyn ContactSolver<f64>> = Box::new(ActiveSet::default());
+/// solver.reserve(2);
+/// let problem = ContactProblem {
+///     delassus: &[2.0, 1.0, 1.0, 2.0],
+///     offset: &[-2.0, 1.0],
+///     bounds: &[Bound::NonNegative; 2],
+///     tolerance: &[1e-14; 2],
+/// };
+/// let mut lambda = [0.0; 2];
+/// solver.solve(&problem, &mut lambda).unwrap();
+/// assert_eq!(lambda, [1.0, 0.0]);
+/// assert_eq!(problem.gap(1, &lambda), 2.0);
+/// ```
+pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
+    /// Reserves memory for problems of up to `size` rows, so that [`solve`](Self::solve) does not allocate.
+    fn reserve(&mut self, size: usize);
+
+    /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are taken as active first) and the solution on exit.
+    /// The guess may change the work, never the result beyond rounding. Returns the number of iterations.
+    ///
+    /// # Errors
+    ///
+    /// [`ContactFailure`]; the multipliers are then unspecified.
+    fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> std::result::Result<usize, ContactFailure<T>>;
+}

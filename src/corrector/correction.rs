@@ -1,0 +1,428 @@
+//! What a corrector works with: the jumps of a stage, the projection that removes them, and the books on impulse and energy.
+
+use super::JumpProjection;
+use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::{ContactState, Motion};
+use crate::system::{Damping, System};
+
+/// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
+///
+/// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw multiplier
+/// positive, or equality rows) and those that touch and approach; a row that touches and separates is left alone. Every edit is booked as
+/// an impulse of its contact, so that Σ h β p + Σ J is the change of momentum to rounding.
+#[derive(Debug)]
+pub struct Correction<'a, T: Real> {
+    pub(crate) h: f64,
+    pub(crate) t: f64,
+    pub(crate) scheme: Scheme<'a>,
+    pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) projection: &'a mut JumpProjection<T>,
+    pub(crate) solver: &'a mut dyn ContactSolver<T>,
+    pub(crate) system: Erased<'a, T>,
+    pub(crate) constraints: ErasedGaps<'a, T>,
+    pub(crate) new: &'a mut Motion<T>,
+    pub(crate) past: &'a mut [Motion<T>],
+    pub(crate) backup: &'a mut Backup<T>,
+    pub(crate) contacts: &'a mut ContactState<T>,
+    /// Closed flags before this stage.
+    pub(crate) was_closed: &'a [bool],
+    pub(crate) buffers: &'a mut Buffers<T>,
+    /// Change of kinetic energy by corrections of velocity.
+    pub(crate) energy: &'a mut T,
+}
+
+/// The numbers of the scheme that a correction needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scheme<'a> {
+    /// z-weight of the acceleration row.
+    pub(crate) acceleration: f64,
+    /// z-weight of the acceleration row of the balance.
+    pub(crate) balance: f64,
+    /// Momentum covector over the past after this stage.
+    pub(crate) covector: &'a [[f64; 3]],
+    /// Which entries of the past later rows read.
+    pub(crate) read: &'a [[bool; 3]],
+}
+
+/// Which jump is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Jump {
+    Velocity,
+    Acceleration,
+}
+
+/// The gaps of all rows, as a correction evaluates them.
+pub(crate) trait Gaps<T: Real> {
+    fn law(&self, row: usize) -> ContactLaw;
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]);
+}
+
+/// Borrowed gaps, debug-printable.
+pub(crate) struct ErasedGaps<'a, T: Real>(pub(crate) &'a mut dyn Gaps<T>);
+
+impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Gaps")
+    }
+}
+
+/// A borrowed system, debug-printable.
+pub(crate) struct Erased<'a, T: Real>(pub(crate) &'a mut dyn System<T>);
+
+impl<T: Real> std::fmt::Debug for Erased<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "System({} dofs)", self.0.dofs())
+    }
+}
+
+/// The past as it was before the step, kept when a corrector first edits it.
+#[derive(Debug)]
+pub(crate) struct Backup<T> {
+    /// Rotations of the history at the present stage.
+    pub(crate) rotations: usize,
+    /// Rotations at which the copy was made, if there is one.
+    kept: Option<usize>,
+    slots: Vec<Motion<T>>,
+}
+
+impl<T: Real> Backup<T> {
+    /// Room for `slots` past states.
+    pub(crate) fn new(slots: usize, dofs: usize) -> Self {
+        Self { rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
+    }
+
+    /// Forgets the copy: the step begins.
+    pub(crate) fn begin(&mut self) {
+        (self.rotations, self.kept) = (0, None);
+    }
+
+    fn keep(&mut self, past: &[Motion<T>]) {
+        if self.kept.is_none() {
+            for (copy, original) in self.slots.iter_mut().zip(past) {
+                copy.copy_from(original);
+            }
+            self.kept = Some(self.rotations);
+        }
+    }
+
+    /// Undoes all stages of a failed step: rotations and edits of the past.
+    pub(crate) fn undo(&mut self, slots: &mut [Motion<T>]) {
+        let kept = self.kept.take();
+        slots.rotate_left(self.rotations - kept.unwrap_or(0));
+        if let Some(rotations) = kept {
+            for (original, copy) in slots[1..].iter_mut().zip(&self.slots) {
+                original.copy_from(copy);
+            }
+            slots.rotate_left(rotations);
+        }
+    }
+}
+
+/// Buffers of the corrections, one entry a closed row unless said otherwise; reserved at build.
+#[derive(Debug)]
+pub(crate) struct Buffers<T> {
+    /// Closed rows.
+    pub(crate) closed: Vec<usize>,
+    /// Engaged rows, a subset of `closed`.
+    engaged: Vec<usize>,
+    bounds: Vec<Bound>,
+    jump: Vec<T>,
+    tolerance: Vec<T>,
+    /// Impulses that remove the velocity jumps, one a closed row.
+    impulses: Vec<T>,
+    /// Forces that remove the acceleration jumps, one an engaged row.
+    forces: Vec<T>,
+    s: Vec<T>,
+    /// One a candidate.
+    rates: Vec<GapRates<T>>,
+    gaps: Vec<T>,
+    /// One a dof.
+    change: Vec<T>,
+    damping: Vec<T>,
+}
+
+impl<T: Real> Buffers<T> {
+    pub(crate) fn new(rows: usize, dofs: usize) -> Self {
+        let reals = |n| Vec::with_capacity(n);
+        Self {
+            closed: Vec::with_capacity(rows),
+            engaged: Vec::with_capacity(rows),
+            bounds: Vec::with_capacity(rows),
+            jump: reals(rows),
+            tolerance: reals(rows),
+            impulses: reals(rows),
+            forces: reals(rows),
+            s: reals(rows * rows),
+            rates: vec![GapRates::default(); rows],
+            gaps: vec![T::zero(); rows],
+            change: vec![T::zero(); dofs],
+            damping: vec![T::zero(); dofs],
+        }
+    }
+}
+
+impl<T: Real> Correction<'_, T> {
+    /// Step size.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// Time of the stage.
+    pub fn time(&self) -> f64 {
+        self.t
+    }
+
+    /// Closed rows, as indices into the contacts of the state.
+    pub fn closed(&self) -> &[usize] {
+        &self.buffers.closed
+    }
+
+    /// Engaged rows; valid after [`solve_velocity_jumps`](Self::solve_velocity_jumps).
+    pub fn engaged(&self) -> &[usize] {
+        &self.buffers.engaged
+    }
+
+    /// Displacements of the stage.
+    pub fn displacement(&self) -> &[T] {
+        &self.new.u
+    }
+
+    /// Velocities of the stage.
+    pub fn velocity(&self) -> &[T] {
+        &self.new.v
+    }
+
+    /// Accelerations of the stage.
+    pub fn acceleration(&self) -> &[T] {
+        &self.new.a
+    }
+
+    /// Contacts of the stage.
+    pub fn contacts(&self) -> &ContactState<T> {
+        self.contacts
+    }
+
+    /// Whether a row is pressed: its jumps vanish both ways.
+    fn is_pressed(&self, row: usize) -> bool {
+        self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row) == ContactLaw::Equality
+    }
+
+    /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching rows), and the engaged rows.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::DependentContacts`], [`Error::Contact`].
+    pub fn solve_velocity_jumps(&mut self) -> Result<()> {
+        let rows = std::mem::take(&mut self.buffers.closed);
+        let mut impulses = std::mem::take(&mut self.buffers.impulses);
+        let result = self.solve_jumps(&rows, Jump::Velocity, &mut impulses);
+        let Buffers { engaged, bounds, .. } = &mut *self.buffers;
+        engaged.clear();
+        for ((&row, &bound), &impulse) in rows.iter().zip(&*bounds).zip(&impulses) {
+            if bound == Bound::Free || impulse > T::zero() {
+                engaged.push(row);
+            }
+        }
+        self.buffers.closed = rows;
+        self.buffers.impulses = impulses;
+        result
+    }
+
+    /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
+    fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
+        let mut bounds = std::mem::take(&mut self.buffers.bounds);
+        bounds.clear();
+        bounds.extend(rows.iter().map(|&row| match self.is_pressed(row) {
+            true => Bound::Free,
+            false => Bound::NonNegative,
+        }));
+        let Buffers { jump: jumps, tolerance, rates, .. } = &mut *self.buffers;
+        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
+        jumps.clear();
+        tolerance.clear();
+        for &row in rows {
+            let (values, own) = match jump {
+                Jump::Velocity => (&self.new.v, rates[row].rate),
+                Jump::Acceleration => (&self.new.a, rates[row].acceleration),
+            };
+            jumps.push(self.g.product(row, values) + own);
+            tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()));
+        }
+        x.clear();
+        x.resize(rows.len(), T::zero());
+        let result = self.solve(rows, &bounds, x);
+        self.buffers.bounds = bounds;
+        result
+    }
+
+    /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping forces to a.
+    ///
+    /// # Errors
+    ///
+    /// None at present.
+    pub fn push_velocity(&mut self) -> Result<()> {
+        let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
+        let Buffers { closed, impulses, jump, change, damping, .. } = &mut **buffers;
+        if impulses.iter().all(|&impulse| impulse == T::zero()) {
+            return Ok(());
+        }
+        change.fill(T::zero());
+        for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
+            projection.push(g, row, impulse, change);
+            contacts.lambda_a[row] = -T::of(self.h) * impulse;
+            contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
+        }
+        // Work of the impulses: impulse times mean gap rate, ½ (before + after).
+        for ((&row, &impulse), &before) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
+            **energy += impulse * (before + T::of(0.5) * g.product(row, change));
+        }
+        T::axpy(T::one(), change, &mut new.v);
+        if system.0.damping(change, damping) == Damping::Present {
+            projection.apply_inverse(damping);
+            T::axpy(-T::one(), damping, &mut new.a);
+        }
+        Ok(())
+    }
+
+    /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative (touching rows).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::DependentContacts`], [`Error::Contact`].
+    pub fn solve_acceleration_jumps(&mut self) -> Result<()> {
+        let rows = std::mem::take(&mut self.buffers.engaged);
+        let mut forces = std::mem::take(&mut self.buffers.forces);
+        let result = self.solve_jumps(&rows, Jump::Acceleration, &mut forces);
+        self.buffers.engaged = rows;
+        self.buffers.forces = forces;
+        result
+    }
+
+    /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported contact force.
+    pub fn push_acceleration(&mut self) {
+        let Self { buffers, contacts, projection, new, g, scheme, h, .. } = self;
+        let share = T::of(scheme.balance / scheme.acceleration);
+        for (&row, &force) in buffers.engaged.iter().zip(&buffers.forces) {
+            projection.push(g, row, force, &mut new.a);
+            contacts.lambda[row] += share * force;
+            contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;
+            contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
+        }
+    }
+
+    /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in all past
+    /// values that later rows read (`docs/theory.md`, history projection).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::DependentContacts`].
+    pub fn project_past(&mut self) -> Result<()> {
+        if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
+            return Ok(());
+        }
+        let rows = std::mem::take(&mut self.buffers.engaged);
+        let closing = self.projection.close(self.g, &rows).map_err(|row| self.dependent(row));
+        let places = self.past.len().min(self.scheme.read.len().saturating_sub(1));
+        if closing.is_ok() && self.scheme.read[1..].iter().flatten().any(|&read| read) {
+            self.backup.keep(self.past);
+            for k in 1..=places {
+                for field in 0..3 {
+                    if self.scheme.read[k][field] {
+                        self.project_field(k, field, &rows);
+                    }
+                }
+            }
+        }
+        self.buffers.engaged = rows;
+        closing
+    }
+
+    /// Projects one field of past state k onto the engaged rows.
+    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) {
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, .. } = self;
+        let Buffers { gaps, rates, jump, .. } = &mut **buffers;
+        let motion = &mut past[k - 1];
+        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        jump.clear();
+        match field {
+            0 => {
+                constraints.0.gap(motion.t, &motion.u, gaps);
+                jump.extend(rows.iter().map(|&row| gaps[row]));
+            }
+            1 => {
+                constraints.0.rates(motion.t, &motion.u, &motion.v, rates);
+                jump.extend(rows.iter().map(|&row| g.product(row, &motion.v) + rates[row].rate));
+            }
+            _ => {
+                constraints.0.rates(motion.t, &motion.u, &motion.v, rates);
+                jump.extend(rows.iter().map(|&row| g.product(row, &motion.a) + rates[row].acceleration));
+            }
+        }
+        projection.solve(jump);
+        let (values, unit) = match field {
+            0 => (&mut motion.u, psi / h),
+            1 => (&mut motion.v, psi),
+            _ => (&mut motion.a, psi * h),
+        };
+        for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
+            projection.push(g, row, -multiplier, values);
+            contacts.impulse[row] -= T::of(unit) * multiplier;
+        }
+    }
+
+    /// Solves S x + jump for the multipliers x of `rows` under their bounds.
+    fn solve(&mut self, rows: &[usize], bounds: &[Bound], x: &mut [T]) -> Result<()> {
+        if bounds.iter().all(|&bound| bound == Bound::Free) {
+            self.projection.close(self.g, rows).map_err(|row| self.dependent(row))?;
+            for (x, &jump) in x.iter_mut().zip(&self.buffers.jump) {
+                *x = -jump;
+            }
+            self.projection.solve(x);
+            return Ok(());
+        }
+        let Buffers { s, jump, tolerance, .. } = &mut *self.buffers;
+        self.projection.assemble(self.g, rows, s);
+        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance };
+        match self.solver.solve(&problem, x) {
+            Ok(_) => Ok(()),
+            Err(failure) => Err(contact_error(self.t, failure, |row| self.contacts.ids[rows[row]])),
+        }
+    }
+
+    fn dependent(&self, row: usize) -> Error {
+        Error::DependentContacts { t: self.t, contact: self.contacts.ids[row] }
+    }
+}
+
+/// What rounding makes of a sum whose terms have this magnitude.
+pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
+    T::of(64.0) * T::epsilon() * magnitude
+}
+
+/// The error of a contact problem that failed at time t.
+pub(crate) fn contact_error<T: Real>(
+    t: f64,
+    failure: ContactFailure<T>,
+    id: impl Fn(usize) -> crate::contact::ContactId,
+) -> Error {
+    match failure {
+        ContactFailure::Dependent { row } => Error::DependentContacts { t, contact: id(row) },
+        ContactFailure::NotConverged { iterations, row, residual } => {
+            Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
+        }
+    }
+}
+
+impl<T: Real> Motion<T> {
+    /// Copies without allocating.
+    fn copy_from(&mut self, other: &Self) {
+        self.t = other.t;
+        self.u.copy_from_slice(&other.u);
+        self.v.copy_from_slice(&other.v);
+        self.a.copy_from_slice(&other.a);
+    }
+}

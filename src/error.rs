@@ -1,0 +1,249 @@
+//! The one error type of the crate: every variant carries the numbers and says what to mend.
+
+use crate::contact::ContactId;
+
+/// What went wrong, where, and with which numbers.
+///
+/// Numbers are reported as `f64` whatever the scalar of the run. A step that fails leaves state and
+/// history bit for bit as they were.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A vector or matrix has the wrong size.
+    #[error("{what} has size {found}, expected {expected}")]
+    Dimension {
+        /// Which input.
+        what: &'static str,
+        /// The size it must have.
+        expected: usize,
+        /// The size it has.
+        found: usize,
+    },
+    /// A parameter is outside its range.
+    #[error("{name} is {value:e}, it must be {range}")]
+    Parameter {
+        /// Which parameter.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// The admissible range, in words.
+        range: &'static str,
+    },
+    /// An input vector holds NaN or infinity.
+    #[error("{what} is not finite at index {index}: {value}")]
+    NotFinite {
+        /// Which input.
+        what: &'static str,
+        /// Index of the first such entry.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// An input matrix holds NaN or infinity.
+    #[error("the {matrix} matrix is not finite at ({row}, {column}): {value}")]
+    MatrixNotFinite {
+        /// Which matrix.
+        matrix: &'static str,
+        /// Row of the first such entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A matrix that must be symmetric is not; both triangles must be stored.
+    #[error(
+        "the {matrix} matrix is not symmetric: entry ({row}, {column}) is {value:e}, entry ({column}, {row}) is \
+         {mirrored:e}; store both triangles"
+    )]
+    Asymmetric {
+        /// Which matrix.
+        matrix: &'static str,
+        /// Row of the worst entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// Its value.
+        value: f64,
+        /// The value across the diagonal.
+        mirrored: f64,
+    },
+    /// A mass that must be positive is not.
+    #[error("the mass of dof {dof} is {value:e}, it must be positive")]
+    Mass {
+        /// The degree of freedom.
+        dof: usize,
+        /// Its (diagonal) mass.
+        value: f64,
+    },
+    /// A degree of freedom does not exist in the system.
+    #[error("{what} names dof {dof}, but the system has {dofs} dofs")]
+    MissingDof {
+        /// Who names it.
+        what: &'static str,
+        /// The dof named.
+        dof: usize,
+        /// Number of dofs of the system.
+        dofs: usize,
+    },
+    /// A degree of freedom is prescribed twice.
+    #[error("dof {dof} is prescribed twice; fix or drive it once")]
+    PrescribedTwice {
+        /// The dof.
+        dof: usize,
+    },
+    /// An initial value contradicts the prescribed motion.
+    #[error("{what} of dof {dof} starts at {given:e}, but its support prescribes {prescribed:e} at the start time")]
+    PrescribedStart {
+        /// Displacement or velocity.
+        what: &'static str,
+        /// The dof.
+        dof: usize,
+        /// The initial value given by the host.
+        given: f64,
+        /// The prescribed value.
+        prescribed: f64,
+    },
+    /// Something that must have content is empty.
+    #[error("{what} is empty; {remedy}")]
+    Empty {
+        /// What is empty.
+        what: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Two parts do not fit together.
+    #[error("{part} cannot be used here: {reason}")]
+    Incompatible {
+        /// The part that was refused.
+        part: String,
+        /// Why.
+        reason: &'static str,
+    },
+    /// A time-integration tableau is malformed.
+    #[error("tableau of {integrator}, stage {stage}: {reason}")]
+    Tableau {
+        /// Name of the integrator.
+        integrator: String,
+        /// Index of the stage.
+        stage: usize,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// A matrix that must be positive definite is not.
+    #[error(
+        "the {matrix} is not positive definite: pivot of dof {dof} is not positive; look for a body without mass or \
+         support, or a negative stiffness"
+    )]
+    Singular {
+        /// Which matrix.
+        matrix: &'static str,
+        /// Degree of freedom of the failing pivot.
+        dof: usize,
+    },
+    /// A factorization does not fit into memory or its index range.
+    #[error("no memory for {what}")]
+    OutOfMemory {
+        /// What was to be allocated.
+        what: &'static str,
+    },
+    /// A contact row has no effect on any free degree of freedom.
+    #[error("contact {contact} acts on no free dof with mass: its row of G is zero or all its dofs are prescribed")]
+    EmptyContact {
+        /// The contact.
+        contact: ContactId,
+    },
+    /// Two contact rows demand the same thing.
+    #[error("contact {contact} repeats contact {other} (same row of G, same gap); remove one of them")]
+    DuplicateContact {
+        /// The repeated row.
+        contact: ContactId,
+        /// The row it repeats.
+        other: ContactId,
+    },
+    /// The active contact rows are linearly dependent.
+    #[error(
+        "t = {t:e}: contact {contact} is linearly dependent on the other closed contacts; remove the redundant row"
+    )]
+    DependentContacts {
+        /// Time of the stage.
+        t: f64,
+        /// The row found dependent.
+        contact: ContactId,
+    },
+    /// The contact problem was not solved.
+    #[error(
+        "t = {t:e}: contact problem not solved after {iterations} iterations; contact {contact} misses complementarity by \
+         {residual:e} (gap units)"
+    )]
+    Contact {
+        /// Time of the stage.
+        t: f64,
+        /// Iterations spent.
+        iterations: usize,
+        /// Worst contact.
+        contact: ContactId,
+        /// Its complementarity residual, in units of the gap.
+        residual: f64,
+    },
+    /// The initial state violates a contact constraint.
+    #[error(
+        "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is not \
+         negative (zero for an equality row)"
+    )]
+    InitialViolation {
+        /// The contact.
+        contact: ContactId,
+        /// Its gap (negative: depth).
+        gap: f64,
+        /// Rounding tolerance of that gap.
+        tolerance: f64,
+    },
+    /// A step produced NaN or infinity.
+    #[error("step from t = {t:e} with h = {h:e}: {what} of dof {dof} is {value}")]
+    StepNotFinite {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// Which quantity.
+        what: &'static str,
+        /// First offending dof.
+        dof: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A gap or a multiplier is NaN or infinite.
+    #[error("t = {t:e}: {what} of contact {contact} is {value}")]
+    ContactNotFinite {
+        /// Time of the stage.
+        t: f64,
+        /// Gap or multiplier.
+        what: &'static str,
+        /// The contact.
+        contact: ContactId,
+        /// Its value.
+        value: f64,
+    },
+    /// A callback of the host failed.
+    #[error("the host's {callback} failed")]
+    Host {
+        /// Which callback.
+        callback: &'static str,
+        /// The host's own error.
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+/// Result with the crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// Whether a smaller step may help (a failed step, not a wrong input).
+    ///
+    /// Errors of the host's own callbacks are never recoverable: the library cannot know.
+    pub fn is_recoverable(&self) -> bool {
+        matches!(self, Self::Contact { .. } | Self::StepNotFinite { .. } | Self::ContactNotFinite { .. })
+    }
+}

@@ -1,0 +1,33 @@
+#![doc = include_str!("lib.md")]
+
+pub mod analysis;
+pub mod contact;
+pub mod contact_solver;
+pub mod corrector;
+mod dense;
+mod error;
+pub mod integrator;
+pub mod linear_solver;
+pub mod mass;
+pub mod observer;
+mod real;
+pub mod reference;
+mod simulation;
+mod sparse;
+mod state;
+mod system;
+pub mod tableau;
+
+pub use contact::{ContactConstraint, LinearRows};
+pub use contact_solver::{ActiveSet, ContactSolver};
+pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
+pub use error::{Error, Result};
+pub use faer;
+pub use integrator::{Composite, Newmark, TimeIntegrator};
+pub use linear_solver::{Automatic, Cholesky, Diagonal, Factorization, LinearSolver};
+pub use mass::Mass;
+pub use observer::{Control, Observer, StepView};
+pub use real::Real;
+pub use simulation::{Energy, Outcome, Simulation, SimulationBuilder, Statistics, Works};
+pub use state::{ContactState, History, State};
+pub use system::{Damping, LinearSystem, System, TangentWeights};

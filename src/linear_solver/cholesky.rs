@@ -1,0 +1,75 @@
+//! Sparse Cholesky through faer: simplicial L D Lᵀ for chains, supernodal L Lᵀ for the rest.
+
+use super::{Factorization, LinearSolver};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::real::kernels::Factorization as Kind;
+use faer::Side;
+use faer::dyn_stack::MemBuffer;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+
+/// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree.
+///
+/// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
+/// is not positive definite is refused with the dof of the failing pivot. In `f32` fill entries far from the diagonal may
+/// become subnormal and slow a factorization down several times; see `docs/design.md`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cholesky {}
+
+struct Factor<T: Real> {
+    symbolic: SymbolicCholesky<usize>,
+    kind: Kind,
+    values: Vec<T>,
+    memory: MemBuffer,
+    columns: usize,
+}
+
+impl<T: Real> std::fmt::Debug for Factor<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Factor").field("kind", &self.kind).field("values", &self.values.len()).finish_non_exhaustive()
+    }
+}
+
+impl<T: Real> LinearSolver<T> for Cholesky {
+    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
+        let out_of_memory = |_| Error::OutOfMemory { what: "a sparse Cholesky factor" };
+        let symbolic = factorize_symbolic_cholesky(
+            pattern,
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        )
+        .map_err(out_of_memory)?;
+        let kind = match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(_) => Kind::Ldlt,
+            SymbolicCholeskyRaw::Supernodal(_) => Kind::Llt,
+        };
+        let scratch = T::cholesky_scratch(kind, &symbolic, 1);
+        let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
+        let values = vec![T::zero(); symbolic.len_val()];
+        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1 }))
+    }
+}
+
+impl<T: Real> Factorization<T> for Factor<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        T::cholesky(self.kind, &self.symbolic, a, &mut self.values, &mut self.memory)
+            .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })
+    }
+
+    fn solve(&mut self, rhs: &mut [T]) {
+        let columns = rhs.len().checked_div(self.symbolic.nrows()).unwrap_or(0);
+        if columns > self.columns {
+            self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
+            self.columns = columns;
+        }
+        T::cholesky_solve(self.kind, &self.symbolic, &self.values, rhs, columns, &mut self.memory);
+    }
+
+    fn stored_values(&self) -> usize {
+        self.values.len()
+    }
+}

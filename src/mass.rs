@@ -1,0 +1,104 @@
+//! Mass matrices: lumping, and M⁻¹ on the degrees of freedom that are free to move.
+
+use crate::error::{Error, Result};
+use crate::linear_solver::{Automatic, Factorization, LinearSolver};
+use crate::real::Real;
+use crate::sparse;
+use faer::sparse::SparseColMatRef;
+
+/// A view of a mass matrix.
+#[derive(Clone, Copy, Debug)]
+pub enum Mass<'a, T> {
+    /// Diagonal: one mass a dof.
+    Lumped(&'a [T]),
+    /// Symmetric, both triangles stored.
+    Consistent(SparseColMatRef<'a, usize, T>),
+}
+
+impl<T: Real> Mass<'_, T> {
+    /// `y += c M x`.
+    pub fn product(&self, c: T, x: &[T], y: &mut [T]) {
+        match *self {
+            Self::Lumped(mass) => {
+                for ((y, &x), &m) in y.iter_mut().zip(x).zip(mass) {
+                    *y += c * m * x;
+                }
+            }
+            Self::Consistent(m) => T::symmetric_product(c, m, x, y),
+        }
+    }
+}
+
+/// Row-sum lumping: the diagonal matrix with the same row sums, hence the same total mass.
+///
+/// # Errors
+///
+/// [`Error::Mass`] if a row sum is not positive (quadratic elements can do that), with the dof and the sum.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// // One linear bar element of mass 6: consistent [2 1; 1 2].
+/// let m = SparseColMat::try_new_from_triplets(
+///     2, 2, &[Triplet::new(0, 0, 2.0), Triplet::new(0, 1, 1.0), Triplet::new(1, 0, 1.0), Triplet::new(1, 1, 2.0)],
+/// )?;
+/// assert_eq!(contact_dynamics::mass::lump(m.as_ref())?, [3.0, 3.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn lump<T: Real>(mass: SparseColMatRef<'_, usize, T>) -> Result<Vec<T>> {
+    sparse::square("mass", mass)?;
+    let mut lumped = vec![T::zero(); mass.nrows()];
+    T::product(T::one(), mass, &vec![T::one(); mass.ncols()], &mut lumped);
+    match lumped.iter().position(|&m| !(m > T::zero() && m.is_finite())) {
+        Some(dof) => Err(Error::Mass { dof, value: lumped[dof].value() }),
+        None => Ok(lumped),
+    }
+}
+
+/// M⁻¹ on the free dofs: prescribed dofs have no response, their rows and columns are left out of M.
+#[derive(Debug)]
+pub(crate) enum InverseMass<T> {
+    /// 1/m, zero on prescribed dofs.
+    Lumped(Vec<T>),
+    /// A factor of M with identity on the prescribed dofs.
+    Consistent { factor: Box<dyn Factorization<T>>, prescribed: Vec<usize> },
+}
+
+impl<T: Real> InverseMass<T> {
+    pub(crate) fn new(mass: Mass<'_, T>, prescribed: &[usize]) -> Result<Self> {
+        match mass {
+            Mass::Lumped(mass) => {
+                let mut inverse = Vec::with_capacity(mass.len());
+                for (dof, &m) in mass.iter().enumerate() {
+                    let free = prescribed.binary_search(&dof).is_err();
+                    if free && !(m > T::zero() && m.is_finite()) {
+                        return Err(Error::Mass { dof, value: m.value() });
+                    }
+                    inverse.push(if free { m.recip() } else { T::zero() });
+                }
+                Ok(Self::Lumped(inverse))
+            }
+            Mass::Consistent(mass) => {
+                let reduced = sparse::Combination::new(mass.ncols(), prescribed, &[mass.symbolic()])?;
+                let mut values = vec![T::zero(); reduced.len()];
+                reduced.fill(&[(T::one(), mass.val())], None, &mut values);
+                let mut factor = Automatic.analyze(reduced.pattern())?;
+                factor.factorize(reduced.view(&values)).map_err(|error| match error {
+                    Error::Singular { dof, .. } => Error::Singular { matrix: "mass matrix", dof },
+                    other => other,
+                })?;
+                Ok(Self::Consistent { factor, prescribed: prescribed.to_vec() })
+            }
+        }
+    }
+
+    /// `x ← M⁻¹ x`, zero on prescribed dofs.
+    pub(crate) fn apply(&mut self, x: &mut [T]) {
+        match self {
+            Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
+            Self::Consistent { factor, prescribed } => {
+                prescribed.iter().for_each(|&dof| x[dof] = T::zero());
+                factor.solve(x);
+            }
+        }
+    }
+}

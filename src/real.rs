@@ -1,0 +1,223 @@
+//! The scalar of a run: `f32` or `f64`, and the kernels that are compiled inside this crate for both.
+//!
+//! A host in a debug build would otherwise compile the generic loops without optimization: with
+//! `[profile.dev.package."*"] opt-level = 3` the functions instantiated here stay fast.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::{ldlt::factor::LdltError, llt::factor::LltError};
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::cholesky::{LdltRef, LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
+use faer::traits::RealField;
+use faer::{Conj, MatMut, Par, Side};
+use num_traits::{Float, NumAssign};
+use std::fmt::{Debug, Display, LowerExp};
+use std::iter::Sum;
+
+/// A real scalar, `f32` or `f64` (sealed).
+///
+/// Time, step size and scheme coefficients are `f64` in every run; `Real` is the type of matrices and vectors.
+pub trait Real:
+    kernels::Kernels + Float + NumAssign + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
+{
+    /// The scalar nearest to `x`.
+    fn of(x: f64) -> Self;
+    /// The value as `f64`.
+    fn value(self) -> f64;
+}
+
+/// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
+pub(crate) mod kernels {
+    use super::*;
+
+    /// How a factor of a symmetric matrix is stored.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Factorization {
+        /// L D Lᵀ, simplicial.
+        Ldlt,
+        /// L Lᵀ, supernodal.
+        Llt,
+    }
+
+    #[doc(hidden)]
+    pub trait Kernels: Sized {
+        /// `out = c x`.
+        fn scale_into(c: Self, x: &[Self], out: &mut [Self]);
+        /// `out += c x`.
+        fn axpy(c: Self, x: &[Self], out: &mut [Self]);
+        /// Whether every entry is finite.
+        fn all_finite(x: &[Self]) -> bool;
+        /// `y += c A x`, any A.
+        fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
+        /// `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
+        fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
+        /// Factorizes; `Err` holds the failing index in the numbering of the caller.
+        fn cholesky(
+            kind: Factorization,
+            symbolic: &SymbolicCholesky<usize>,
+            a: SparseColMatRef<'_, usize, Self>,
+            values: &mut [Self],
+            memory: &mut MemBuffer,
+        ) -> Result<(), usize>;
+        /// Solves in place for the columns of `rhs`.
+        fn cholesky_solve(
+            kind: Factorization,
+            symbolic: &SymbolicCholesky<usize>,
+            values: &[Self],
+            rhs: &mut [Self],
+            columns: usize,
+            memory: &mut MemBuffer,
+        );
+        /// Scratch for factorizing and for solving `columns` right-hand sides.
+        fn cholesky_scratch(
+            kind: Factorization,
+            symbolic: &SymbolicCholesky<usize>,
+            columns: usize,
+        ) -> faer::dyn_stack::StackReq;
+    }
+
+    // The generic bodies are inlined into the concrete implementations below, once a scalar.
+
+    #[inline(always)]
+    fn product<T: Real>(c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+        for (j, &xj) in x.iter().enumerate() {
+            let cx = c * xj;
+            for (&i, &value) in a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)) {
+                y[i] += value * cx;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn symmetric_product<T: Real>(c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+        let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
+        for (yj, range) in y.iter_mut().zip(pointers.windows(2)) {
+            let mut sum = T::zero();
+            for (&i, &value) in rows[range[0]..range[1]].iter().zip(&values[range[0]..range[1]]) {
+                sum += value * x[i];
+            }
+            *yj += c * sum;
+        }
+    }
+
+    #[inline(always)]
+    fn cholesky<T: RealField>(
+        kind: Factorization,
+        symbolic: &SymbolicCholesky<usize>,
+        a: SparseColMatRef<'_, usize, T>,
+        values: &mut [T],
+        memory: &mut MemBuffer,
+    ) -> Result<(), usize> {
+        let stack = MemStack::new(memory);
+        let failure = match kind {
+            Factorization::Llt => symbolic
+                .factorize_numeric_llt(values, a, Side::Lower, Default::default(), Par::Seq, stack, Default::default())
+                .err()
+                .map(|LltError::NonPositivePivot { index }| index),
+            Factorization::Ldlt => symbolic
+                .factorize_numeric_ldlt(values, a, Side::Lower, Default::default(), Par::Seq, stack, Default::default())
+                .err()
+                .map(|LdltError::ZeroPivot { index }| index),
+        };
+        let original = |k: usize| symbolic.perm().map_or(k, |p| p.arrays().0[k]);
+        if let Some(index) = failure {
+            // faer counts pivots from one in simplicial factors and from zero in supernodal ones.
+            let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
+            return Err(original(index.saturating_sub(base)));
+        }
+        // LDLᵀ of an indefinite matrix succeeds: the signs of D decide. The first entry of a simplicial column is D.
+        if let (Factorization::Ldlt, SymbolicCholeskyRaw::Simplicial(raw)) = (kind, symbolic.raw()) {
+            let pivots = &raw.col_ptr()[..symbolic.nrows()];
+            let bad = |&start: &usize| !(values[start] > T::zero_impl() && T::is_finite_impl(&values[start]));
+            if let Some(k) = pivots.iter().position(bad) {
+                return Err(original(k));
+            }
+        }
+        Ok(())
+    }
+
+    macro_rules! kernels {
+        ($scalar:ty) => {
+            impl Kernels for $scalar {
+                fn scale_into(c: Self, x: &[Self], out: &mut [Self]) {
+                    for (y, &x) in out.iter_mut().zip(x) {
+                        *y = c * x;
+                    }
+                }
+                fn axpy(c: Self, x: &[Self], out: &mut [Self]) {
+                    for (y, &x) in out.iter_mut().zip(x) {
+                        *y += c * x;
+                    }
+                }
+                fn all_finite(x: &[Self]) -> bool {
+                    // x − x is 0 for finite x and NaN otherwise; the sum vectorizes, an early exit does not.
+                    x.iter().map(|&x| x - x).sum::<$scalar>() == 0.0
+                }
+                fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
+                    product(c, a, x, y);
+                }
+                fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
+                    symmetric_product(c, a, x, y);
+                }
+                fn cholesky(
+                    kind: Factorization,
+                    symbolic: &SymbolicCholesky<usize>,
+                    a: SparseColMatRef<'_, usize, Self>,
+                    values: &mut [Self],
+                    memory: &mut MemBuffer,
+                ) -> Result<(), usize> {
+                    cholesky(kind, symbolic, a, values, memory)
+                }
+                fn cholesky_solve(
+                    kind: Factorization,
+                    symbolic: &SymbolicCholesky<usize>,
+                    values: &[Self],
+                    rhs: &mut [Self],
+                    columns: usize,
+                    memory: &mut MemBuffer,
+                ) {
+                    let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
+                    let stack = MemStack::new(memory);
+                    match kind {
+                        Factorization::Llt => {
+                            LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack)
+                        }
+                        Factorization::Ldlt => {
+                            LdltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack)
+                        }
+                    }
+                }
+                fn cholesky_scratch(
+                    kind: Factorization,
+                    symbolic: &SymbolicCholesky<usize>,
+                    columns: usize,
+                ) -> faer::dyn_stack::StackReq {
+                    let solve = symbolic.solve_in_place_scratch::<$scalar>(columns, Par::Seq);
+                    let factorize = match kind {
+                        Factorization::Llt => {
+                            symbolic.factorize_numeric_llt_scratch::<$scalar>(Par::Seq, Default::default())
+                        }
+                        Factorization::Ldlt => {
+                            symbolic.factorize_numeric_ldlt_scratch::<$scalar>(Par::Seq, Default::default())
+                        }
+                    };
+                    solve.or(factorize)
+                }
+            }
+
+            impl Real for $scalar {
+                #[inline]
+                #[allow(clippy::cast_possible_truncation)]
+                fn of(x: f64) -> Self {
+                    x as $scalar
+                }
+                #[inline]
+                fn value(self) -> f64 {
+                    f64::from(self)
+                }
+            }
+        };
+    }
+
+    kernels!(f64);
+    kernels!(f32);
+}

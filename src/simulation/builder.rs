@@ -1,0 +1,302 @@
+//! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
+
+use super::energy::Ledger;
+use super::program::Compiler;
+use super::start::{self, Start};
+use super::{Constraints, ContactRowsWork, Simulation, Statistics, Workspace};
+use crate::contact::{ContactConstraint, GapRates};
+use crate::contact_solver::{ActiveSet, ContactSolver};
+use crate::corrector::{Backup, Buffers, Corrector, Edits};
+use crate::error::{Error, Result};
+use crate::integrator::{Newmark, TimeIntegrator};
+use crate::linear_solver::{Automatic, LinearSolver};
+use crate::mass::Mass;
+use crate::real::Real;
+use crate::state::{Clock, ContactState, History, Motion, State};
+use crate::system::System;
+
+/// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
+pub struct SimulationBuilder<'a, T: Real> {
+    system: Box<dyn System<T> + 'a>,
+    integrator: Box<dyn TimeIntegrator + 'a>,
+    h: f64,
+    t: f64,
+    u: Option<Vec<T>>,
+    v: Option<Vec<T>>,
+    constraints: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+    contact_solver: Box<dyn ContactSolver<T> + 'a>,
+    correctors: Vec<Box<dyn Corrector<T> + 'a>>,
+    linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    resumed: Option<(State<T>, History<T>)>,
+    balance: EnergyBalance,
+}
+
+/// Whether the works of the energy balance are accumulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum EnergyBalance {
+    Off,
+    On,
+}
+
+impl<T: Real> std::fmt::Debug for SimulationBuilder<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SimulationBuilder")
+            .field("integrator", &self.integrator)
+            .field("h", &self.h)
+            .field("constraints", &self.constraints.len())
+            .field("correctors", &self.correctors)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a, T: Real> SimulationBuilder<'a, T> {
+    pub(super) fn new(system: Box<dyn System<T> + 'a>, integrator: Box<dyn TimeIntegrator + 'a>, h: f64) -> Self {
+        Self {
+            system,
+            integrator,
+            h,
+            t: 0.0,
+            u: None,
+            v: None,
+            constraints: Vec::new(),
+            contact_solver: Box::new(ActiveSet::default()),
+            correctors: Vec::new(),
+            linear_solver: Box::new(Automatic),
+            resumed: None,
+            balance: EnergyBalance::Off,
+        }
+    }
+
+    /// Time at the start; 0 by default.
+    #[must_use]
+    pub fn start_time(mut self, t: f64) -> Self {
+        self.t = t;
+        self
+    }
+
+    /// Initial displacements, one a dof; zero by default. Prescribed dofs may be left at zero.
+    #[must_use]
+    pub fn displacement(mut self, u: Vec<T>) -> Self {
+        self.u = Some(u);
+        self
+    }
+
+    /// Initial velocities, one a dof; zero by default. Prescribed dofs may be left at zero.
+    #[must_use]
+    pub fn velocity(mut self, v: Vec<T>) -> Self {
+        self.v = Some(v);
+        self
+    }
+
+    /// Adds a contact constraint; any number may be added.
+    #[must_use]
+    pub fn constraint(mut self, constraint: impl ContactConstraint<T> + 'a) -> Self {
+        self.constraints.push(Box::new(constraint));
+        self
+    }
+
+    /// Chooses the solver of the contact problems; [`ActiveSet`] by default.
+    #[must_use]
+    pub fn contact_solver(mut self, solver: impl ContactSolver<T> + 'a) -> Self {
+        self.contact_solver = Box::new(solver);
+        self
+    }
+
+    /// Adds a corrector; several act in the order given.
+    #[must_use]
+    pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
+        self.correctors.push(Box::new(corrector));
+        self
+    }
+
+    /// Chooses the linear solver; [`Automatic`] by default.
+    #[must_use]
+    pub fn linear_solver(mut self, solver: impl LinearSolver<T> + 'a) -> Self {
+        self.linear_solver = Box::new(solver);
+        self
+    }
+
+    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs about one K-product a step.
+    #[must_use]
+    pub fn energy_balance(mut self) -> Self {
+        self.balance = EnergyBalance::On;
+        self
+    }
+
+    /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit. Initial values
+    /// and start time given elsewhere are ignored.
+    #[must_use]
+    pub fn resume(mut self, state: State<T>, history: History<T>) -> Self {
+        self.resumed = Some((state, history));
+        self
+    }
+
+    /// Checks everything and builds.
+    ///
+    /// # Errors
+    ///
+    /// Any [`Error`] that names a wrong input: sizes, NaN, parameters, masses, supports, contact rows on missing or prescribed dofs,
+    /// duplicated rows, initial penetration, a singular effective matrix, parts that do not fit together.
+    pub fn build(self) -> Result<Simulation<'a, T>> {
+        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
+        }
+        if !t.is_finite() {
+            return Err(Error::Parameter { name: "the start time", value: t, range: "finite" });
+        }
+        let dofs = check_system(&*system)?;
+        let tableau = integrator.tableau();
+        tableau.check(&integrator.name())?;
+        let (depth, stages) = (tableau.depth(), tableau.stages.len());
+        let (mut constraints, mut g) = Constraints::new(constraints, dofs)?;
+        let rows = constraints.capacity();
+        if rows > 0 && tableau.stages.iter().any(|stage| stage.recovery.u.z == 0.0) {
+            return Err(Error::Incompatible {
+                part: integrator.name(),
+                reason: "its displacements do not contain the unknown, so a gap cannot be closed by a multiplier",
+            });
+        }
+        let initial = |what, values: Option<Vec<T>>| {
+            let values = values.unwrap_or_else(|| vec![T::zero(); dofs]);
+            check_vector(what, &values, dofs).map(|()| values)
+        };
+        let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
+
+        let momentum = tableau.momentum();
+        let (state, history, projection) = match self.resumed {
+            Some((state, history)) => {
+                history.check(dofs, depth + stages)?;
+                check_vector("the resumed displacement", &state.motion.u, dofs)?;
+                check_vector("the resumed velocity", &state.motion.v, dofs)?;
+                check_vector("the resumed acceleration", &state.motion.a, dofs)?;
+                if history.clock.h.to_bits() != h.to_bits() {
+                    let value = history.clock.h;
+                    return Err(Error::Parameter {
+                        name: "the step size of the history",
+                        value,
+                        range: "h of the run",
+                    });
+                }
+                constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
+                constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
+                let projection = start::projection(&*system, dofs, rows)?;
+                (state, history, projection)
+            }
+            None => {
+                let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, h, t };
+                let (motion, contacts, projection) = start.state(u, v, &mut constraints, &mut g, rows)?;
+                let known = if start::is_free_flight(&motion, h) { depth } else { 1 };
+                let mut slots = vec![Motion::zero(dofs); depth + stages];
+                if known > 1 {
+                    start::straight_past(&motion, h, &mut slots[1..depth]);
+                }
+                let clock = Clock { reference: t, steps: 0, h };
+                (State { motion, contacts }, History { slots, known, clock }, projection)
+            }
+        };
+        contact_solver.reserve(rows);
+
+        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, rows };
+        let program = compiler.compile(&tableau, &momentum, &tableau)?;
+        let startup = match history.known < depth {
+            true => Some(compiler.compile(&Newmark::trapezoidal().tableau(), &momentum, &tableau)?),
+            false => None,
+        };
+        let factorizations =
+            program.operators.len() as u64 + startup.as_ref().map_or(0, |program| program.operators.len() as u64);
+        let prescribed = system.prescribed().to_vec();
+        let edits_past = self.correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+        let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
+        let work = Workspace {
+            increment: vec![T::zero(); dofs],
+            balance: separate_balance.then(|| Motion::zero(dofs)),
+            supports: vec![[T::zero(); 3]; prescribed.len()],
+            balance_supports: vec![[T::zero(); 3]; prescribed.len()],
+            coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
+            prescribed,
+            trial: ContactState::with_capacity(rows),
+            was_closed: Vec::with_capacity(rows),
+            rows: ContactRowsWork {
+                gaps: vec![T::zero(); rows],
+                rates: vec![GapRates::default(); rows],
+                tolerance: vec![T::zero(); rows],
+                in_problem: vec![false; rows],
+                problem: Vec::with_capacity(rows),
+                delassus: Vec::with_capacity(rows * rows),
+                offset: Vec::with_capacity(rows),
+                problem_tolerance: Vec::with_capacity(rows),
+                bounds: Vec::with_capacity(rows),
+                multipliers: Vec::with_capacity(rows),
+            },
+            buffers: Buffers::new(rows, dofs),
+            projection: (rows > 0 && !self.correctors.is_empty()).then_some(projection),
+            backup: Backup::new(if edits_past { depth + stages - 1 } else { 0 }, dofs),
+            correction_energy: T::zero(),
+        };
+        let ledger = match self.balance {
+            EnergyBalance::Off => None,
+            EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
+        };
+        let mut simulation = Simulation {
+            system,
+            constraints,
+            g,
+            contact_solver,
+            correctors: self.correctors,
+            integrator,
+            momentum,
+            program,
+            startup,
+            depth,
+            state,
+            history,
+            work,
+            ledger,
+            statistics: Statistics { factorizations, ..Statistics::default() },
+        };
+        let Simulation { constraints, state, work, .. } = &mut simulation;
+        constraints.finite_gaps(state.motion.t, &state.motion.u, &mut work.rows.gaps)?;
+        Ok(simulation)
+    }
+}
+
+/// Sizes and supports of a host's system.
+fn check_system<T: Real>(system: &dyn System<T>) -> Result<usize> {
+    let dofs = system.dofs();
+    if dofs == 0 {
+        return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
+    }
+    let size = |what, found| match found == dofs {
+        true => Ok(()),
+        false => Err(Error::Dimension { what, expected: dofs, found }),
+    };
+    match system.mass() {
+        Mass::Lumped(mass) => size("the mass", mass.len())?,
+        Mass::Consistent(mass) => {
+            size("the mass matrix", mass.nrows())?;
+            size("the mass matrix", mass.ncols())?;
+        }
+    }
+    size("the pattern of the tangent", system.pattern().nrows())?;
+    size("the pattern of the tangent", system.pattern().ncols())?;
+    let prescribed = system.prescribed();
+    if let Some(&dof) = prescribed.iter().find(|&&dof| dof >= dofs) {
+        return Err(Error::MissingDof { what: "a support", dof, dofs });
+    }
+    match prescribed.windows(2).find(|pair| pair[0] >= pair[1]) {
+        Some(pair) if pair[0] == pair[1] => Err(Error::PrescribedTwice { dof: pair[0] }),
+        Some(_) => Err(Error::Incompatible { part: "the system".into(), reason: "its prescribed dofs must ascend" }),
+        None => Ok(dofs),
+    }
+}
+
+fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
+    if values.len() != dofs {
+        return Err(Error::Dimension { what, expected: dofs, found: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,143 @@
+//! All constraints of a simulation as one list of rows.
+
+use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates};
+use crate::corrector::Gaps;
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// The constraints in the order given, their rows one after the other.
+pub(crate) struct Constraints<'a, T: Real> {
+    parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+    pub(crate) ids: Vec<ContactId>,
+    laws: Vec<ContactLaw>,
+}
+
+impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Constraints").field("parts", &self.parts.len()).field("rows", &self.ids.len()).finish()
+    }
+}
+
+impl<'a, T: Real> Constraints<'a, T> {
+    /// The constraints, and the rows of their G (kept apart: corrections read G while they evaluate gaps).
+    pub(crate) fn new(
+        parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+        dofs: usize,
+    ) -> Result<(Self, ContactJacobian<T>)> {
+        for part in &parts {
+            part.check(dofs)?;
+        }
+        let rows = parts.iter().map(|part| part.max_candidates()).sum();
+        let entries = parts.iter().map(|part| part.max_entries()).sum();
+        let mut jacobian = ContactJacobian::with_capacity(rows, entries);
+        let mut constraints = Self { parts, ids: Vec::with_capacity(rows), laws: Vec::with_capacity(rows) };
+        constraints.rebuild(&mut jacobian);
+        Ok((constraints, jacobian))
+    }
+
+    /// The largest number of rows there can be.
+    pub(crate) fn capacity(&self) -> usize {
+        self.parts.iter().map(|part| part.max_candidates()).sum()
+    }
+
+    pub(crate) fn search(&mut self, t: f64, u: &[T], v: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+        let mut found = Candidates::Unchanged;
+        for part in &mut self.parts {
+            if part.search(t, u, v)? == Candidates::Changed {
+                found = Candidates::Changed;
+            }
+        }
+        if found == Candidates::Changed {
+            self.rebuild(jacobian);
+        }
+        Ok(found)
+    }
+
+    fn rebuild(&mut self, jacobian: &mut ContactJacobian<T>) {
+        let Self { parts, ids, laws } = self;
+        jacobian.clear();
+        ids.clear();
+        laws.clear();
+        for (constraint, part) in parts.iter().enumerate() {
+            part.jacobian(jacobian);
+            for row in 0..part.candidates() {
+                let (feature, candidate) = part.identity(row);
+                ids.push(ContactId { constraint, feature, candidate });
+                laws.push(part.law(row));
+            }
+        }
+    }
+
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Gaps of all rows, refusing NaN and infinity.
+    pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
+        self.gap(t, u, out);
+        match out[..self.len()].iter().position(|gap| !gap.is_finite()) {
+            None => Ok(()),
+            Some(row) => {
+                Err(Error::ContactNotFinite { t, what: "the gap", contact: self.ids[row], value: out[row].value() })
+            }
+        }
+    }
+
+    /// Refuses rows that act on no free dof, and repeated rows with the same gap.
+    pub(crate) fn check_rows(
+        &mut self,
+        jacobian: &ContactJacobian<T>,
+        prescribed: &[usize],
+        t: f64,
+        u: &[T],
+    ) -> Result<()> {
+        let mut gaps = vec![T::zero(); self.len()];
+        self.finite_gaps(t, u, &mut gaps)?;
+        let mut rows: Vec<(Vec<(usize, T)>, usize)> = Vec::with_capacity(self.len());
+        for (row, &contact) in self.ids.iter().enumerate() {
+            let mut entries: Vec<_> = jacobian.row(row).filter(|(_, weight)| *weight != T::zero()).collect();
+            if entries.iter().all(|(dof, _)| prescribed.binary_search(dof).is_ok()) {
+                return Err(Error::EmptyContact { contact });
+            }
+            entries.sort_unstable_by_key(|&(dof, _)| dof);
+            rows.push((entries, row));
+        }
+        let order = |x: &(usize, T), y: &(usize, T)| x.0.cmp(&y.0).then(x.1.value().total_cmp(&y.1.value()));
+        rows.sort_by(|(x, i), (y, j)| {
+            let entries = x.iter().zip(y).map(|(x, y)| order(x, y)).find(|o| o.is_ne());
+            x.len().cmp(&y.len()).then(entries.unwrap_or(std::cmp::Ordering::Equal)).then(i.cmp(j))
+        });
+        for pair in rows.windows(2) {
+            let (i, j) = (pair[0].1, pair[1].1);
+            if pair[0].0 == pair[1].0 && gaps[i] == gaps[j] && self.laws[i] == self.laws[j] {
+                return Err(Error::DuplicateContact { contact: self.ids[j], other: self.ids[i] });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real> Gaps<T> for Constraints<'_, T> {
+    fn law(&self, row: usize) -> ContactLaw {
+        self.laws[row]
+    }
+
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
+        let mut rest = out;
+        for part in &mut self.parts {
+            let (own, others) = rest.split_at_mut(part.candidates());
+            part.gap(t, u, own);
+            rest = others;
+        }
+    }
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+        let mut rest = out;
+        for part in &mut self.parts {
+            let (own, others) = rest.split_at_mut(part.candidates());
+            part.rates(t, u, v, own);
+            rest = others;
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! Energy of a state, the energy balance of a run, and the forces of the supports.
+
+use crate::contact::ContactJacobian;
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::{ContactState, Motion, State};
+use crate::system::{Damping, System};
+
+/// Energy of a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Energy<T> {
+    /// ½ vᵀ M v.
+    pub kinetic: T,
+    /// ½ uᵀ K u, if the system has a potential.
+    pub potential: Option<T>,
+    /// Where energy came from and went since the start, if the builder asked for the balance.
+    pub works: Option<Works<T>>,
+}
+
+impl<T: Real> Energy<T> {
+    /// Kinetic plus potential energy.
+    pub fn total(&self) -> T {
+        self.kinetic + self.potential.unwrap_or(T::zero())
+    }
+}
+
+/// Works done on the system since the start, by the trapezoidal rule over the steps; all but `remainder` are what physics
+/// says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Works<T> {
+    /// Work of the external load.
+    pub load: T,
+    /// Work of the supports.
+    pub supports: T,
+    /// Work of damping (not positive).
+    pub damping: T,
+    /// Work of the reported contact forces.
+    pub contact: T,
+    /// Change of kinetic energy by corrections of velocity.
+    pub corrections: T,
+    /// Total energy minus energy at the start minus all of the above.
+    pub remainder: T,
+}
+
+/// Accumulates [`Works`]; costs one load, one product with C and, with supports, one evaluation of f a step.
+#[derive(Debug)]
+pub(crate) struct Ledger<T> {
+    works: Works<T>,
+    start: T,
+    load: Vec<T>,
+    old_load: Vec<T>,
+    old_u: Vec<T>,
+    residual: Vec<T>,
+    power: T,
+    reactions: Vec<T>,
+    lambda: Vec<T>,
+}
+
+/// What the ledger needs to know of an accepted step besides its state.
+pub(crate) struct StepBooks<'a, T> {
+    pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) corrections: T,
+    pub(crate) h: f64,
+}
+
+impl<T: Real> Ledger<T> {
+    pub(crate) fn new(
+        system: &mut dyn System<T>,
+        state: &State<T>,
+        g: &ContactJacobian<T>,
+        rows: usize,
+    ) -> Result<Self> {
+        let zero = || vec![T::zero(); system.dofs()];
+        let mut ledger = Self {
+            works: Works::default(),
+            start: T::zero(),
+            load: zero(),
+            old_load: zero(),
+            old_u: zero(),
+            residual: zero(),
+            power: T::zero(),
+            reactions: vec![T::zero(); system.prescribed().len()],
+            lambda: vec![T::zero(); rows],
+        };
+        ledger.start = energy(system, state, None).total();
+        ledger.power = ledger.damping_power(system, state.velocity());
+        system.load(state.time(), &mut ledger.load);
+        ledger.reactions = reactions(system, state, g)?;
+        Ok(ledger)
+    }
+
+    fn damping_power(&mut self, system: &mut dyn System<T>, v: &[T]) -> T {
+        match system.damping(v, &mut self.residual) {
+            Damping::None => T::zero(),
+            Damping::Present => -dot(&self.residual, v),
+        }
+    }
+
+    /// Remembers what the step starts from.
+    pub(crate) fn begin(&mut self, state: &State<T>) {
+        self.old_u.copy_from_slice(state.displacement());
+        let lambda = state.contacts().forces();
+        self.lambda[..lambda.len()].copy_from_slice(lambda);
+        self.lambda[lambda.len()..].fill(T::zero());
+    }
+
+    /// What may fail, before the step is accepted: the forces of the supports.
+    pub(crate) fn prepare(
+        &mut self,
+        system: &mut dyn System<T>,
+        new: &Motion<T>,
+        contacts: &ContactState<T>,
+        books: &StepBooks<'_, T>,
+    ) -> Result<()> {
+        if !system.prescribed().is_empty() {
+            balance_residual(system, new, contacts, books.g, &mut self.residual)?;
+        }
+        Ok(())
+    }
+
+    /// Books an accepted step.
+    pub(crate) fn end(
+        &mut self,
+        system: &mut dyn System<T>,
+        new: &Motion<T>,
+        contacts: &ContactState<T>,
+        books: &StepBooks<'_, T>,
+    ) {
+        let half = T::of(0.5);
+        let (u, works) = (&new.u, &mut self.works);
+        for (reaction, &dof) in self.reactions.iter_mut().zip(system.prescribed()) {
+            let mean = half * (*reaction + self.residual[dof]);
+            works.supports += mean * (u[dof] - self.old_u[dof]);
+            *reaction = self.residual[dof];
+        }
+        std::mem::swap(&mut self.load, &mut self.old_load);
+        system.load(new.t, &mut self.load);
+        let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
+        let loads = self.load.iter().zip(&self.old_load).map(|(&new, &old)| half * (new + old));
+        works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
+        for (row, &force) in contacts.lambda.iter().enumerate() {
+            let advance: T = books.g.row(row).map(|(dof, weight)| weight * (u[dof] - self.old_u[dof])).sum();
+            works.contact += half * (force + self.lambda[row]) * advance;
+        }
+        works.corrections += books.corrections;
+        let old_power = self.power;
+        self.power = self.damping_power(system, &new.v);
+        self.works.damping += half * (old_power + self.power) * T::of(books.h);
+    }
+
+    fn works(&self, total: T) -> Works<T> {
+        let Works { load, supports, damping, contact, corrections, .. } = self.works;
+        let remainder = total - self.start - (load + supports + damping + contact + corrections);
+        Works { remainder, ..self.works }
+    }
+}
+
+/// Energy of a state, with the balance of a ledger.
+pub(crate) fn energy<T: Real>(system: &mut dyn System<T>, state: &State<T>, ledger: Option<&Ledger<T>>) -> Energy<T> {
+    let v = state.velocity();
+    let kinetic = T::of(0.5)
+        * match system.mass() {
+            crate::mass::Mass::Lumped(mass) => mass.iter().zip(v).map(|(&m, &v)| m * v * v).sum::<T>(),
+            consistent @ crate::mass::Mass::Consistent(_) => {
+                let mut momentum = vec![T::zero(); v.len()];
+                consistent.product(T::one(), v, &mut momentum);
+                dot(&momentum, v)
+            }
+        };
+    let energy = Energy { kinetic, potential: system.potential_energy(state.displacement()), works: None };
+    Energy { works: ledger.map(|ledger| ledger.works(energy.total())), ..energy }
+}
+
+/// R = M a − f − Gᵀ λ on the prescribed dofs.
+pub(crate) fn reactions<T: Real>(
+    system: &mut dyn System<T>,
+    state: &State<T>,
+    g: &ContactJacobian<T>,
+) -> Result<Vec<T>> {
+    let mut residual = vec![T::zero(); system.dofs()];
+    balance_residual(system, &state.motion, &state.contacts, g, &mut residual)?;
+    Ok(system.prescribed().iter().map(|&dof| residual[dof]).collect())
+}
+
+/// M a − f − Gᵀ λ on all dofs: on prescribed dofs the force of the support.
+fn balance_residual<T: Real>(
+    system: &mut dyn System<T>,
+    motion: &Motion<T>,
+    contacts: &ContactState<T>,
+    g: &ContactJacobian<T>,
+    residual: &mut [T],
+) -> Result<()> {
+    system.force(motion.t, &motion.u, &motion.v, residual)?;
+    for (row, &force) in contacts.lambda.iter().enumerate() {
+        g.scatter(row, force, residual);
+    }
+    residual.iter_mut().for_each(|r| *r = -*r);
+    system.mass().product(T::one(), &motion.a, residual);
+    Ok(())
+}
+
+fn dot<T: Real>(x: &[T], y: &[T]) -> T {
+    x.iter().zip(y).map(|(&x, &y)| x * y).sum()
+}

@@ -1,0 +1,244 @@
+//! A tableau compiled for one system and one step size: scaled coefficients and factorized effective matrices.
+
+use crate::contact::ContactJacobian;
+use crate::error::{Error, Result};
+use crate::linear_solver::{Factorization, LinearSolver};
+use crate::mass::Mass;
+use crate::real::Real;
+use crate::sparse::Combination;
+use crate::state::Motion;
+use crate::system::{System, TangentWeights};
+use crate::tableau::{MAX_PAST, Momentum, Row, Rows, Stage, Tableau};
+
+/// One term of a row: coefficient times one field of one past state.
+#[derive(Clone, Copy, Debug)]
+struct Term<T> {
+    c: T,
+    state: usize,
+    field: usize,
+}
+
+/// Three rows with h multiplied in: parts of u, v, a that come from the past, and the weights of the increment d.
+#[derive(Debug)]
+pub(crate) struct ScaledRows<T> {
+    terms: [Vec<Term<T>>; 3],
+    pub(crate) weights: [T; 3],
+}
+
+/// Dofs a block: what it touches stays in the first-level cache.
+const BLOCK: usize = 1024;
+
+impl<T: Real> ScaledRows<T> {
+    fn new(rows: Rows, h: f64) -> Self {
+        // Row i gives h^i times its quantity, column j of a past state is h^j times the stored one.
+        let scale = |row: usize, field: usize| match field.abs_diff(row) {
+            0 => 1.0,
+            1 if field > row => h,
+            1 => 1.0 / h,
+            _ if field > row => h * h,
+            _ => 1.0 / (h * h),
+        };
+        let compile = |i: usize, row: Row| {
+            let entry = |state: usize, field: usize| (row.past(state)[field], state, field);
+            (0..MAX_PAST)
+                .flat_map(|state| (0..3).map(move |field| entry(state, field)))
+                .filter(|&(c, ..)| c != 0.0)
+                .map(|(c, state, field)| Term { c: T::of(c * scale(i, field)), state, field })
+                .collect()
+        };
+        let [u, v, a] = rows.each();
+        Self {
+            terms: [compile(0, u), compile(1, v), compile(2, a)],
+            weights: [T::of(u.z), T::of(v.z * scale(1, 0)), T::of(a.z * scale(2, 0))],
+        }
+    }
+
+    /// Whether the past has a part in u, v or a.
+    pub(crate) fn reads_past(&self, field: usize) -> bool {
+        !self.terms[field].is_empty()
+    }
+
+    /// Writes the parts that come from the past, block by block; fields without a term are left as they are.
+    pub(crate) fn predict(&self, past: &[Motion<T>], outputs: &mut [&mut [T]; 3]) {
+        let dofs = outputs[0].len();
+        let mut start = 0;
+        while start < dofs {
+            let block = start..dofs.min(start + BLOCK);
+            for (terms, output) in self.terms.iter().zip(outputs.iter_mut()) {
+                let out = &mut output[block.clone()];
+                for (i, term) in terms.iter().enumerate() {
+                    let source = &past[term.state].field(term.field)[block.clone()];
+                    if i == 0 { T::scale_into(term.c, source, out) } else { T::axpy(term.c, source, out) }
+                }
+            }
+            start = block.end;
+        }
+    }
+}
+
+/// One stage, compiled.
+#[derive(Debug)]
+pub(crate) struct CompiledStage<T> {
+    pub(crate) recovery: ScaledRows<T>,
+    /// Only where the balance does not hold at the recovered state.
+    pub(crate) balance: Option<ScaledRows<T>>,
+    pub(crate) load: f64,
+    pub(crate) end: f64,
+    pub(crate) operator: usize,
+    /// Pure z-weights of the acceleration rows, recovery and balance.
+    pub(crate) acceleration: f64,
+    pub(crate) balance_acceleration: f64,
+    pub(crate) impulse_weight: f64,
+    pub(crate) covector: Vec<[f64; 3]>,
+    pub(crate) read: Vec<[bool; 3]>,
+}
+
+/// A factorized effective matrix and the responses A⁻¹ Gᵀ computed with it so far.
+#[derive(Debug)]
+pub(crate) struct Operator<T> {
+    /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
+    weights: [f64; 3],
+    factor: Box<dyn Factorization<T>>,
+    dofs: usize,
+    columns: Vec<T>,
+    computed: Vec<bool>,
+}
+
+impl<T: Real> Operator<T> {
+    /// `x ← A⁻¹ x`.
+    pub(crate) fn solve(&mut self, x: &mut [T]) {
+        self.factor.solve(x);
+    }
+
+    /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response).
+    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, row: usize, prescribed: &[usize]) {
+        if !self.computed[row] {
+            let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];
+            column.fill(T::zero());
+            g.scatter(row, T::one(), column);
+            prescribed.iter().for_each(|&dof| column[dof] = T::zero());
+            self.factor.solve(column);
+            self.computed[row] = true;
+        }
+    }
+
+    /// A⁻¹ G_rowᵀ.
+    pub(crate) fn response(&self, row: usize) -> &[T] {
+        &self.columns[row * self.dofs..(row + 1) * self.dofs]
+    }
+
+    /// Forgets responses to rows that have changed.
+    pub(crate) fn reset(&mut self) {
+        self.computed.fill(false);
+    }
+
+    pub(crate) fn stored_values(&self) -> usize {
+        self.factor.stored_values()
+    }
+}
+
+/// A compiled tableau.
+#[derive(Debug)]
+pub(crate) struct Program<T> {
+    pub(crate) stages: Vec<CompiledStage<T>>,
+    pub(crate) operators: Vec<Operator<T>>,
+}
+
+/// What a program is compiled for.
+pub(crate) struct Compiler<'c, T: Real> {
+    pub(crate) system: &'c mut dyn System<T>,
+    pub(crate) solver: &'c dyn LinearSolver<T>,
+    pub(crate) h: f64,
+    /// Contact rows to reserve responses for.
+    pub(crate) rows: usize,
+}
+
+impl<T: Real> Compiler<'_, T> {
+    /// Compiles `tableau`; covectors and read flags are those of `momentum` and `reader`, the scheme that goes on afterwards.
+    pub(crate) fn compile(&mut self, tableau: &Tableau, momentum: &Momentum, reader: &Tableau) -> Result<Program<T>> {
+        let mut program = Program { stages: Vec::new(), operators: Vec::new() };
+        let own = std::ptr::eq(tableau, reader);
+        for (s, stage) in tableau.stages.iter().enumerate() {
+            let weights = stage.balance.each().map(|row| row.z);
+            let shared = program.operators.iter().position(|operator| operator.weights == weights);
+            let operator = match shared {
+                Some(operator) => operator,
+                None => {
+                    program.operators.push(self.operator(stage, weights)?);
+                    program.operators.len() - 1
+                }
+            };
+            let increment = stage.increment();
+            let (covector, read) = if own {
+                (momentum.after_stage(s).to_vec(), tableau.read_after(s))
+            } else {
+                // A start-up step: what follows is read by the scheme that is being started.
+                (momentum.after_step(), reader.read_after(reader.stages.len() - 1))
+            };
+            let response = stage.recovery.each().map(|row| row.z / stage.balance.a.z);
+            let impulse_weight = response.iter().zip(covector[0]).map(|(r, p)| r * p).sum();
+            program.stages.push(CompiledStage {
+                recovery: ScaledRows::new(increment.recovery, self.h),
+                balance: (!stage.is_collocated()).then(|| ScaledRows::new(increment.balance, self.h)),
+                load: stage.load,
+                end: stage.end,
+                operator,
+                acceleration: stage.recovery.a.z,
+                balance_acceleration: stage.balance.a.z,
+                impulse_weight,
+                covector,
+                read,
+            });
+        }
+        Ok(program)
+    }
+
+    /// Assembles and factorizes w_ū K + w_v̄/h C + w_ā/h² M, identity on the prescribed dofs.
+    fn operator(&mut self, stage: &Stage, weights: [f64; 3]) -> Result<Operator<T>> {
+        let h = self.h;
+        let dofs = self.system.dofs();
+        let pattern = self.system.pattern();
+        let mut tangent = vec![T::zero(); pattern.row_idx().len()];
+        let (combination, explicit) = {
+            // Without K and C in the effective matrix its pattern is that of M.
+            let explicit = weights[0] == 0.0 && weights[1] == 0.0;
+            let mass_pattern = match self.system.mass() {
+                Mass::Lumped(_) => None,
+                Mass::Consistent(mass) => Some(mass.symbolic()),
+            };
+            let sources: Vec<_> = (!explicit).then_some(pattern).into_iter().chain(mass_pattern).collect();
+            (Combination::new(dofs, self.system.prescribed(), &sources)?, explicit)
+        };
+        if !explicit {
+            let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
+            self.system.tangent(weights, &mut tangent)?;
+        }
+        let mut values = vec![T::zero(); combination.len()];
+        let inertia = T::of(stage.balance.a.z / (h * h));
+        let tangent = (!explicit).then_some((T::one(), &tangent[..]));
+        match self.system.mass() {
+            Mass::Lumped(mass) => {
+                let sources: Vec<_> = tangent.into_iter().collect();
+                combination.fill(&sources, Some((inertia, mass)), &mut values);
+            }
+            Mass::Consistent(mass) => {
+                let sources: Vec<_> = tangent.into_iter().chain([(inertia, mass.val())]).collect();
+                combination.fill(&sources, None, &mut values);
+            }
+        }
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let column = combination.pattern().col_ptr().partition_point(|&p| p <= at) - 1;
+            let (row, value) = (combination.pattern().row_idx()[at], values[at].value());
+            return Err(Error::MatrixNotFinite { matrix: "effective", row, column, value });
+        }
+        let mut factor = self.solver.analyze(combination.pattern())?;
+        factor.factorize(combination.view(&values))?;
+        Ok(Operator {
+            weights,
+            factor,
+            dofs,
+            columns: vec![T::zero(); self.rows * dofs],
+            computed: vec![false; self.rows],
+        })
+    }
+}

@@ -1,0 +1,165 @@
+//! Checks of sparse input, and linear combinations of sparse matrices in one fixed pattern.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+
+/// The size of a square matrix.
+pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<usize> {
+    if a.nrows() == a.ncols() {
+        Ok(a.nrows())
+    } else {
+        Err(Error::Dimension { what: matrix, expected: a.nrows(), found: a.ncols() })
+    }
+}
+
+/// Refuses NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
+pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    let n = square(matrix, a)?;
+    let mut largest = T::zero();
+    for column in 0..n {
+        for (&row, &value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
+            if !value.is_finite() {
+                return Err(Error::MatrixNotFinite { matrix, row, column, value: value.value() });
+            }
+            largest = largest.max(value.abs());
+        }
+    }
+    // Assembly adds the same element entries in different orders: a few units in the last place of the largest entry.
+    let tolerance = T::of(256.0) * T::epsilon() * largest;
+    let mut worst = (tolerance, None);
+    for column in 0..n {
+        for (&row, &value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
+            let mirrored = entry(a, column, row);
+            let difference = (value - mirrored).abs();
+            if difference > worst.0 {
+                worst = (difference, Some((row, column, value, mirrored)));
+            }
+        }
+    }
+    match worst.1 {
+        None => Ok(()),
+        Some((row, column, value, mirrored)) => {
+            Err(Error::Asymmetric { matrix, row, column, value: value.value(), mirrored: mirrored.value() })
+        }
+    }
+}
+
+/// Entry (row, column), zero if it is not stored.
+pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, column: usize) -> T {
+    let rows = a.row_idx_of_col_raw(column);
+    rows.binary_search(&row).map_or(T::zero(), |at| a.val_of_col(column)[at])
+}
+
+/// A fixed pattern that holds weighted sums of several symmetric matrices, with rows and columns of some dofs replaced by
+/// those of the identity; entries are moved by precomputed slots.
+#[derive(Debug)]
+pub(crate) struct Combination {
+    pattern: SymbolicSparseColMat<usize>,
+    /// For each source, the slot of each of its entries; `DROPPED` on the rows and columns left out.
+    slots: Vec<Vec<usize>>,
+    diagonal: Vec<usize>,
+    identity: Vec<usize>,
+}
+
+const DROPPED: usize = usize::MAX;
+
+impl Combination {
+    pub(crate) fn new(n: usize, identity: &[usize], sources: &[SymbolicSparseColMatRef<'_, usize>]) -> Result<Self> {
+        let out_of_memory = |_| Error::OutOfMemory { what: "the pattern of the effective matrix" };
+        let kept = |dof: &usize| identity.binary_search(dof).is_err();
+        let mut pointers = Vec::with_capacity(n + 1);
+        let mut rows: Vec<usize> = Vec::new();
+        let mut column_rows: Vec<usize> = Vec::new();
+        let mut diagonal = Vec::with_capacity(n);
+        pointers.push(0);
+        for column in 0..n {
+            column_rows.clear();
+            column_rows.push(column);
+            if kept(&column) {
+                for source in sources {
+                    column_rows.extend(source.row_idx_of_col_raw(column).iter().copied().filter(|row| kept(row)));
+                }
+            }
+            column_rows.sort_unstable();
+            column_rows.dedup();
+            let at = column_rows.partition_point(|&row| row < column);
+            diagonal.push(rows.len() + at);
+            rows.extend_from_slice(&column_rows);
+            pointers.push(rows.len());
+        }
+        let slots = sources
+            .iter()
+            .map(|source| {
+                let mut slots = Vec::with_capacity(source.row_idx().len());
+                for column in 0..n {
+                    let range = pointers[column]..pointers[column + 1];
+                    for row in source.row_idx_of_col_raw(column) {
+                        let found = kept(&column).then(|| rows[range.clone()].binary_search(row).ok()).flatten();
+                        slots.push(found.map_or(DROPPED, |at| range.start + at));
+                    }
+                }
+                slots
+            })
+            .collect();
+        let pattern =
+            SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows).to_owned().map_err(out_of_memory)?;
+        Ok(Self { pattern, slots, diagonal, identity: identity.to_vec() })
+    }
+
+    /// Number of stored entries.
+    pub(crate) fn len(&self) -> usize {
+        self.pattern.row_idx().len()
+    }
+
+    pub(crate) fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+
+    pub(crate) fn view<'a, T: Real>(&'a self, values: &'a [T]) -> SparseColMatRef<'a, usize, T> {
+        SparseColMatRef::new(self.pattern.as_ref(), values)
+    }
+
+    /// `out = Σ weight · source (+ weight · diag)`, identity on the rows left out.
+    pub(crate) fn fill<T: Real>(&self, sources: &[(T, &[T])], diagonal: Option<(T, &[T])>, out: &mut [T]) {
+        out.fill(T::zero());
+        for (slots, (weight, values)) in self.slots.iter().zip(sources) {
+            for (&slot, &value) in slots.iter().zip(*values) {
+                if slot != DROPPED {
+                    out[slot] += *weight * value;
+                }
+            }
+        }
+        if let Some((weight, values)) = diagonal {
+            for (&slot, &value) in self.diagonal.iter().zip(values) {
+                out[slot] += weight * value;
+            }
+        }
+        for &dof in &self.identity {
+            out[self.diagonal[dof]] = T::one();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faer::sparse::{SparseColMat, Triplet};
+
+    #[test]
+    fn combination_adds_in_one_pattern_and_cuts_prescribed_dofs_out() {
+        let triplets = |entries: &[(usize, usize, f64)]| {
+            let list: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
+            SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &list).unwrap()
+        };
+        let k =
+            triplets(&[(0, 0, 2.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 2.0), (1, 2, -1.0), (2, 1, -1.0), (2, 2, 1.0)]);
+        let c = triplets(&[(0, 2, 5.0), (2, 0, 5.0)]);
+        let sum = Combination::new(3, &[1], &[k.symbolic(), c.symbolic()]).unwrap();
+        let mut values = vec![0.0; sum.len()];
+        sum.fill(&[(2.0, k.val()), (1.0, c.val())], Some((10.0, &[1.0, 1.0, 1.0])), &mut values);
+        let a = sum.view(&values);
+        let dense: Vec<Vec<f64>> = (0..3).map(|i| (0..3).map(|j| entry(a, i, j)).collect()).collect();
+        assert_eq!(dense, [[14.0, 0.0, 5.0], [0.0, 1.0, 0.0], [5.0, 0.0, 12.0]]);
+    }
+}

@@ -1,0 +1,225 @@
+//! The motion: what a later step reads, and what the user reads.
+
+use crate::contact::ContactId;
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// Stored values of one state: displacement, velocity and acceleration at its time.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Motion<T> {
+    pub(crate) t: f64,
+    pub(crate) u: Vec<T>,
+    pub(crate) v: Vec<T>,
+    pub(crate) a: Vec<T>,
+}
+
+impl<T: Real> Motion<T> {
+    pub(crate) fn zero(dofs: usize) -> Self {
+        let zero = || vec![T::zero(); dofs];
+        Self { t: 0.0, u: zero(), v: zero(), a: zero() }
+    }
+
+    /// Field 0, 1, 2: u, v, a.
+    pub(crate) fn field(&self, field: usize) -> &[T] {
+        match field {
+            0 => &self.u,
+            1 => &self.v,
+            _ => &self.a,
+        }
+    }
+}
+
+/// The state of a simulation at a time: motion and contacts.
+///
+/// Together with [`History`] it is everything a later step reads: continue from clones of both and the run goes on bit for
+/// bit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<T> {
+    pub(crate) motion: Motion<T>,
+    pub(crate) contacts: ContactState<T>,
+}
+
+impl<T: Real> State<T> {
+    /// Time.
+    pub fn time(&self) -> f64 {
+        self.motion.t
+    }
+
+    /// Displacements, one a dof.
+    pub fn displacement(&self) -> &[T] {
+        &self.motion.u
+    }
+
+    /// Velocities at the time of the state, one a dof.
+    pub fn velocity(&self) -> &[T] {
+        &self.motion.v
+    }
+
+    /// Accelerations at the time of the state, one a dof.
+    pub fn acceleration(&self) -> &[T] {
+        &self.motion.a
+    }
+
+    /// Contacts, one entry a candidate.
+    pub fn contacts(&self) -> &ContactState<T> {
+        &self.contacts
+    }
+}
+
+/// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactState<T> {
+    pub(crate) ids: Vec<ContactId>,
+    pub(crate) lambda: Vec<T>,
+    pub(crate) lambda_raw: Vec<T>,
+    pub(crate) closed: Vec<bool>,
+    pub(crate) impulse: Vec<T>,
+    pub(crate) lambda_v: Vec<T>,
+    pub(crate) lambda_a: Vec<T>,
+}
+
+impl<T: Real> ContactState<T> {
+    pub(crate) fn with_capacity(rows: usize) -> Self {
+        let reals = || Vec::with_capacity(rows);
+        Self {
+            ids: Vec::with_capacity(rows),
+            lambda: reals(),
+            lambda_raw: reals(),
+            closed: Vec::with_capacity(rows),
+            impulse: reals(),
+            lambda_v: reals(),
+            lambda_a: reals(),
+        }
+    }
+
+    /// Opens every contact of `ids`.
+    pub(crate) fn reset(&mut self, ids: &[ContactId]) {
+        let n = ids.len();
+        self.ids.clear();
+        self.ids.extend_from_slice(ids);
+        for reals in [&mut self.lambda, &mut self.lambda_raw, &mut self.impulse, &mut self.lambda_v, &mut self.lambda_a]
+        {
+            reals.clear();
+            reals.resize(n, T::zero());
+        }
+        self.closed.clear();
+        self.closed.resize(n, false);
+    }
+
+    /// Copies what belongs to the same contacts from another state; contacts it does not know are open.
+    pub(crate) fn carry_over(&mut self, old: &Self, ids: &[ContactId]) {
+        self.reset(ids);
+        for (i, id) in ids.iter().enumerate() {
+            // Candidates rarely move far in the list: the same place first.
+            let same = (old.ids.get(i) == Some(id)).then_some(i);
+            if let Some(j) = same.or_else(|| old.ids.iter().position(|other| other == id)) {
+                self.lambda[i] = old.lambda[j];
+                self.lambda_raw[i] = old.lambda_raw[j];
+                self.closed[i] = old.closed[j];
+                self.impulse[i] = old.impulse[j];
+                self.lambda_v[i] = old.lambda_v[j];
+                self.lambda_a[i] = old.lambda_a[j];
+            }
+        }
+    }
+
+    /// Which contact each entry belongs to.
+    pub fn ids(&self) -> &[ContactId] {
+        &self.ids
+    }
+
+    /// Contact forces, compression positive: after correction, consistent with the accelerations of the state.
+    pub fn forces(&self) -> &[T] {
+        &self.lambda
+    }
+
+    /// Raw multipliers of the last stage's contact problem; they decide release, and their impulse is h Σ β λ.
+    pub fn raw_forces(&self) -> &[T] {
+        &self.lambda_raw
+    }
+
+    /// Whether a contact is closed: pressed (raw multiplier > 0) or touching within rounding.
+    pub fn closed(&self) -> &[bool] {
+        &self.closed
+    }
+
+    /// Impulses of the last step, corrections included: their sum over the steps is the change of momentum.
+    pub fn impulses(&self) -> &[T] {
+        &self.impulse
+    }
+
+    /// The paper's λ_v of the last correction (momentum, kg m/s): it corrected the acceleration; zero without correction.
+    pub fn lambda_v(&self) -> &[T] {
+        &self.lambda_v
+    }
+
+    /// The paper's λ_a of the last correction (kg m): it corrected the velocity; zero without correction.
+    pub fn lambda_a(&self) -> &[T] {
+        &self.lambda_a
+    }
+}
+
+/// The past states that a multistep scheme reads, and the clock of the run.
+#[derive(Clone, Debug)]
+pub struct History<T> {
+    /// Slot 0 is spare between steps; past state k (k ≥ 1) is slot k.
+    pub(crate) slots: Vec<Motion<T>>,
+    /// Number of states known, the current one included.
+    pub(crate) known: usize,
+    pub(crate) clock: Clock,
+}
+
+impl<T: Real> History<T> {
+    /// Step size with which the states were spaced.
+    pub fn step_size(&self) -> f64 {
+        self.clock.h
+    }
+
+    /// Number of past states known, the current one not counted.
+    pub fn len(&self) -> usize {
+        self.known - 1
+    }
+
+    /// Whether no past state is known.
+    pub fn is_empty(&self) -> bool {
+        self.known <= 1
+    }
+
+    /// Displacement, velocity and acceleration of past state k = 1 (the one before the current), 2, …, as later steps read
+    /// them: after a history projection they differ from what an observer saw.
+    pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
+        let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
+        Some((&motion.u, &motion.v, &motion.a))
+    }
+
+    pub(crate) fn check(&self, dofs: usize, slots: usize) -> Result<()> {
+        let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });
+        if self.slots.len() != slots {
+            return wrong("the history (states)", slots, self.slots.len());
+        }
+        for motion in &self.slots {
+            for found in (0..3).map(|field| motion.field(field).len()) {
+                if found != dofs {
+                    return wrong("a state of the history", dofs, found);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Time as t_ref + k h, so that it does not drift.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clock {
+    pub(crate) reference: f64,
+    pub(crate) steps: u64,
+    pub(crate) h: f64,
+}
+
+impl Clock {
+    /// Time at `fraction` of the step that comes next.
+    #[allow(clippy::cast_precision_loss)]
+    pub(crate) fn at(&self, fraction: f64) -> f64 {
+        self.reference + (self.steps as f64 + fraction) * self.h
+    }
+}

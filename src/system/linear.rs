@@ -1,0 +1,327 @@
+//! Linear systems: constant M, C and K, a load of time, fixed and driven degrees of freedom.
+
+use super::{Damping, System, TangentWeights};
+use crate::error::{Error, Result};
+use crate::mass::Mass;
+use crate::real::Real;
+use crate::sparse::{self, Combination};
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
+
+type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
+type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
+
+/// `M a + C v + K u = F(t) + Gᵀ λ` with symmetric M, C and K (both triangles stored).
+///
+/// A mass matrix without entries off the diagonal is recognized as lumped. Without damping nothing is paid for damping.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{LinearSystem, System};
+///
+/// // A mass on a spring, and a driven support at the other end of the spring.
+/// let k = SparseColMat::try_new_from_triplets(
+///     2, 2, &[Triplet::new(0, 0, 9.0), Triplet::new(0, 1, -9.0), Triplet::new(1, 0, -9.0), Triplet::new(1, 1, 9.0)],
+/// )?;
+/// let mut system = LinearSystem::lumped(vec![1.0, 1.0], k)?
+///     .rayleigh(0.0, 1e-3)?
+///     .load(|t, force| force[1] = t)
+///     .drive(0, |t: f64| [t.sin(), t.cos(), -t.sin()])?;
+/// let mut force = [0.0; 2];
+/// system.force(2.0, &[0.0, 1.0], &[0.0, 0.0], &mut force)?;
+/// assert_eq!(force, [9.0, -7.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct LinearSystem<'a, T: Real> {
+    mass: StoredMass<T>,
+    stiffness: SparseColMat<usize, T>,
+    damping: StoredDamping<T>,
+    /// K and a general C in one pattern; K's own pattern is enough without C.
+    union: Option<Combination>,
+    load: Option<Load<'a, T>>,
+    prescribed: Vec<usize>,
+    motions: Vec<Option<Motion<'a, T>>>,
+    scratch: Vec<T>,
+}
+
+enum StoredMass<T> {
+    Lumped(Vec<T>),
+    Consistent(SparseColMat<usize, T>),
+}
+
+enum StoredDamping<T> {
+    None,
+    /// C = mass · M + stiffness · K.
+    Rayleigh {
+        mass: T,
+        stiffness: T,
+    },
+    General(SparseColMat<usize, T>),
+}
+
+impl<T: Real> std::fmt::Debug for LinearSystem<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LinearSystem")
+            .field("dofs", &self.dofs())
+            .field("entries", &self.stiffness.row_idx().len())
+            .field("prescribed", &self.prescribed)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a, T: Real> LinearSystem<'a, T> {
+    /// A system with mass matrix M (diagonal entries only: lumped) and stiffness matrix K.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`] for
+    /// a diagonal mass that is not positive.
+    pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
+        sparse::check_symmetric("mass", mass.as_ref())?;
+        let n = mass.nrows();
+        let off_diagonal = |j: usize| {
+            let column = mass.as_ref();
+            let entries = column.row_idx_of_col_raw(j).iter().zip(column.val_of_col(j));
+            entries.filter(|&(&i, &value)| i != j && value != T::zero()).count()
+        };
+        let diagonal = (0..n).map(|j| sparse::entry(mass.as_ref(), j, j)).collect();
+        if (0..n).all(|j| off_diagonal(j) == 0) {
+            Self::lumped(diagonal, stiffness)
+        } else {
+            check_masses(&diagonal)?;
+            Self::with(StoredMass::Consistent(mass), n, stiffness)
+        }
+    }
+
+    /// A system with lumped masses, one a dof.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    pub fn lumped(mass: Vec<T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
+        check_masses(&mass)?;
+        let n = mass.len();
+        Self::with(StoredMass::Lumped(mass), n, stiffness)
+    }
+
+    fn with(mass: StoredMass<T>, n: usize, stiffness: SparseColMat<usize, T>) -> Result<Self> {
+        if n == 0 {
+            return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
+        }
+        same_size("stiffness matrix", n, stiffness.as_ref())?;
+        sparse::check_symmetric("stiffness", stiffness.as_ref())?;
+        Ok(Self {
+            mass,
+            stiffness,
+            damping: StoredDamping::None,
+            union: None,
+            load: None,
+            prescribed: Vec::new(),
+            motions: Vec::new(),
+            scratch: Vec::new(),
+        })
+    }
+
+    /// Adds a damping matrix C.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new), for C.
+    pub fn damping(mut self, damping: SparseColMat<usize, T>) -> Result<Self> {
+        same_size("damping matrix", self.dofs(), damping.as_ref())?;
+        sparse::check_symmetric("damping", damping.as_ref())?;
+        self.union = Some(Combination::new(self.dofs(), &[], &[self.stiffness.symbolic(), damping.symbolic()])?);
+        self.damping = StoredDamping::General(damping);
+        Ok(self)
+    }
+
+    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for a negative or non-finite coefficient.
+    pub fn rayleigh(mut self, mass: T, stiffness: T) -> Result<Self> {
+        for (name, value) in [("Rayleigh's mass coefficient", mass), ("Rayleigh's stiffness coefficient", stiffness)] {
+            if !(value >= T::zero() && value.is_finite()) {
+                return Err(Error::Parameter { name, value: value.value(), range: "finite and not negative" });
+            }
+        }
+        self.damping = match mass + stiffness {
+            none if none == T::zero() => StoredDamping::None,
+            _ => StoredDamping::Rayleigh { mass, stiffness },
+        };
+        let consistent_mass = match &self.mass {
+            StoredMass::Consistent(m) if mass > T::zero() => Some(m.symbolic()),
+            _ => None,
+        };
+        let sources: Vec<_> = std::iter::once(self.stiffness.symbolic()).chain(consistent_mass).collect();
+        self.union = match mass > T::zero() {
+            true => Some(Combination::new(self.dofs(), &[], &sources)?),
+            false => None,
+        };
+        self.scratch = vec![T::zero(); self.dofs()];
+        Ok(self)
+    }
+
+    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry.
+    #[must_use]
+    pub fn load(mut self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
+        self.load = Some(Box::new(load));
+        self
+    }
+
+    /// Fixes a dof at zero displacement.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    pub fn fix(self, dof: usize) -> Result<Self> {
+        self.prescribe(dof, None)
+    }
+
+    /// Drives a dof: the closure gives displacement, velocity and acceleration at t. They must be derivatives of each other.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    pub fn drive(self, dof: usize, motion: impl FnMut(f64) -> [T; 3] + Send + 'a) -> Result<Self> {
+        self.prescribe(dof, Some(Box::new(motion)))
+    }
+
+    fn prescribe(mut self, dof: usize, motion: Option<Motion<'a, T>>) -> Result<Self> {
+        let dofs = self.dofs();
+        if dof >= dofs {
+            return Err(Error::MissingDof { what: "a support", dof, dofs });
+        }
+        match self.prescribed.binary_search(&dof) {
+            Ok(_) => Err(Error::PrescribedTwice { dof }),
+            Err(at) => {
+                self.prescribed.insert(at, dof);
+                self.motions.insert(at, motion);
+                Ok(self)
+            }
+        }
+    }
+
+    /// The stiffness matrix.
+    pub fn stiffness(&self) -> SparseColMatRef<'_, usize, T> {
+        self.stiffness.as_ref()
+    }
+}
+
+fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
+    match mass.iter().position(|&m| !(m > T::zero() && m.is_finite())) {
+        Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
+        None => Ok(()),
+    }
+}
+
+fn same_size<T>(what: &'static str, n: usize, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    match [a.nrows(), a.ncols()].into_iter().find(|&size| size != n) {
+        Some(found) => Err(Error::Dimension { what, expected: n, found }),
+        None => Ok(()),
+    }
+}
+
+impl<T: Real> StoredMass<T> {
+    fn view(&self) -> Mass<'_, T> {
+        match self {
+            Self::Lumped(m) => Mass::Lumped(m),
+            Self::Consistent(m) => Mass::Consistent(m.as_ref()),
+        }
+    }
+}
+
+impl<T: Real> System<T> for LinearSystem<'_, T> {
+    fn dofs(&self) -> usize {
+        self.stiffness.nrows()
+    }
+
+    fn mass(&self) -> Mass<'_, T> {
+        self.mass.view()
+    }
+
+    fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+        self.load(t, out);
+        let minus = -T::one();
+        match &self.damping {
+            StoredDamping::None => T::symmetric_product(minus, self.stiffness.as_ref(), u, out),
+            StoredDamping::General(c) => {
+                T::symmetric_product(minus, self.stiffness.as_ref(), u, out);
+                T::symmetric_product(minus, c.as_ref(), v, out);
+            }
+            StoredDamping::Rayleigh { mass, stiffness } => {
+                // One product with K serves both: K (u + βv).
+                self.scratch.copy_from_slice(u);
+                T::axpy(*stiffness, v, &mut self.scratch);
+                T::symmetric_product(minus, self.stiffness.as_ref(), &self.scratch, out);
+                if *mass > T::zero() {
+                    self.mass.view().product(-*mass, v, out);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.union.as_ref().map_or(self.stiffness.symbolic(), Combination::pattern)
+    }
+
+    fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
+        let TangentWeights { stiffness: ku, damping: kv } = weights;
+        let k = self.stiffness.val();
+        match (&self.union, &self.damping) {
+            (Some(union), StoredDamping::General(c)) => union.fill(&[(ku, k), (kv, c.val())], None, out),
+            (Some(union), StoredDamping::Rayleigh { mass, stiffness }) => match &self.mass {
+                StoredMass::Lumped(m) => union.fill(&[(ku + kv * *stiffness, k)], Some((kv * *mass, m)), out),
+                StoredMass::Consistent(m) => {
+                    union.fill(&[(ku + kv * *stiffness, k), (kv * *mass, m.val())], None, out);
+                }
+            },
+            (None, StoredDamping::Rayleigh { stiffness, .. }) => T::scale_into(ku + kv * *stiffness, k, out),
+            (_, _) => T::scale_into(ku, k, out),
+        }
+        Ok(())
+    }
+
+    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
+        match &self.damping {
+            StoredDamping::None => return Damping::None,
+            StoredDamping::General(c) => {
+                out.fill(T::zero());
+                T::symmetric_product(T::one(), c.as_ref(), v, out);
+            }
+            StoredDamping::Rayleigh { mass, stiffness } => {
+                out.fill(T::zero());
+                T::symmetric_product(*stiffness, self.stiffness.as_ref(), v, out);
+                self.mass.view().product(*mass, v, out);
+            }
+        }
+        Damping::Present
+    }
+
+    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
+        let k = self.stiffness.as_ref();
+        let energy = |j: usize| {
+            let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
+            u[j] * entries.map(|(&i, &value)| value * u[i]).sum::<T>()
+        };
+        Some(T::of(0.5) * (0..u.len()).map(energy).sum::<T>())
+    }
+
+    fn load(&mut self, t: f64, out: &mut [T]) {
+        out.fill(T::zero());
+        if let Some(load) = &mut self.load {
+            load(t, out);
+        }
+    }
+
+    fn prescribed(&self) -> &[usize] {
+        &self.prescribed
+    }
+
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
+        for (motion, out) in self.motions.iter_mut().zip(out) {
+            *out = motion.as_mut().map_or([T::zero(); 3], |motion| motion(t));
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
+
+pub mod bars;
+pub mod measure;
+
+pub use bars::{Bars, MassKind};
+pub use measure::{Figures, Record, record};
