@@ -89,7 +89,7 @@ mod tests {
         let a = [[4.0, 0.0, 2.0], [0.0, 3.0, 0.0], [2.0, 0.0, 5.0]];
         let mut factor = DenseCholesky::with_capacity(3);
         factor.factorize(3, |i, j| a[i][j]).unwrap();
-        let mut x = [8.0, 3.0, 12.0];
+        let mut x = [8.0_f64, 3.0, 12.0];
         factor.solve(&mut x);
         for (x, expected) in x.iter().zip([1.0, 1.0, 2.0]) {
             assert!((x - expected).abs() < 1e-15);

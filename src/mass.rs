@@ -96,7 +96,9 @@ impl<T: Real> InverseMass<T> {
         match self {
             Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
             Self::Consistent { factor, prescribed } => {
-                prescribed.iter().for_each(|&dof| x[dof] = T::zero());
+                for &dof in prescribed.iter() {
+                    x[dof] = T::zero();
+                }
                 factor.solve(x);
             }
         }

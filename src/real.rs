@@ -27,7 +27,10 @@ pub trait Real:
 
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
-    use super::*;
+    use super::{Conj, LdltError, LdltRef, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
+    use super::{SparseColMatRef, SymbolicCholesky, SymbolicCholeskyRaw};
+    use faer::Spec;
+    use faer::linalg::cholesky::{ldlt::factor::LdltRegularization, llt::factor::LltRegularization};
 
     /// How a factor of a symmetric matrix is stored.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +80,7 @@ pub(crate) mod kernels {
 
     // The generic bodies are inlined into the concrete implementations below, once a scalar.
 
-    #[inline(always)]
+    #[inline]
     fn product<T: Real>(c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
         for (j, &xj) in x.iter().enumerate() {
             let cx = c * xj;
@@ -87,7 +90,7 @@ pub(crate) mod kernels {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn symmetric_product<T: Real>(c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
         let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
         for (yj, range) in y.iter_mut().zip(pointers.windows(2)) {
@@ -99,7 +102,7 @@ pub(crate) mod kernels {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn cholesky<T: RealField>(
         kind: Factorization,
         symbolic: &SymbolicCholesky<usize>,
@@ -110,11 +113,27 @@ pub(crate) mod kernels {
         let stack = MemStack::new(memory);
         let failure = match kind {
             Factorization::Llt => symbolic
-                .factorize_numeric_llt(values, a, Side::Lower, Default::default(), Par::Seq, stack, Default::default())
+                .factorize_numeric_llt(
+                    values,
+                    a,
+                    Side::Lower,
+                    LltRegularization::default(),
+                    Par::Seq,
+                    stack,
+                    Spec::default(),
+                )
                 .err()
                 .map(|LltError::NonPositivePivot { index }| index),
             Factorization::Ldlt => symbolic
-                .factorize_numeric_ldlt(values, a, Side::Lower, Default::default(), Par::Seq, stack, Default::default())
+                .factorize_numeric_ldlt(
+                    values,
+                    a,
+                    Side::Lower,
+                    LdltRegularization::default(),
+                    Par::Seq,
+                    stack,
+                    Spec::default(),
+                )
                 .err()
                 .map(|LdltError::ZeroPivot { index }| index),
         };
@@ -194,10 +213,10 @@ pub(crate) mod kernels {
                     let solve = symbolic.solve_in_place_scratch::<$scalar>(columns, Par::Seq);
                     let factorize = match kind {
                         Factorization::Llt => {
-                            symbolic.factorize_numeric_llt_scratch::<$scalar>(Par::Seq, Default::default())
+                            symbolic.factorize_numeric_llt_scratch::<$scalar>(Par::Seq, Spec::default())
                         }
                         Factorization::Ldlt => {
-                            symbolic.factorize_numeric_ldlt_scratch::<$scalar>(Par::Seq, Default::default())
+                            symbolic.factorize_numeric_ldlt_scratch::<$scalar>(Par::Seq, Spec::default())
                         }
                     };
                     solve.or(factorize)

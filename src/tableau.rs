@@ -75,7 +75,7 @@ impl Row {
 
     /// One more than the oldest past state read, 0 if none is.
     pub fn depth(&self) -> usize {
-        (0..MAX_PAST).rev().find(|&k| self.past(k) != [0.0; 3]).map_or(0, |k| k + 1)
+        (0..MAX_PAST).rev().find(|&k| self.past(k).iter().any(|&c| c != 0.0)).map_or(0, |k| k + 1)
     }
 
     fn is_finite(&self) -> bool {
@@ -189,6 +189,7 @@ impl Stage {
     /// Rows over the increment d = z − ẑ instead of z, with ẑ the value for which the acceleration row vanishes.
     ///
     /// Recovering a by subtracting displacements costs eps u/h²; in this form the terms that cancel are gone.
+    #[must_use]
     pub fn increment(&self) -> Self {
         let zero = self.recovery.a;
         Self { recovery: self.recovery.increment(zero), balance: self.balance.increment(zero), ..*self }
@@ -364,7 +365,9 @@ impl Momentum {
         let mut psi = null_vector(transposed);
         #[allow(clippy::cast_precision_loss)]
         let flight: f64 = psi.chunks(3).enumerate().map(|(k, p)| p[1] - k as f64 * p[0]).sum();
-        psi.iter_mut().for_each(|p| *p /= flight);
+        for p in &mut psi {
+            *p /= flight;
+        }
 
         // Pull back through the stages, last to first. After the last stage the intermediate states are not kept.
         let mut covector: Vec<[f64; 3]> = psi.chunks(3).map(|p| [p[0], p[1], p[2]]).collect();

@@ -1,12 +1,13 @@
 //! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
 
+use super::contact_step::ContactRowsWork;
 use super::energy::Ledger;
-use super::program::Compiler;
+use super::program::{Compiler, Program};
 use super::start::{self, Start};
-use super::{Constraints, ContactRowsWork, Simulation, Statistics, Workspace};
-use crate::contact::{ContactConstraint, GapRates};
+use super::{Constraints, Simulation, Statistics, Workspace};
+use crate::contact::ContactConstraint;
 use crate::contact_solver::{ActiveSet, ContactSolver};
-use crate::corrector::{Backup, Buffers, Corrector, Edits};
+use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::error::{Error, Result};
 use crate::integrator::{Newmark, TimeIntegrator};
 use crate::linear_solver::{Automatic, LinearSolver};
@@ -164,36 +165,29 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
         let momentum = tableau.momentum();
-        let (state, history, projection) = match self.resumed {
-            Some((state, history)) => {
-                history.check(dofs, depth + stages)?;
-                check_vector("the resumed displacement", &state.motion.u, dofs)?;
-                check_vector("the resumed velocity", &state.motion.v, dofs)?;
-                check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-                if history.clock.h.to_bits() != h.to_bits() {
-                    let value = history.clock.h;
-                    return Err(Error::Parameter {
-                        name: "the step size of the history",
-                        value,
-                        range: "h of the run",
-                    });
-                }
-                constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
-                constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
-                let projection = start::projection(&*system, dofs, rows)?;
-                (state, history, projection)
+        let (state, history, projection) = if let Some((state, history)) = self.resumed {
+            history.check(dofs, depth + stages)?;
+            check_vector("the resumed displacement", &state.motion.u, dofs)?;
+            check_vector("the resumed velocity", &state.motion.v, dofs)?;
+            check_vector("the resumed acceleration", &state.motion.a, dofs)?;
+            if history.clock.h.to_bits() != h.to_bits() {
+                let value = history.clock.h;
+                return Err(Error::Parameter { name: "the step size of the history", value, range: "h of the run" });
             }
-            None => {
-                let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, h, t };
-                let (motion, contacts, projection) = start.state(u, v, &mut constraints, &mut g, rows)?;
-                let known = if start::is_free_flight(&motion, h) { depth } else { 1 };
-                let mut slots = vec![Motion::zero(dofs); depth + stages];
-                if known > 1 {
-                    start::straight_past(&motion, h, &mut slots[1..depth]);
-                }
-                let clock = Clock { reference: t, steps: 0, h };
-                (State { motion, contacts }, History { slots, known, clock }, projection)
+            constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
+            constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
+            let projection = start::projection(&*system, dofs, rows)?;
+            (state, history, projection)
+        } else {
+            let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, h, t };
+            let (motion, contacts, projection) = start.state(u, v, &mut constraints, &mut g, rows)?;
+            let known = if start::is_free_flight(&motion, h) { depth } else { 1 };
+            let mut slots = vec![Motion::zero(dofs); depth + stages];
+            if known > 1 {
+                start::straight_past(&motion, h, &mut slots[1..depth]);
             }
+            let clock = Clock { reference: t, steps: 0, h };
+            (State { motion, contacts }, History { slots, known, clock }, projection)
         };
         contact_solver.reserve(rows);
 
@@ -205,35 +199,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let factorizations =
             program.operators.len() as u64 + startup.as_ref().map_or(0, |program| program.operators.len() as u64);
-        let prescribed = system.prescribed().to_vec();
-        let edits_past = self.correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
-        let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
-        let work = Workspace {
-            increment: vec![T::zero(); dofs],
-            balance: separate_balance.then(|| Motion::zero(dofs)),
-            supports: vec![[T::zero(); 3]; prescribed.len()],
-            balance_supports: vec![[T::zero(); 3]; prescribed.len()],
-            coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
-            prescribed,
-            trial: ContactState::with_capacity(rows),
-            was_closed: Vec::with_capacity(rows),
-            rows: ContactRowsWork {
-                gaps: vec![T::zero(); rows],
-                rates: vec![GapRates::default(); rows],
-                tolerance: vec![T::zero(); rows],
-                in_problem: vec![false; rows],
-                problem: Vec::with_capacity(rows),
-                delassus: Vec::with_capacity(rows * rows),
-                offset: Vec::with_capacity(rows),
-                problem_tolerance: Vec::with_capacity(rows),
-                bounds: Vec::with_capacity(rows),
-                multipliers: Vec::with_capacity(rows),
-            },
-            buffers: Buffers::new(rows, dofs),
-            projection: (rows > 0 && !self.correctors.is_empty()).then_some(projection),
-            backup: Backup::new(if edits_past { depth + stages - 1 } else { 0 }, dofs),
-            correction_energy: T::zero(),
-        };
+        let work = workspace(&*system, &program, &self.correctors, projection, rows, depth + stages);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
             EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
@@ -258,6 +224,36 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let Simulation { constraints, state, work, .. } = &mut simulation;
         constraints.finite_gaps(state.motion.t, &state.motion.u, &mut work.rows.gaps)?;
         Ok(simulation)
+    }
+}
+
+/// Memory of the steps: nothing is allocated after this.
+fn workspace<T: Real>(
+    system: &dyn System<T>,
+    program: &Program<T>,
+    correctors: &[Box<dyn Corrector<T> + '_>],
+    projection: JumpProjection<T>,
+    rows: usize,
+    slots: usize,
+) -> Workspace<T> {
+    let dofs = system.dofs();
+    let prescribed = system.prescribed().to_vec();
+    let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+    let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
+    Workspace {
+        increment: vec![T::zero(); dofs],
+        balance: separate_balance.then(|| Motion::zero(dofs)),
+        supports: vec![[T::zero(); 3]; prescribed.len()],
+        balance_supports: vec![[T::zero(); 3]; prescribed.len()],
+        coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
+        prescribed,
+        trial: ContactState::with_capacity(rows),
+        was_closed: Vec::with_capacity(rows),
+        rows: ContactRowsWork::new(rows),
+        buffers: Buffers::new(rows, dofs),
+        projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
+        backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
+        correction_energy: T::zero(),
     }
 }
 

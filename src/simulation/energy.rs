@@ -194,7 +194,9 @@ fn balance_residual<T: Real>(
     for (row, &force) in contacts.lambda.iter().enumerate() {
         g.scatter(row, force, residual);
     }
-    residual.iter_mut().for_each(|r| *r = -*r);
+    for r in residual.iter_mut() {
+        *r = -*r;
+    }
     system.mass().product(T::one(), &motion.a, residual);
     Ok(())
 }

@@ -29,7 +29,7 @@ pub(crate) struct ScaledRows<T> {
 const BLOCK: usize = 1024;
 
 impl<T: Real> ScaledRows<T> {
-    fn new(rows: Rows, h: f64) -> Self {
+    fn new(rows: &Rows, h: f64) -> Self {
         // Row i gives h^i times its quantity, column j of a past state is h^j times the stored one.
         let scale = |row: usize, field: usize| match field.abs_diff(row) {
             0 => 1.0,
@@ -116,7 +116,9 @@ impl<T: Real> Operator<T> {
             let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];
             column.fill(T::zero());
             g.scatter(row, T::one(), column);
-            prescribed.iter().for_each(|&dof| column[dof] = T::zero());
+            for &dof in prescribed {
+                column[dof] = T::zero();
+            }
             self.factor.solve(column);
             self.computed[row] = true;
         }
@@ -160,14 +162,12 @@ impl<T: Real> Compiler<'_, T> {
         let own = std::ptr::eq(tableau, reader);
         for (s, stage) in tableau.stages.iter().enumerate() {
             let weights = stage.balance.each().map(|row| row.z);
-            let shared = program.operators.iter().position(|operator| operator.weights == weights);
-            let operator = match shared {
-                Some(operator) => operator,
-                None => {
-                    program.operators.push(self.operator(stage, weights)?);
-                    program.operators.len() - 1
-                }
-            };
+            let bits = |weights: [f64; 3]| weights.map(f64::to_bits);
+            let shared = program.operators.iter().position(|operator| bits(operator.weights) == bits(weights));
+            if shared.is_none() {
+                program.operators.push(self.operator(stage, weights)?);
+            }
+            let operator = shared.unwrap_or(program.operators.len() - 1);
             let increment = stage.increment();
             let (covector, read) = if own {
                 (momentum.after_stage(s).to_vec(), tableau.read_after(s))
@@ -178,8 +178,8 @@ impl<T: Real> Compiler<'_, T> {
             let response = stage.recovery.each().map(|row| row.z / stage.balance.a.z);
             let impulse_weight = response.iter().zip(covector[0]).map(|(r, p)| r * p).sum();
             program.stages.push(CompiledStage {
-                recovery: ScaledRows::new(increment.recovery, self.h),
-                balance: (!stage.is_collocated()).then(|| ScaledRows::new(increment.balance, self.h)),
+                recovery: ScaledRows::new(&increment.recovery, self.h),
+                balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
                 load: stage.load,
                 end: stage.end,
                 operator,
