@@ -47,6 +47,8 @@ pub(crate) mod kernels {
         fn scale_into(c: Self, x: &[Self], out: &mut [Self]);
         /// `out += c x`.
         fn axpy(c: Self, x: &[Self], out: &mut [Self]);
+        /// `out += c (x − y)`.
+        fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]);
         /// Whether every entry is finite.
         fn all_finite(x: &[Self]) -> bool;
         /// `y += c A x`, any A.
@@ -165,6 +167,11 @@ pub(crate) mod kernels {
                 fn axpy(c: Self, x: &[Self], out: &mut [Self]) {
                     for (y, &x) in out.iter_mut().zip(x) {
                         *y += c * x;
+                    }
+                }
+                fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]) {
+                    for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
+                        *out += c * (x - y);
                     }
                 }
                 fn all_finite(x: &[Self]) -> bool {

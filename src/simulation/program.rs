@@ -11,11 +11,20 @@ use crate::system::{System, TangentWeights};
 use crate::tableau::{MAX_PAST, Momentum, Row, Rows, Stage, Tableau};
 
 /// One term of a row: coefficient times one field of one past state.
+///
+/// Displacements of older states (field 0, state ≥ 1) enter as differences from the newest: their coefficients times u would leave
+/// eps u/h in a velocity, the differences are exact.
 #[derive(Clone, Copy, Debug)]
 struct Term<T> {
     c: T,
     state: usize,
     field: usize,
+}
+
+impl<T> Term<T> {
+    fn is_difference(&self) -> bool {
+        self.field == 0 && self.state > 0
+    }
 }
 
 /// Three rows with h multiplied in: parts of u, v, a that come from the past, and the weights of the increment d.
@@ -39,12 +48,22 @@ impl<T: Real> ScaledRows<T> {
             _ => 1.0 / (h * h),
         };
         let compile = |i: usize, row: Row| {
-            let entry = |state: usize, field: usize| (row.past(state)[field], state, field);
-            (0..MAX_PAST)
-                .flat_map(|state| (0..3).map(move |field| entry(state, field)))
-                .filter(|&(c, ..)| c != 0.0)
-                .map(|(c, state, field)| Term { c: T::of(c * scale(i, field)), state, field })
-                .collect()
+            // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own rounding.
+            let sum: f64 = row.u.iter().sum();
+            let size: f64 = row.u.iter().map(|c| c.abs()).sum();
+            let nearest = if (sum - sum.round()).abs() <= 8.0 * f64::EPSILON * size { sum.round() } else { sum };
+            let coefficient = |state: usize, field: usize| match (state, field) {
+                (0, 0) => nearest,
+                _ => row.past(state)[field],
+            };
+            let mut terms: Vec<_> = (0..MAX_PAST)
+                .flat_map(|state| (0..3).map(move |field| (state, field)))
+                .map(|(state, field)| Term { c: T::of(coefficient(state, field) * scale(i, field)), state, field })
+                .filter(|term| term.c != T::zero())
+                .collect();
+            // Differences last: the first term overwrites.
+            terms.sort_by_key(|term: &Term<T>| (term.is_difference(), term.state, term.field));
+            terms
         };
         let [u, v, a] = rows.each();
         Self {
@@ -68,7 +87,16 @@ impl<T: Real> ScaledRows<T> {
                 let out = &mut output[block.clone()];
                 for (i, term) in terms.iter().enumerate() {
                     let source = &past[term.state].field(term.field)[block.clone()];
-                    if i == 0 { T::scale_into(term.c, source, out) } else { T::axpy(term.c, source, out) }
+                    match (i, term.is_difference()) {
+                        (0, false) => T::scale_into(term.c, source, out),
+                        (_, false) => T::axpy(term.c, source, out),
+                        (i, true) => {
+                            if i == 0 {
+                                out.fill(T::zero());
+                            }
+                            T::axpy_difference(term.c, source, &past[0].u[block.clone()], out);
+                        }
+                    }
                 }
             }
             start = block.end;
