@@ -41,10 +41,11 @@ pub fn spectral_radius(tableau: &Tableau, omega: f64, xi: f64) -> f64 {
     moduli.fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
 }
 
-/// Relative period elongation and numerical damping ratio of the principal root at `h_over_period` = h/T, for ξ of the
+/// Relative elongation of the (damped) period and damping ratio of the principal root at `h_over_period` = h/T, for ξ of the
 /// equation. `None` if the principal roots are real (no oscillation is left).
 ///
-/// The numerical damping includes the physical one.
+/// The damping ratio is −ln|root| over the angle of the root, as the literature tabulates it: numerical and physical damping
+/// together, ξ/√(1 − ξ²) for an exact scheme.
 pub fn period_and_damping(tableau: &Tableau, h_over_period: f64, xi: f64) -> Option<(f64, f64)> {
     let omega = 2.0 * std::f64::consts::PI * h_over_period;
     // The principal root is the complex one nearest to the exact exp(−ξΩ ± i Ω√(1 − ξ²)).
@@ -53,7 +54,5 @@ pub fn period_and_damping(tableau: &Tableau, h_over_period: f64, xi: f64) -> Opt
     let roots = eigenvalues(tableau, omega, xi).into_iter().filter(|root| root.im > 1e-12);
     let root = roots.min_by(|x, y| distance(x).total_cmp(&distance(y)))?;
     let (decay, angle) = (-root.re.hypot(root.im).ln(), root.im.atan2(root.re));
-    let damping = decay / angle.hypot(decay);
-    let frequency = angle / (1.0 - damping * damping).sqrt();
-    Some((omega / frequency - 1.0, damping))
+    Some((exact.1 / angle - 1.0, decay / angle))
 }

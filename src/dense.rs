@@ -28,7 +28,6 @@ impl<T: Real> DenseCholesky<T> {
         self.l.clear();
         self.l.resize(size * size, T::zero());
         self.first.clear();
-        #[allow(clippy::cast_precision_loss)]
         let dependent = T::of(16.0 * size as f64) * T::epsilon();
         for i in 0..size {
             let (done, rest) = self.l.split_at_mut(i * size);

@@ -201,7 +201,6 @@ impl<'a, T: Real> Simulation<'a, T> {
     /// # Errors
     ///
     /// [`Error::Dimension`] if the direction has the wrong length.
-    #[allow(clippy::cast_precision_loss)]
     pub fn momentum(&self, direction: &[T]) -> Result<T> {
         let dofs = self.system.dofs();
         if direction.len() != dofs {

@@ -218,7 +218,6 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Time at `fraction` of the step that comes next.
-    #[allow(clippy::cast_precision_loss)]
     pub(crate) fn at(&self, fraction: f64) -> f64 {
         self.reference + (self.steps as f64 + fraction) * self.h
     }

@@ -363,7 +363,6 @@ impl Momentum {
         let transposed =
             (0..size).map(|i| (0..size).map(|j| map[j][i] - f64::from(u8::from(i == j))).collect()).collect();
         let mut psi = null_vector(transposed);
-        #[allow(clippy::cast_precision_loss)]
         let flight: f64 = psi.chunks(3).enumerate().map(|(k, p)| p[1] - k as f64 * p[0]).sum();
         for p in &mut psi {
             *p /= flight;

@@ -89,7 +89,10 @@ fn figures_at_phase_0_are_those_of_the_prototypes() {
         let found = run(&Bars::paper(n), scheme, correction, H);
         let found = [found.force_rms, found.force_max, found.energy];
         for (found, expected) in found.iter().zip(phase_0) {
-            assert!((found / expected - 1.0).abs() < 0.03, "n = {n}, {scheme:?}, {correction:?}: {found} for {expected}");
+            assert!(
+                (found / expected - 1.0).abs() < 0.03,
+                "n = {n}, {scheme:?}, {correction:?}: {found} for {expected}"
+            );
         }
     }
 }
@@ -197,7 +200,10 @@ fn results_do_not_depend_on_a_common_velocity() {
                 for i in 0..found.t.len() {
                     let force = (found.force[i] - reference.force[i]).abs() / 0.0125;
                     let speed = (found.v[i][0] - boost - reference.v[i][0]).abs() / 0.05;
-                    assert!(force < 1e-9 && speed < 1e-9, "{scheme:?}, phase {phase}, {velocity:?}, step {i}: {force:e} {speed:e}");
+                    assert!(
+                        force < 1e-9 && speed < 1e-9,
+                        "{scheme:?}, phase {phase}, {velocity:?}, step {i}: {force:e} {speed:e}"
+                    );
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod measure;
+pub mod schemes;
 
 pub use bars::{Bars, MassKind};
 pub use measure::{Figures, Record, record};
