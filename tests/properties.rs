@@ -1,0 +1,273 @@
+//! Random systems and contacts: what must hold whatever the numbers are.
+
+use contact_dynamics::contact::ContactJacobian;
+use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{
+    Composite, JumpProjection, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Simulation,
+    TimeIntegrator,
+};
+use contact_dynamics_scenes::schemes::{bathe, chung_hulbert, park};
+use proptest::prelude::*;
+
+fn scheme(index: usize) -> Box<dyn TimeIntegrator> {
+    match index {
+        0 => Box::new(Composite),
+        1 => Box::new(Newmark::trapezoidal()),
+        2 => Box::new(bathe()),
+        3 => Box::new(chung_hulbert(0.8)),
+        _ => Box::new(park()),
+    }
+}
+
+/// A random scene: springs between random pairs, random masses, independent contact rows, random motion.
+#[derive(Clone, Debug)]
+struct Scene {
+    masses: Vec<f64>,
+    /// (i, j, stiffness); i = j is a spring to the ground.
+    springs: Vec<(usize, usize, f64)>,
+    /// Share of the mass that a consistent matrix puts on each spring's pair; none for a lumped mass.
+    coupling: Option<f64>,
+    /// Row r pushes dof r and, through weights, some later dofs: rows are independent by construction.
+    rows: Vec<(Vec<(usize, f64)>, f64)>,
+    velocity: Vec<f64>,
+    damping: (f64, f64),
+    h: f64,
+    scheme: usize,
+}
+
+fn scenes() -> impl Strategy<Value = Scene> {
+    (3_usize..8).prop_flat_map(|n| {
+        let masses = prop::collection::vec(0.5..5.0, n);
+        let springs = prop::collection::vec((0..n, 0..n, 1.0..200.0), 2..2 * n);
+        let coupling = prop::option::of(0.02..0.2);
+        let weights = prop::collection::vec(prop::collection::vec((0..n, -1.0..1.0), 0..3), 1..n);
+        let gaps = prop::collection::vec(0.0..0.2, n);
+        let velocity = prop::collection::vec(-2.0..2.0, n);
+        let damping = prop_oneof![Just((0.0, 0.0)), (0.0..0.1, 0.0..0.01)];
+        (masses, springs, coupling, weights, gaps, velocity, damping, 0.002..0.05, 0_usize..5).prop_map(
+            |(masses, springs, coupling, weights, gaps, velocity, damping, h, scheme)| {
+                let rows = weights
+                    .into_iter()
+                    .enumerate()
+                    .map(|(r, weights)| {
+                        let mut row = vec![(r, 1.0)];
+                        for (dof, weight) in weights {
+                            if dof > r && !row.iter().any(|&(other, _)| other == dof) {
+                                row.push((dof, weight));
+                            }
+                        }
+                        (row, gaps[r] + 1e-3)
+                    })
+                    .collect();
+                Scene { masses, springs, coupling, rows, velocity, damping, h, scheme }
+            },
+        )
+    })
+}
+
+impl Scene {
+    fn matrix(&self, pair: impl Fn(f64) -> [f64; 2], ground: impl Fn(f64) -> f64) -> SparseColMat<usize, f64> {
+        let n = self.masses.len();
+        let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
+        for &(i, j, k) in &self.springs {
+            if i == j {
+                triplets.push(Triplet::new(i, i, ground(k)));
+            } else {
+                let [diagonal, off] = pair(k);
+                for (r, c, x) in [(i, i, diagonal), (j, j, diagonal), (i, j, off), (j, i, off)] {
+                    triplets.push(Triplet::new(r, c, x));
+                }
+            }
+        }
+        SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
+    }
+
+    fn mass(&self) -> Option<SparseColMat<usize, f64>> {
+        let share = self.coupling?;
+        let n = self.masses.len();
+        let springs = self.matrix(|_| [2.0 * share, share], |_| 0.0);
+        let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, self.masses[i])).collect();
+        for j in 0..n {
+            for (&i, &x) in springs.as_ref().row_idx_of_col_raw(j).iter().zip(springs.as_ref().val_of_col(j)) {
+                triplets.push(Triplet::new(i, j, x));
+            }
+        }
+        Some(SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap())
+    }
+
+    fn system(&self) -> LinearSystem<'static, f64> {
+        let stiffness = self.matrix(|k| [k, -k], |k| k);
+        let system = match self.mass() {
+            Some(mass) => LinearSystem::new(mass, stiffness),
+            None => LinearSystem::lumped(self.masses.clone(), stiffness),
+        };
+        system.unwrap().rayleigh(self.damping.0, self.damping.1).unwrap()
+    }
+
+    fn contact(&self) -> LinearRows<'static, f64> {
+        self.rows.iter().fold(LinearRows::new(), |rows, (row, gap)| rows.unilateral(row, *gap))
+    }
+
+    fn jacobian(&self) -> ContactJacobian<f64> {
+        let mut g = ContactJacobian::default();
+        for (row, _) in &self.rows {
+            g.push(row);
+        }
+        g
+    }
+
+    fn start(&self) -> Simulation<'static, f64> {
+        Simulation::builder(self.system(), scheme(self.scheme), self.h)
+            .velocity(self.velocity.clone())
+            .constraint(self.contact())
+            .corrector(PersistencyCorrection::with_history_projection())
+            .energy_balance()
+            .build()
+            .unwrap()
+    }
+}
+
+fn largest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0_f64, |a, b| a.max(b.abs()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_step_is_complementary_and_free_of_jumps(scene in scenes()) {
+        let mut run = scene.start();
+        let g = scene.jacobian();
+        let mut corrections = 0.0;
+        for _ in 0..60 {
+            run.step().unwrap();
+            let state = run.state();
+            let (u, v, a) = (state.displacement(), state.velocity(), state.acceleration());
+            let contacts = state.contacts();
+            let length = largest(u) + scene.h * largest(v) + 0.2;
+            for (row, &gap) in run.gaps().iter().enumerate() {
+                let raw = contacts.raw_forces()[row];
+                prop_assert!(gap > -1e-12 * length && raw >= 0.0, "gap {gap}, raw {raw}");
+                if raw > 0.0 {
+                    prop_assert!(gap < 1e-12 * length, "pressed with gap {gap}");
+                    let (rate, acceleration) = (g.product(row, v), g.product(row, a));
+                    prop_assert!(rate.abs() < 1e-11 * (largest(v) + largest(u) / scene.h), "jump of velocity {rate}");
+                    prop_assert!(acceleration.abs() < 1e-10 * (largest(a) + largest(v) / scene.h), "jump of acceleration {acceleration}");
+                }
+                if !contacts.closed()[row] {
+                    prop_assert_eq!(contacts.forces()[row], 0.0);
+                }
+            }
+            let works = run.energy().works.unwrap();
+            prop_assert!(works.corrections <= corrections + 1e-14, "the projection gained energy");
+            corrections = works.corrections;
+        }
+    }
+
+    #[test]
+    fn a_clone_of_state_and_history_continues_bit_for_bit(scene in scenes(), steps in 0_usize..40) {
+        let mut run = scene.start();
+        for _ in 0..steps {
+            run.step().unwrap();
+        }
+        let mut resumed = Simulation::builder(scene.system(), scheme(scene.scheme), scene.h)
+            .constraint(scene.contact())
+            .corrector(PersistencyCorrection::with_history_projection())
+            .resume(run.state().clone(), run.history().clone())
+            .build()
+            .unwrap();
+        for _ in 0..30 {
+            run.step().unwrap();
+            resumed.step().unwrap();
+            prop_assert_eq!(run.state(), resumed.state());
+            prop_assert_eq!(run.time().to_bits(), resumed.time().to_bits());
+        }
+    }
+
+    #[test]
+    fn momentum_changes_by_the_impulses_of_contact(scene in scenes()) {
+        // Without springs to the ground and without mass-proportional damping only contact changes momentum.
+        let springs = scene.springs.iter().copied().filter(|(i, j, _)| i != j).collect();
+        let scene = Scene { springs, damping: (0.0, scene.damping.1), ..scene };
+        let mut run = scene.start();
+        // Each connected body has its own momentum; the total is enough here.
+        let direction = vec![1.0; scene.masses.len()];
+        let before = run.momentum(&direction).unwrap();
+        let (mut impulse, mut size) = (0.0, before.abs());
+        // The start-up of a multistep scheme from a deformed state is another functional; these start undeformed and damped at most.
+        let undamped = scene.damping.1 == 0.0;
+        for _ in 0..80 {
+            run.step().unwrap();
+            for ((row, _), &j) in scene.rows.iter().zip(run.state().contacts().impulses()) {
+                let push: f64 = row.iter().map(|(_, weight)| weight * j).sum();
+                impulse += push;
+                size += push.abs();
+            }
+        }
+        let after = run.momentum(&direction).unwrap();
+        let scale = size + largest(&scene.velocity);
+        if undamped || run.history().is_empty() {
+            prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+        }
+    }
+
+    #[test]
+    fn projection_removes_jumps_and_never_gains_energy(scene in scenes(), targets in prop::collection::vec(-1.0_f64..1.0, 8)) {
+        let g = scene.jacobian();
+        let stored = scene.mass();
+        let mass = stored.as_ref().map_or(Mass::Lumped(&scene.masses), |m| Mass::Consistent(m.as_ref()));
+        let mut projection = JumpProjection::new(mass, &[], g.rows()).unwrap();
+        let rows: Vec<usize> = (0..g.rows()).collect();
+        projection.close(&g, &rows).unwrap();
+        let energy = |v: &[f64]| {
+            let mut p = vec![0.0; v.len()];
+            mass.product(1.0, v, &mut p);
+            0.5 * p.iter().zip(v).map(|(p, v)| p * v).sum::<f64>()
+        };
+        let mut v = scene.velocity.clone();
+        let mut multipliers = vec![0.0; rows.len()];
+        let zero = vec![0.0; rows.len()];
+        projection.remove_jump(&g, &zero, &mut v, &mut multipliers);
+        let jumps: Vec<f64> = rows.iter().map(|&row| g.product(row, &scene.velocity)).collect();
+        // ½ jumpᵀ S⁻¹ jump
+        let loss = 0.5 * jumps.iter().zip(&multipliers).map(|(j, m)| j * m).sum::<f64>();
+        let (before, after) = (energy(&scene.velocity), energy(&v));
+        prop_assert!(loss >= 0.0 && (before - after - loss).abs() < 1e-12 * before);
+        prop_assert!(rows.iter().all(|&row| g.product(row, &v).abs() < 1e-12 * largest(&scene.velocity).max(1e-3)));
+        projection.remove_jump(&g, &targets[..rows.len()], &mut v, &mut multipliers);
+        for &row in &rows {
+            prop_assert!((g.product(row, &v) - targets[row]).abs() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn active_set_finds_the_only_solution(
+        entries in prop::collection::vec(-1.0_f64..1.0, 36),
+        offset in prop::collection::vec(-1.0_f64..1.0, 6),
+        guess in prop::collection::vec(0.0_f64..1.0, 6),
+        free in 0_usize..3,
+    ) {
+        // W = B Bᵀ + 0.05: by enumeration of all active sets there is exactly one solution.
+        let n = 6;
+        let w: Vec<f64> = (0..n * n)
+            .map(|k| {
+                let (i, j) = (k % n, k / n);
+                (0..n).map(|l| entries[i * n + l] * entries[j * n + l]).sum::<f64>() + if i == j { 0.05 } else { 0.0 }
+            })
+            .collect();
+        let bounds: Vec<_> = (0..n).map(|i| if i < free { Bound::Free } else { Bound::NonNegative }).collect();
+        let tolerance = vec![1e-13; n];
+        let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance };
+        let mut solver = ActiveSet::default();
+        solver.reserve(n);
+        let mut lambda = guess.iter().map(|&x| if x > 0.5 { x } else { 0.0 }).collect::<Vec<_>>();
+        solver.solve(&problem, &mut lambda).unwrap();
+        prop_assert!(problem.residual(&lambda).1 < 1e-11, "{:?}", problem.residual(&lambda));
+        let mut cold = vec![0.0; n];
+        solver.solve(&problem, &mut cold).unwrap();
+        for (x, y) in lambda.iter().zip(&cold) {
+            prop_assert!((x - y).abs() < 1e-9 * (1.0 + largest(&lambda)));
+        }
+    }
+}
