@@ -95,6 +95,39 @@ pub trait ContactConstraint<T: Real>: Send {
     }
 }
 
+impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> {
+    fn max_candidates(&self) -> usize {
+        (**self).max_candidates()
+    }
+    fn max_entries(&self) -> usize {
+        (**self).max_entries()
+    }
+    fn check(&self, dofs: usize) -> Result<()> {
+        (**self).check(dofs)
+    }
+    fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
+        (**self).search(t, u, v)
+    }
+    fn candidates(&self) -> usize {
+        (**self).candidates()
+    }
+    fn identity(&self, row: usize) -> (usize, usize) {
+        (**self).identity(row)
+    }
+    fn law(&self, row: usize) -> ContactLaw {
+        (**self).law(row)
+    }
+    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+        (**self).jacobian(out);
+    }
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
+        (**self).gap(t, u, out);
+    }
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+        (**self).rates(t, u, v, out);
+    }
+}
+
 /// What a search found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Candidates {

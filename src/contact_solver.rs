@@ -113,3 +113,16 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>>;
 }
+
+impl<T: Real, S: ContactSolver<T> + ?Sized> ContactSolver<T> for Box<S> {
+    fn reserve(&mut self, size: usize) {
+        (**self).reserve(size);
+    }
+    fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> std::result::Result<usize, ContactFailure<T>> {
+        (**self).solve(problem, multipliers)
+    }
+}

@@ -37,6 +37,12 @@ pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>>;
 }
 
+impl<T: Real, L: LinearSolver<T> + ?Sized> LinearSolver<T> for Box<L> {
+    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
+        (**self).analyze(pattern)
+    }
+}
+
 /// The memory of a [`LinearSolver`] for one pattern; several may live at once.
 pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Factorizes a matrix with the analyzed pattern.

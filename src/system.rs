@@ -93,38 +93,45 @@ pub trait System<T: Real>: Send {
     }
 }
 
-impl<T: Real, S: System<T> + ?Sized> System<T> for &mut S {
-    fn dofs(&self) -> usize {
-        (**self).dofs()
-    }
-    fn mass(&self) -> Mass<'_, T> {
-        (**self).mass()
-    }
-    fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        (**self).force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        (**self).pattern()
-    }
-    fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
-        (**self).tangent(weights, out)
-    }
-    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
-        (**self).damping(v, out)
-    }
-    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
-        (**self).potential_energy(u)
-    }
-    fn load(&mut self, t: f64, out: &mut [T]) {
-        (**self).load(t, out);
-    }
-    fn prescribed(&self) -> &[usize] {
-        (**self).prescribed()
-    }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
-        (**self).prescribed_motion(t, out);
-    }
-    fn commit(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
-        (**self).commit(t, u, v)
-    }
+/// What points to a system is a system: `&mut S` lends the host's model, `Box<dyn System<T>>` is chosen at run time.
+macro_rules! forward {
+    ($($pointer:ty),*) => {$(
+        impl<T: Real, S: System<T> + ?Sized> System<T> for $pointer {
+            fn dofs(&self) -> usize {
+                (**self).dofs()
+            }
+            fn mass(&self) -> Mass<'_, T> {
+                (**self).mass()
+            }
+            fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+                (**self).force(t, u, v, out)
+            }
+            fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+                (**self).pattern()
+            }
+            fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
+                (**self).tangent(weights, out)
+            }
+            fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
+                (**self).damping(v, out)
+            }
+            fn potential_energy(&mut self, u: &[T]) -> Option<T> {
+                (**self).potential_energy(u)
+            }
+            fn load(&mut self, t: f64, out: &mut [T]) {
+                (**self).load(t, out);
+            }
+            fn prescribed(&self) -> &[usize] {
+                (**self).prescribed()
+            }
+            fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
+                (**self).prescribed_motion(t, out);
+            }
+            fn commit(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
+                (**self).commit(t, u, v)
+            }
+        }
+    )*};
 }
+
+forward!(&mut S, Box<S>);

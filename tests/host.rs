@@ -1,0 +1,317 @@
+//! A host's own parts behind every trait, chosen at run time, in both precisions.
+
+use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw};
+use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
+use contact_dynamics::corrector::Correction;
+use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::observer::{ContactRecorder, DofRecorder};
+use contact_dynamics::{
+    ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, Damping, Error, Factorization,
+    LinearSolver, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation, StepView, System,
+    TangentWeights, TimeIntegrator,
+};
+use contact_dynamics_scenes::Bars;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A mass on a spring and a dashpot, without any matrix.
+struct Oscillator<T> {
+    mass: [T; 1],
+    stiffness: T,
+    damping: T,
+    pattern: SymbolicSparseColMat<usize>,
+    commits: usize,
+}
+
+impl<T: Real> Oscillator<T> {
+    fn new(mass: f64, stiffness: f64, damping: f64) -> Self {
+        Self {
+            mass: [T::of(mass)],
+            stiffness: T::of(stiffness),
+            damping: T::of(damping),
+            pattern: SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]),
+            commits: 0,
+        }
+    }
+}
+
+impl<T: Real> System<T> for Oscillator<T> {
+    fn dofs(&self) -> usize {
+        1
+    }
+    fn mass(&self) -> Mass<'_, T> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, _: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+        out[0] = -self.stiffness * u[0] - self.damping * v[0];
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
+        out[0] = weights.stiffness * self.stiffness + weights.damping * self.damping;
+        Ok(())
+    }
+    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
+        out[0] = self.damping * v[0];
+        Damping::Present
+    }
+    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
+        Some(T::of(0.5) * self.stiffness * u[0] * u[0])
+    }
+    fn commit(&mut self, _: f64, _: &[T], _: &[T]) -> Result<()> {
+        self.commits += 1;
+        if self.commits == 1000 {
+            return Err(Error::Host { callback: "commit", source: "full".into() });
+        }
+        Ok(())
+    }
+}
+
+/// A floor at u = −depth that appears only near it: candidates change during the run.
+struct Floor {
+    depth: f64,
+    near: bool,
+}
+
+impl<T: Real> ContactConstraint<T> for Floor {
+    fn max_candidates(&self) -> usize {
+        1
+    }
+    fn max_entries(&self) -> usize {
+        1
+    }
+    fn check(&self, dofs: usize) -> Result<()> {
+        assert_eq!(dofs, 1);
+        Ok(())
+    }
+    fn search(&mut self, _: f64, u: &[T], _: &[T]) -> Result<contact_dynamics::contact::Candidates> {
+        let near = u[0].value() < -0.5 * self.depth;
+        let changed = near != self.near;
+        self.near = near;
+        Ok(match changed {
+            true => contact_dynamics::contact::Candidates::Changed,
+            false => contact_dynamics::contact::Candidates::Unchanged,
+        })
+    }
+    fn candidates(&self) -> usize {
+        usize::from(self.near)
+    }
+    fn identity(&self, _: usize) -> (usize, usize) {
+        (7, 3)
+    }
+    fn law(&self, _: usize) -> ContactLaw {
+        ContactLaw::Rigid
+    }
+    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+        if self.near {
+            out.push(&[(0, T::one())]);
+        }
+    }
+    fn gap(&mut self, _: f64, u: &[T], out: &mut [T]) {
+        if let Some(gap) = out.first_mut() {
+            *gap = u[0] + T::of(self.depth);
+        }
+    }
+}
+
+/// Counts what passes through to the library's own solvers.
+#[derive(Debug)]
+struct Counting {
+    calls: Arc<AtomicUsize>,
+}
+
+#[derive(Debug)]
+struct CountingFactor<T: Real> {
+    inner: Box<dyn Factorization<T>>,
+    calls: Arc<AtomicUsize>,
+}
+
+impl<T: Real> LinearSolver<T> for Counting {
+    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
+        let inner = Cholesky::default().analyze(pattern)?;
+        Ok(Box::new(CountingFactor { inner, calls: self.calls.clone() }))
+    }
+}
+
+impl<T: Real> Factorization<T> for CountingFactor<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        self.inner.factorize(a)
+    }
+    fn solve(&mut self, rhs: &mut [T]) {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.inner.solve(rhs);
+    }
+    fn stored_values(&self) -> usize {
+        self.inner.stored_values()
+    }
+}
+
+#[derive(Debug)]
+struct CountingContact<T: Real> {
+    inner: ActiveSet<T>,
+    calls: Arc<AtomicUsize>,
+}
+
+impl<T: Real> ContactSolver<T> for CountingContact<T> {
+    fn reserve(&mut self, size: usize) {
+        self.inner.reserve(size);
+    }
+    fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> std::result::Result<usize, ContactFailure<T>> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.inner.solve(problem, multipliers)
+    }
+}
+
+#[derive(Debug)]
+struct CountingCorrector {
+    calls: Arc<AtomicUsize>,
+}
+
+impl<T: Real> Corrector<T> for CountingCorrector {
+    fn name(&self) -> String {
+        "counting".into()
+    }
+    fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
+        assert!(!step.closed().is_empty());
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+fn by_name(name: &str) -> Box<dyn TimeIntegrator> {
+    match name {
+        "composite" => Box::new(Composite),
+        _ => Box::new(Newmark::trapezoidal()),
+    }
+}
+
+/// Builds everything from trait objects.
+fn host_run<T: Real>(name: &str, counts: [&Arc<AtomicUsize>; 3]) -> Simulation<'static, T> {
+    let system: Box<dyn System<T>> = Box::new(Oscillator::<T>::new(2.0, 50.0, 0.4));
+    let floor: Box<dyn ContactConstraint<T>> = Box::new(Floor { depth: 0.1, near: false });
+    let linear: Box<dyn LinearSolver<T>> = Box::new(Counting { calls: counts[0].clone() });
+    let contact: Box<dyn ContactSolver<T>> =
+        Box::new(CountingContact { inner: ActiveSet::default(), calls: counts[1].clone() });
+    let correctors: [Box<dyn Corrector<T>>; 2] =
+        [Box::new(PersistencyCorrection::new()), Box::new(CountingCorrector { calls: counts[2].clone() })];
+    let [first, second] = correctors;
+    Simulation::builder(system, by_name(name), 0.005)
+        .velocity(vec![T::of(-1.0)])
+        .constraint(floor)
+        .linear_solver(linear)
+        .contact_solver(contact)
+        .corrector(first)
+        .corrector(second)
+        .build()
+        .unwrap()
+}
+
+fn run_in<T: Real>() {
+    for name in ["composite", "Newmark"] {
+        let counts = [(); 3].map(|()| Arc::new(AtomicUsize::new(0)));
+        let mut run = host_run::<T>(name, [&counts[0], &counts[1], &counts[2]]);
+        let mut lowest = 0.0_f64;
+        let mut observer: Box<dyn Observer<T>> = Box::new((DofRecorder::<T>::new(0), ContactRecorder::<T>::new()));
+        let mut pressed = 0;
+        while run.time() < 2.0 - 1e-9 {
+            run.run_until(run.time() + 0.005, &mut *observer).unwrap();
+            lowest = lowest.min(run.state().displacement()[0].value());
+            let contacts = run.state().contacts();
+            if contacts.closed().first() == Some(&true) {
+                pressed += 1;
+                assert_eq!(contacts.ids()[0].feature, 7);
+                assert!(run.state().velocity()[0].value().abs() < 1e-4);
+            }
+        }
+        assert!((lowest + 0.1).abs() < 1e-6, "{name}: {lowest}");
+        assert!(pressed > 0);
+        for (count, what) in counts.iter().zip(["linear solves", "contact solves", "corrections"]) {
+            assert!(count.load(Ordering::Relaxed) > 0, "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_host_brings_every_part_in_double_precision() {
+    run_in::<f64>();
+}
+
+#[test]
+fn a_host_brings_every_part_in_single_precision() {
+    run_in::<f32>();
+}
+
+#[test]
+fn a_lent_system_stays_with_the_host() {
+    let mut system = Oscillator::<f64>::new(1.0, 4.0, 0.0);
+    {
+        let mut run =
+            Simulation::builder(&mut system, Newmark::trapezoidal(), 0.01).displacement(vec![1.0]).build().unwrap();
+        run.run_until(0.5, &mut ()).unwrap();
+        assert!((run.state().displacement()[0] - 1.0_f64.cos()).abs() < 1e-4);
+    }
+    assert_eq!(system.commits, 50);
+}
+
+#[test]
+fn a_commit_that_fails_undoes_the_step() {
+    let mut run = Simulation::builder(Oscillator::<f64>::new(1.0, 4.0, 0.0), Composite, 0.01)
+        .displacement(vec![1.0])
+        .build()
+        .unwrap();
+    run.run_until(9.99, &mut ()).unwrap();
+    let before = (run.state().clone(), run.time(), *run.statistics());
+    let error = run.step().unwrap_err();
+    assert!(matches!(error, Error::Host { callback: "commit", .. }) && !error.is_recoverable());
+    assert_eq!(std::error::Error::source(&error).unwrap().to_string(), "full");
+    let after = (run.state().clone(), run.time(), *run.statistics());
+    assert_eq!((before.0, before.1.to_bits(), before.2.steps), (after.0, after.1.to_bits(), after.2.steps));
+}
+
+#[test]
+fn observers_pair_up_and_may_stop_the_run() {
+    let bars = Bars::paper(10);
+    let mut run = Simulation::builder(bars.system::<f64>(), Composite, 1e-3)
+        .velocity(bars.velocities())
+        .constraint(bars.contact())
+        .linear_solver(Automatic)
+        .build()
+        .unwrap();
+    let mut recorder = DofRecorder::new(10);
+    let mut forces = ContactRecorder::new();
+    let mut steps = 0;
+    let stop = |step: &StepView<'_, f64>| {
+        assert_eq!(step.gaps.len(), 1);
+        steps += 1;
+        match step.state.contacts().closed()[0] {
+            true => Control::Stop,
+            false => Control::Continue,
+        }
+    };
+    let record = |step: &StepView<'_, f64>| {
+        recorder.observe(step);
+        forces.observe(step)
+    };
+    let outcome = run.run_until(1.0, &mut ((record, ()), stop)).unwrap();
+    assert_eq!(outcome, Outcome::Stopped);
+    assert_eq!(recorder.times().len(), steps);
+    assert_eq!(forces.forces().len(), steps);
+    assert!((recorder.motion()[steps - 1][0] - 0.005).abs() < 1e-4);
+    assert!((run.time() - 0.1).abs() < 2e-3, "{}", run.time());
+    assert_eq!(run.run_until(0.05, &mut ()).unwrap(), Outcome::Reached);
+}
+
+#[test]
+fn time_is_counted_not_summed() {
+    let mut run =
+        Simulation::builder(Oscillator::<f64>::new(1.0, 4.0, 0.0), Newmark::trapezoidal(), 1e-3).build().unwrap();
+    run.run_until(0.9, &mut ()).unwrap();
+    assert_eq!(run.time().to_bits(), (900.0_f64 * 1e-3).to_bits());
+    assert_eq!(run.statistics().steps, 900);
+}
