@@ -1,4 +1,5 @@
 #![doc = include_str!("lib.md")]
+#![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 pub mod analysis;
 pub mod contact;

@@ -6,7 +6,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::{ldlt::factor::LdltError, llt::factor::LltError};
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::cholesky::{LdltRef, LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::traits::RealField;
 use faer::{Conj, MatMut, Par, Side};
 use num_traits::{Float, NumAssign};
@@ -27,7 +27,7 @@ pub trait Real:
 
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
-    use super::{Conj, LdltError, LdltRef, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
+    use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
     use super::{SparseColMatRef, SymbolicCholesky, SymbolicCholeskyRaw};
     use faer::Spec;
     use faer::linalg::cholesky::{ldlt::factor::LdltRegularization, llt::factor::LltRegularization};
@@ -39,6 +39,16 @@ pub(crate) mod kernels {
         Ldlt,
         /// L Lᵀ, supernodal.
         Llt,
+    }
+
+    /// A simplicial L D Lᵀ in the order of elimination: each column holds 1/D, then L below it.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Simplicial<'a, T> {
+        pub pointers: &'a [usize],
+        pub rows: &'a [usize],
+        pub values: &'a [T],
+        /// The dof eliminated k-th, if not the k-th itself.
+        pub order: Option<&'a [usize]>,
     }
 
     #[doc(hidden)]
@@ -63,15 +73,16 @@ pub(crate) mod kernels {
             values: &mut [Self],
             memory: &mut MemBuffer,
         ) -> Result<(), usize>;
-        /// Solves in place for the columns of `rhs`.
-        fn cholesky_solve(
-            kind: Factorization,
+        /// Solves in place for the columns of `rhs` with a supernodal factor.
+        fn supernodal_solve(
             symbolic: &SymbolicCholesky<usize>,
             values: &[Self],
             rhs: &mut [Self],
             columns: usize,
             memory: &mut MemBuffer,
         );
+        /// Solves in place for one right-hand side with a simplicial factor; `x` is scratch.
+        fn simplicial_solve(factor: &Simplicial<'_, Self>, rhs: &mut [Self], x: &mut [Self]);
         /// Scratch for factorizing and for solving `columns` right-hand sides.
         fn cholesky_scratch(
             kind: Factorization,
@@ -152,8 +163,53 @@ pub(crate) mod kernels {
             if let Some(k) = pivots.iter().position(bad) {
                 return Err(original(k));
             }
+            // The sweeps multiply by 1/D.
+            for &start in pivots {
+                values[start] = T::recip_impl(&values[start]);
+            }
         }
         Ok(())
+    }
+
+    /// Permute, sweep forward, divide, sweep backward, permute back.
+    ///
+    /// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory takes
+    /// longer than the arithmetic.
+    #[inline]
+    fn simplicial_solve<T: Real>(factor: &Simplicial<'_, T>, rhs: &mut [T], x: &mut [T]) {
+        let Simplicial { pointers, rows, values, order } = *factor;
+        match order {
+            Some(order) => x.iter_mut().zip(order).for_each(|(x, &dof)| *x = rhs[dof]),
+            None => x.copy_from_slice(rhs),
+        }
+        let mut next = x.first().copied().unwrap_or(T::zero());
+        for (j, range) in pointers.windows(2).enumerate() {
+            let xj = next;
+            next = x.get(j + 1).copied().unwrap_or(T::zero());
+            let below = range[0] + 1..range[1];
+            for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
+                if i == j + 1 {
+                    next -= l * xj;
+                } else {
+                    x[i] -= l * xj;
+                }
+            }
+            x[j] = xj * values[range[0]];
+        }
+        let mut last = T::zero();
+        for (j, range) in pointers.windows(2).enumerate().rev() {
+            let below = range[0] + 1..range[1];
+            let mut sum = x[j];
+            for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
+                sum -= l * if i == j + 1 { last } else { x[i] };
+            }
+            x[j] = sum;
+            last = sum;
+        }
+        match order {
+            Some(order) => x.iter().zip(order).for_each(|(&x, &dof)| rhs[dof] = x),
+            None => rhs.copy_from_slice(x),
+        }
     }
 
     macro_rules! kernels {
@@ -193,8 +249,7 @@ pub(crate) mod kernels {
                 ) -> Result<(), usize> {
                     cholesky(kind, symbolic, a, values, memory)
                 }
-                fn cholesky_solve(
-                    kind: Factorization,
+                fn supernodal_solve(
                     symbolic: &SymbolicCholesky<usize>,
                     values: &[Self],
                     rhs: &mut [Self],
@@ -203,14 +258,10 @@ pub(crate) mod kernels {
                 ) {
                     let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
                     let stack = MemStack::new(memory);
-                    match kind {
-                        Factorization::Llt => {
-                            LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack)
-                        }
-                        Factorization::Ldlt => {
-                            LdltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack)
-                        }
-                    }
+                    LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+                }
+                fn simplicial_solve(factor: &Simplicial<'_, Self>, rhs: &mut [Self], x: &mut [Self]) {
+                    simplicial_solve(factor, rhs, x);
                 }
                 fn cholesky_scratch(
                     kind: Factorization,

@@ -1,4 +1,5 @@
 //! Energy of states and the energy balance of runs.
+#![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{Composite, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator};

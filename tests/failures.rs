@@ -1,4 +1,5 @@
 //! Wrong inputs: a typed error with the numbers, never a panic, and a failed step that leaves everything as it was.
+#![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactConstraint, ContactId, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

@@ -1,4 +1,5 @@
 //! Random systems and contacts: what must hold whatever the numbers are.
+#![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
 use contact_dynamics::contact::ContactJacobian;
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};

@@ -22,7 +22,8 @@ fn period_error_and_damping_are_those_of_the_literature() {
     ];
     for (scheme, period, damping) in cases {
         let found = period_and_damping(&scheme.tableau(), 0.1, 0.0).unwrap();
-        let digits = if period == 4.21 { (5e-3, 5e-2) } else { (5.01e-4, 5.01e-4) };
+        // Three digits, but for the one that the literature gives with fewer.
+        let digits = if scheme.name() == "Newmark(0.5, 1)" { (5e-3, 5e-2) } else { (5.01e-4, 5.01e-4) };
         assert!((100.0 * found.0 - period).abs() < digits.0, "{}: {found:?}", scheme.name());
         assert!((100.0 * found.1 - damping).abs() < digits.1, "{}: {found:?}", scheme.name());
     }

@@ -1,9 +1,9 @@
-//! Sparse Cholesky through faer: simplicial L D Lᵀ for chains, supernodal L Lᵀ for the rest.
+//! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
 use super::{Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::real::kernels::Factorization as Kind;
+use crate::real::kernels::{Factorization as Kind, Simplicial};
 use faer::Side;
 use faer::dyn_stack::MemBuffer;
 use faer::sparse::linalg::cholesky::{
@@ -24,7 +24,10 @@ struct Factor<T: Real> {
     kind: Kind,
     values: Vec<T>,
     memory: MemBuffer,
+    /// Right-hand sides that `memory` has room for.
     columns: usize,
+    /// One right-hand side in the order of elimination; simplicial factors only.
+    sweep: Vec<T>,
 }
 
 impl<T: Real> std::fmt::Debug for Factor<T> {
@@ -50,7 +53,11 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let scratch = T::cholesky_scratch(kind, &symbolic, 1);
         let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
         let values = vec![T::zero(); symbolic.len_val()];
-        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1 }))
+        let sweep = match kind {
+            Kind::Ldlt => vec![T::zero(); symbolic.nrows()],
+            Kind::Llt => Vec::new(),
+        };
+        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, sweep }))
     }
 }
 
@@ -62,11 +69,23 @@ impl<T: Real> Factorization<T> for Factor<T> {
 
     fn solve(&mut self, rhs: &mut [T]) {
         let columns = rhs.len().checked_div(self.symbolic.nrows()).unwrap_or(0);
+        if let SymbolicCholeskyRaw::Simplicial(raw) = self.symbolic.raw() {
+            let factor = Simplicial {
+                pointers: raw.col_ptr(),
+                rows: raw.row_idx(),
+                values: &self.values,
+                order: self.symbolic.perm().map(|perm| perm.arrays().0),
+            };
+            for column in rhs.chunks_exact_mut(self.symbolic.nrows()) {
+                T::simplicial_solve(&factor, column, &mut self.sweep);
+            }
+            return;
+        }
         if columns > self.columns {
             self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
             self.columns = columns;
         }
-        T::cholesky_solve(self.kind, &self.symbolic, &self.values, rhs, columns, &mut self.memory);
+        T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
     }
 
     fn stored_values(&self) -> usize {

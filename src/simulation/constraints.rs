@@ -27,8 +27,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         for part in &parts {
             part.check(dofs)?;
         }
-        let rows = parts.iter().map(|part| part.max_candidates()).sum();
-        let entries = parts.iter().map(|part| part.max_entries()).sum();
+        let rows = parts.iter().map(ContactConstraint::max_candidates).sum();
+        let entries = parts.iter().map(ContactConstraint::max_entries).sum();
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
         let mut constraints = Self { parts, ids: Vec::with_capacity(rows), laws: Vec::with_capacity(rows) };
         constraints.rebuild(&mut jacobian);
@@ -37,7 +37,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// The largest number of rows there can be.
     pub(crate) fn capacity(&self) -> usize {
-        self.parts.iter().map(|part| part.max_candidates()).sum()
+        self.parts.iter().map(ContactConstraint::max_candidates).sum()
     }
 
     pub(crate) fn search(&mut self, t: f64, u: &[T], v: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
