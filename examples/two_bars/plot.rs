@@ -1,0 +1,240 @@
+//! Pages of line plots in SVG: panels with a title, a legend above the frame, and curves clipped to the frame.
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+pub(crate) use plotters::style::RGBColor;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::error::Error;
+use std::ops::Range;
+
+pub(crate) const DARK: RGBColor = RGBColor(0x22, 0x22, 0x22);
+pub(crate) const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
+pub(crate) const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
+pub(crate) const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+const FRAME: RGBColor = RGBColor(0x90, 0x90, 0x90);
+const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
+
+/// The SVG backend rounds to whole units: pages are drawn in quarters of a pixel. All lengths below are in these units.
+const UNITS: u32 = 4;
+const MARGIN: i32 = 48;
+const PAGE_TITLE: i32 = 92;
+const PAGE_SUBTITLE: i32 = 92;
+const PANEL_TITLE: i32 = 80;
+const LEGEND: i32 = 96;
+const LEGEND_LINE: i32 = 88;
+const Y_LABELS: i32 = 240;
+const X_LABELS: i32 = 176;
+const TICK: i32 = 16;
+/// Width to allow for a character of the widest common sans-serif font.
+const CHARACTER: i32 = 31;
+
+/// Font sizes; plotters' are 1.24 times those of the SVG it writes.
+const TEXT: f64 = 1.24 * 52.0;
+const TITLE: f64 = 1.24 * 60.0;
+
+type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Point = (f64, f64);
+
+/// Label, range and ticks of an axis.
+#[derive(Clone)]
+pub(crate) struct Axis {
+    pub(crate) label: &'static str,
+    pub(crate) range: Range<f64>,
+    pub(crate) ticks: Vec<f64>,
+}
+
+impl Axis {
+    /// Zero in the middle, wide enough for the curves.
+    pub(crate) fn symmetric(label: &'static str, curves: &[Curve]) -> Self {
+        let limit = round_up(curves.iter().flat_map(Curve::values).map(f64::abs).fold(0.0, f64::max));
+        Self { label, range: -limit..limit, ticks: [-1.0, -0.5, 0.0, 0.5, 1.0].map(|x| x * limit).to_vec() }
+    }
+
+    /// From zero to above the curves.
+    pub(crate) fn upward(label: &'static str, curves: &[Curve]) -> Self {
+        let limit = round_up(curves.iter().flat_map(Curve::values).fold(0.0, f64::max));
+        Self { label, range: -0.04 * limit..limit, ticks: [0.0, 0.25, 0.5, 0.75, 1.0].map(|x| x * limit).to_vec() }
+    }
+}
+
+/// The next number whose quarters read well.
+fn round_up(value: f64) -> f64 {
+    let decades = (0..12).map(|k| 10.0_f64.powi(k));
+    let mut candidates = decades.flat_map(|decade| [1.0, 2.0, 4.0, 6.0, 8.0].map(|m| m * decade));
+    candidates.find(|&candidate| candidate >= value).unwrap_or(value)
+}
+
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        RangedCoordf64::from(self.range.clone()).map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+/// A polyline; without a label it is left out of the legend.
+pub(crate) struct Curve {
+    pub(crate) label: Option<String>,
+    pub(crate) color: RGBColor,
+    /// Stroke width in quarters of a pixel.
+    pub(crate) width: u32,
+    pub(crate) points: Vec<Point>,
+}
+
+impl Curve {
+    pub(crate) fn values(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|point| point.1)
+    }
+}
+
+/// Curves in a frame, the first one lowest.
+pub(crate) struct Panel {
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) curves: Vec<Curve>,
+    /// A remark inside the frame, to the left of and below a point.
+    pub(crate) note: Option<(Point, String)>,
+}
+
+/// A page of 2 × 2 panels under a title and a subtitle, as SVG.
+pub(crate) fn page(title: &str, subtitle: &str, panels: &[Panel; 4]) -> Result<String, Box<dyn Error>> {
+    svg((1000, 860), |canvas| {
+        let (head, body) = canvas.split_vertically(PAGE_TITLE + PAGE_SUBTITLE);
+        let bold = FontDesc::new(FontFamily::SansSerif, TITLE, FontStyle::Bold);
+        head.draw_text(title, &anchored(bold, HPos::Left, VPos::Bottom), (MARGIN, PAGE_TITLE))?;
+        let below = (MARGIN, PAGE_TITLE + PAGE_SUBTITLE / 2);
+        head.draw_text(subtitle, &text(HPos::Left, VPos::Center), below)?;
+        for (panel, area) in panels.iter().zip(body.split_evenly((2, 2))) {
+            draw(panel, &area)?;
+        }
+        Ok(())
+    })
+}
+
+/// One wide panel, as SVG.
+pub(crate) fn banner(panel: &Panel) -> Result<String, Box<dyn Error>> {
+    svg((900, 420), |canvas| draw(panel, canvas))
+}
+
+/// Draws on a white page of `size` pixels.
+fn svg(
+    size: (u32, u32),
+    content: impl FnOnce(&Canvas<'_>) -> Result<(), Box<dyn Error>>,
+) -> Result<String, Box<dyn Error>> {
+    let (width, height) = (size.0 * UNITS, size.1 * UNITS);
+    let mut svg = String::new();
+    {
+        let canvas = SVGBackend::with_string(&mut svg, (width, height)).into_drawing_area();
+        canvas.fill(&WHITE)?;
+        content(&canvas)?;
+        canvas.present()?;
+    }
+    let drawn = format!(r#"width="{width}" height="{height}""#);
+    let shown = format!(r#"width="{}" height="{}""#, size.0, size.1);
+    Ok(svg.replacen(&drawn, &shown, 1))
+}
+
+fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
+    let (head, rest) = area.margin(MARGIN, MARGIN, MARGIN, MARGIN).split_vertically(PANEL_TITLE);
+    head.draw_text(&panel.title, &text(HPos::Left, VPos::Center), (Y_LABELS, PANEL_TITLE / 3))?;
+    let (legend, body) = rest.split_vertically(LEGEND);
+    draw_legend(&panel.curves, &legend)?;
+
+    let mut chart = ChartBuilder::on(&body)
+        .y_label_area_size(Y_LABELS)
+        .x_label_area_size(X_LABELS)
+        .margin_right(MARGIN)
+        .build_cartesian_2d(panel.x.clone(), panel.y.clone())?;
+    chart
+        .configure_mesh()
+        .bold_line_style(GRID.stroke_width(UNITS))
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME.stroke_width(UNITS))
+        .set_all_tick_mark_size(TICK)
+        .label_style(text(HPos::Left, VPos::Center))
+        .x_label_formatter(&|&value| tick_label(value))
+        .y_label_formatter(&|&value| tick_label(value))
+        .x_desc(panel.x.label)
+        .y_desc(panel.y.label)
+        .draw()?;
+    for curve in &panel.curves {
+        for piece in clipped(&curve.points, &panel.x.range, &panel.y.range) {
+            chart.draw_series(LineSeries::new(piece, curve.color.stroke_width(curve.width)))?;
+        }
+    }
+    if let Some((point, note)) = &panel.note {
+        chart.plotting_area().draw(&Text::new(note.as_str(), *point, text(HPos::Right, VPos::Top)))?;
+    }
+    Ok(())
+}
+
+/// A sample of each labeled curve, in a row.
+fn draw_legend(curves: &[Curve], area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
+    let (mut x, y) = (Y_LABELS, LEGEND / 3);
+    for curve in curves {
+        let Some(label) = &curve.label else { continue };
+        let line = vec![(x, y), (x + LEGEND_LINE, y)];
+        area.draw(&PathElement::new(line, curve.color.stroke_width(curve.width)))?;
+        x += LEGEND_LINE + CHARACTER;
+        area.draw_text(label, &text(HPos::Left, VPos::Center), (x, y))?;
+        x += label.chars().map(|_| CHARACTER).sum::<i32>() + 2 * CHARACTER;
+    }
+    Ok(())
+}
+
+fn text(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    anchored(FontDesc::new(FontFamily::SansSerif, TEXT, FontStyle::Normal), horizontal, vertical)
+}
+
+fn anchored(font: FontDesc<'static>, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    TextStyle::from(font).color(&DARK).pos(Pos::new(horizontal, vertical))
+}
+
+/// As few digits as possible, with a minus sign rather than a hyphen.
+fn tick_label(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    rounded.to_string().replace('-', "−")
+}
+
+/// The pieces of a polyline inside a rectangle.
+fn clipped(points: &[Point], x: &Range<f64>, y: &Range<f64>) -> Vec<Vec<Point>> {
+    let mut pieces: Vec<Vec<Point>> = Vec::new();
+    for segment in points.windows(2) {
+        let Some((from, to)) = clipped_segment(segment[0], segment[1], x, y) else { continue };
+        match pieces.last_mut() {
+            Some(piece) if piece.last() == Some(&from) => piece.push(to),
+            _ => pieces.push(vec![from, to]),
+        }
+    }
+    pieces
+}
+
+/// The part of a segment inside a rectangle (Liang and Barsky).
+fn clipped_segment(from: Point, to: Point, x: &Range<f64>, y: &Range<f64>) -> Option<(Point, Point)> {
+    let span = (to.0 - from.0, to.1 - from.1);
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for (start, span, range) in [(from.0, span.0, x), (from.1, span.1, y)] {
+        if span == 0.0 {
+            if start < range.start || start > range.end {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((range.start - start) / span, (range.end - start) / span);
+        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+    }
+    let at = |fraction: f64| (from.0 + fraction * span.0, from.1 + fraction * span.1);
+    (enter < leave).then(|| (at(enter), if leave < 1.0 { at(leave) } else { to }))
+}
