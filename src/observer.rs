@@ -1,7 +1,7 @@
 //! Observers see every accepted step; they may stop the run, never change it.
 
 use crate::real::Real;
-use crate::simulation::Statistics;
+use crate::simulation::{Energy, Statistics};
 use crate::state::State;
 
 /// Whether a run goes on.
@@ -21,6 +21,8 @@ pub struct StepView<'a, T> {
     pub state: &'a State<T>,
     /// Gaps at the end of the step, one a candidate.
     pub gaps: &'a [T],
+    /// Energy at the end of the step, if an observer [wants](Observer::wants) it.
+    pub energy: Option<Energy<T>>,
     /// Size of the step.
     pub h: f64,
     /// Work counts since the start.
@@ -46,6 +48,20 @@ pub struct StepView<'a, T> {
 pub trait Observer<T: Real> {
     /// Called once after each accepted step.
     fn observe(&mut self, step: &StepView<'_, T>) -> Control;
+
+    /// What has to be computed for this observer besides the step itself.
+    fn wants(&self) -> Wants {
+        Wants::State
+    }
+}
+
+/// What an observer needs to see; more costs more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Wants {
+    /// State, gaps and counts: nothing is computed for it.
+    State,
+    /// Energy as well: about one product with M and one with K a step.
+    Energy,
 }
 
 impl<T: Real, F: FnMut(&StepView<'_, T>) -> Control> Observer<T> for F {
@@ -67,6 +83,10 @@ impl<T: Real, A: Observer<T>, B: Observer<T>> Observer<T> for (A, B) {
             (Control::Continue, Control::Continue) => Control::Continue,
             _ => Control::Stop,
         }
+    }
+
+    fn wants(&self) -> Wants {
+        self.0.wants().max(self.1.wants())
     }
 }
 
@@ -157,5 +177,59 @@ impl<T: Real> Observer<T> for ContactRecorder<T> {
         self.raw_forces.push(contacts.raw_forces().iter().copied().sum());
         self.impulses.push(contacts.impulses().iter().copied().sum());
         Control::Continue
+    }
+}
+
+/// Records the energy over time.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::observer::EnergyRecorder;
+/// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+///
+/// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)])?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1)
+///     .displacement(vec![1.0])
+///     .build()?;
+/// let mut recorder = EnergyRecorder::new();
+/// run.run_until(5.0, &mut recorder)?;
+/// // The trapezoidal rule conserves ½ k u².
+/// assert!(recorder.energies().iter().all(|energy| (energy.total() - 2.0).abs() < 1e-13));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct EnergyRecorder<T> {
+    times: Vec<f64>,
+    energies: Vec<Energy<T>>,
+}
+
+impl<T: Real> EnergyRecorder<T> {
+    /// An empty recorder.
+    pub fn new() -> Self {
+        Self { times: Vec::new(), energies: Vec::new() }
+    }
+
+    /// Times of the recorded steps.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Energies of the recorded steps.
+    pub fn energies(&self) -> &[Energy<T>] {
+        &self.energies
+    }
+}
+
+impl<T: Real> Observer<T> for EnergyRecorder<T> {
+    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
+        if let Some(energy) = step.energy {
+            self.times.push(step.state.time());
+            self.energies.push(energy);
+        }
+        Control::Continue
+    }
+
+    fn wants(&self) -> Wants {
+        Wants::Energy
     }
 }

@@ -17,7 +17,7 @@ use crate::contact_solver::ContactSolver;
 use crate::corrector::{Backup, Buffers, Corrector, JumpProjection};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
-use crate::observer::{Control, Observer, StepView};
+use crate::observer::{Control, Observer, StepView, Wants};
 use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
 use crate::system::System;
@@ -148,8 +148,13 @@ impl<'a, T: Real> Simulation<'a, T> {
         }
         while self.history.clock.at(0.0) < t - 1e-9 * self.history.clock.h {
             self.step()?;
+            let energy = match observer.wants() {
+                Wants::State => None,
+                Wants::Energy => Some(self.energy()),
+            };
             let view = StepView {
                 state: &self.state,
+                energy,
                 gaps: &self.work.rows.gaps[..self.constraints.len()],
                 h: self.history.clock.h,
                 statistics: &self.statistics,

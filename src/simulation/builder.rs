@@ -110,6 +110,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Adds correctors that were chosen at run time: any number, an `Option` for instance.
+    #[must_use]
+    pub fn correctors(mut self, correctors: impl IntoIterator<Item = Box<dyn Corrector<T> + 'a>>) -> Self {
+        self.correctors.extend(correctors);
+        self
+    }
+
     /// Chooses the linear solver; [`Automatic`] by default.
     #[must_use]
     pub fn linear_solver(mut self, solver: impl LinearSolver<T> + 'a) -> Self {

@@ -1,7 +1,7 @@
 //! Runs of the two-bar scene and the figures that are taken from them.
 
 use crate::Bars;
-use contact_dynamics::observer::{Control, StepView};
+use contact_dynamics::observer::{Control, EnergyRecorder, StepView};
 use contact_dynamics::{Corrector, Real, Simulation, TimeIntegrator};
 
 /// What a run leaves behind, one entry a step.
@@ -59,19 +59,17 @@ pub fn record<T: Real>(
     h: f64,
     until: f64,
 ) -> Record {
-    let builder =
-        Simulation::builder(bars.system::<T>(), integrator, h).velocity(bars.velocities()).constraint(bars.contact());
-    let builder = match corrector {
-        Some(corrector) => builder.corrector(corrector),
-        None => builder,
-    };
-    let mut run = builder.build().unwrap();
+    let mut run = Simulation::builder(bars.system::<T>(), integrator, h)
+        .velocity(bars.velocities())
+        .constraint(bars.contact())
+        .correctors(corrector)
+        .build()
+        .unwrap();
     record_run(bars, &mut run, until)
 }
 
 /// Records a simulation of two bars that is ready to run.
 pub fn record_run<T: Real>(bars: &Bars, run: &mut Simulation<'_, T>, until: f64) -> Record {
-    let h = run.history().step_size();
     let direction = |bar: usize| -> Vec<T> {
         let split = bars.elements[0] + 1;
         (0..bars.dofs()).map(|dof| if (dof < split) == (bar == 0) { T::one() } else { T::zero() }).collect()
@@ -80,21 +78,21 @@ pub fn record_run<T: Real>(bars: &Bars, run: &mut Simulation<'_, T>, until: f64)
     let mut record =
         Record { momentum: [momentum(run); 2], start_energy: run.energy().total().value(), ..Record::default() };
     let [left, right] = bars.contact_dofs();
-    while run.time() < until - 1e-9 * h {
-        let before = run.time();
-        let mut one = |step: &StepView<'_, T>| {
-            let (state, contacts) = (step.state, step.state.contacts());
-            record.t.push(state.time());
-            record.force.push(contacts.forces()[0].value());
-            record.raw.push(contacts.raw_forces()[0].value());
-            record.impulse.push(contacts.impulses()[0].value());
-            record.u.push([left, right].map(|dof| state.displacement()[dof].value()));
-            record.v.push([left, right].map(|dof| state.velocity()[dof].value()));
-            record.gap.push(step.gaps[0].value());
-            Control::Continue
-        };
-        run.run_until(before + 0.5 * h, &mut one).unwrap();
-        let energy = run.energy();
+    let steps = |step: &StepView<'_, T>| {
+        let (state, contacts) = (step.state, step.state.contacts());
+        record.t.push(state.time());
+        record.force.push(contacts.forces()[0].value());
+        record.raw.push(contacts.raw_forces()[0].value());
+        record.impulse.push(contacts.impulses()[0].value());
+        record.u.push([left, right].map(|dof| state.displacement()[dof].value()));
+        record.v.push([left, right].map(|dof| state.velocity()[dof].value()));
+        record.gap.push(step.gaps[0].value());
+        Control::Continue
+    };
+    let mut observers = (steps, EnergyRecorder::new());
+    run.run_until(until, &mut observers).unwrap();
+    let (_, energies) = observers;
+    for energy in energies.energies() {
         record.kinetic.push(energy.kinetic.value());
         record.elastic.push(energy.potential.unwrap().value());
     }
