@@ -225,6 +225,16 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
+    /// A prescribed motion is NaN or infinite.
+    #[error("t = {t:e}: the prescribed motion of dof {dof} is {value}")]
+    SupportNotFinite {
+        /// Time of the motion.
+        t: f64,
+        /// The prescribed dof.
+        dof: usize,
+        /// The value (displacement, velocity or acceleration).
+        value: f64,
+    },
     /// A callback of the host failed.
     #[error("the host's {callback} failed")]
     Host {
@@ -244,6 +254,12 @@ impl Error {
     ///
     /// Errors of the host's own callbacks are never recoverable: the library cannot know.
     pub fn is_recoverable(&self) -> bool {
-        matches!(self, Self::Contact { .. } | Self::StepNotFinite { .. } | Self::ContactNotFinite { .. })
+        matches!(
+            self,
+            Self::Contact { .. }
+                | Self::StepNotFinite { .. }
+                | Self::ContactNotFinite { .. }
+                | Self::SupportNotFinite { .. }
+        )
     }
 }

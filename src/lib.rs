@@ -15,6 +15,7 @@ mod error;
 pub mod integrator;
 pub mod linear_solver;
 pub mod mass;
+mod memory;
 pub mod observer;
 mod real;
 pub mod reference;

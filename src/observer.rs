@@ -19,8 +19,6 @@ pub enum Control {
 pub struct StepView<'a, T> {
     /// The state at the end of the step.
     pub state: &'a State<T>,
-    /// Gaps at the end of the step, one a candidate.
-    pub gaps: &'a [T],
     /// Energy at the end of the step, if an observer [wants](Observer::wants) it.
     pub energy: Option<Energy<T>>,
     /// Size of the step.

@@ -152,13 +152,7 @@ impl<'a, T: Real> Simulation<'a, T> {
                 Wants::State => None,
                 Wants::Energy => Some(self.energy()),
             };
-            let view = StepView {
-                state: &self.state,
-                energy,
-                gaps: &self.work.rows.gaps[..self.constraints.len()],
-                h: self.history.clock.h,
-                statistics: &self.statistics,
-            };
+            let view = StepView { state: &self.state, energy, h: self.history.clock.h, statistics: &self.statistics };
             if observer.observe(&view) == Control::Stop {
                 return Ok(Outcome::Stopped);
             }
@@ -183,7 +177,7 @@ impl<'a, T: Real> Simulation<'a, T> {
 
     /// Gaps at the end of the last step, one a candidate.
     pub fn gaps(&self) -> &[T] {
-        &self.work.rows.gaps[..self.constraints.len()]
+        &self.state.contacts.gap
     }
 
     /// Work counts.

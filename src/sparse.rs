@@ -13,9 +13,23 @@ pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) 
     }
 }
 
+/// Refuses patterns with slack between columns or with rows out of order: every loop here relies on neither.
+pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<()> {
+    let refuse = |reason| Err(Error::Incompatible { part: format!("the {matrix} matrix"), reason });
+    if pattern.col_nnz().is_some() {
+        return refuse("its columns have slack; store it compressed");
+    }
+    let ascending = |j: usize| pattern.row_idx_of_col_raw(j).windows(2).all(|pair| pair[0] < pair[1]);
+    match (0..pattern.ncols()).all(ascending) {
+        true => Ok(()),
+        false => refuse("its row indices must ascend in each column, without repetition"),
+    }
+}
+
 /// Refuses NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
 pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
     let n = square(matrix, a)?;
+    check_pattern(matrix, a.symbolic())?;
     let mut largest = T::zero();
     for column in 0..n {
         for (&row, &value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
@@ -28,12 +42,38 @@ pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<
     // Assembly adds the same element entries in different orders: a few units in the last place of the largest entry.
     let tolerance = T::of(256.0) * T::epsilon() * largest;
     let mut worst = (tolerance, None);
+    let mut compare = |row: usize, column: usize, value: T, mirrored: T| {
+        let difference = (value - mirrored).abs();
+        if difference > worst.0 {
+            worst = (difference, Some((row, column, value, mirrored)));
+        }
+    };
+    // Entries below the diagonal meet those of the upper triangle in ascending order: one cursor a column finds the partners.
+    let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
+    let mut cursor: Vec<usize> = pointers[..n].to_vec();
     for column in 0..n {
-        for (&row, &value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
-            let mirrored = entry(a, column, row);
-            let difference = (value - mirrored).abs();
-            if difference > worst.0 {
-                worst = (difference, Some((row, column, value, mirrored)));
+        for at in pointers[column]..pointers[column + 1] {
+            let (row, value) = (rows[at], values[at]);
+            if row <= column {
+                continue;
+            }
+            let upper = &mut cursor[row];
+            while *upper < pointers[row + 1] && rows[*upper] < column {
+                compare(rows[*upper], row, values[*upper], T::zero());
+                *upper += 1;
+            }
+            if *upper < pointers[row + 1] && rows[*upper] == column {
+                compare(row, column, value, values[*upper]);
+                *upper += 1;
+            } else {
+                compare(row, column, value, T::zero());
+            }
+        }
+    }
+    for (column, &start) in cursor.iter().enumerate() {
+        for at in start..pointers[column + 1] {
+            if rows[at] < column {
+                compare(rows[at], column, values[at], T::zero());
             }
         }
     }
@@ -145,6 +185,30 @@ impl Combination {
 mod tests {
     use super::*;
     use faer::sparse::{SparseColMat, Triplet};
+
+    #[test]
+    fn every_asymmetric_entry_is_found() {
+        // A full symmetric matrix with one entry changed or missing, at every place.
+        let n = 5;
+        let value = |i: usize, j: usize| (i * j + i + j) as f64 + 1.0;
+        for broken in (0..n * n).filter(|k| k % n != k / n) {
+            for factor in [0.0, 0.5] {
+                let entries: Vec<_> = (0..n * n)
+                    .filter(|&k| k != broken || factor > 0.0)
+                    .map(|k| (k % n, k / n, if k == broken { factor } else { 1.0 }))
+                    .map(|(i, j, factor)| Triplet::new(i, j, factor * value(i, j)))
+                    .collect();
+                let a = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).unwrap();
+                match check_symmetric("test", a.as_ref()) {
+                    Err(Error::Asymmetric { row, column, .. }) => {
+                        let (i, j) = (broken % n, broken / n);
+                        assert!((row, column) == (i, j) || (row, column) == (j, i));
+                    }
+                    other => panic!("{broken}: {other:?}"),
+                }
+            }
+        }
+    }
 
     #[test]
     fn combination_adds_in_one_pattern_and_cuts_prescribed_dofs_out() {

@@ -73,6 +73,7 @@ pub struct ContactState<T> {
     pub(crate) lambda: Vec<T>,
     pub(crate) lambda_raw: Vec<T>,
     pub(crate) closed: Vec<bool>,
+    pub(crate) gap: Vec<T>,
     pub(crate) impulse: Vec<T>,
     pub(crate) lambda_v: Vec<T>,
     pub(crate) lambda_a: Vec<T>,
@@ -86,6 +87,7 @@ impl<T: Real> ContactState<T> {
             lambda: reals(),
             lambda_raw: reals(),
             closed: Vec::with_capacity(rows),
+            gap: reals(),
             impulse: reals(),
             lambda_v: reals(),
             lambda_a: reals(),
@@ -97,8 +99,8 @@ impl<T: Real> ContactState<T> {
         let n = ids.len();
         self.ids.clear();
         self.ids.extend_from_slice(ids);
-        for reals in [&mut self.lambda, &mut self.lambda_raw, &mut self.impulse, &mut self.lambda_v, &mut self.lambda_a]
-        {
+        let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, .. } = self;
+        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a] {
             reals.clear();
             reals.resize(n, T::zero());
         }
@@ -116,6 +118,7 @@ impl<T: Real> ContactState<T> {
                 self.lambda[i] = old.lambda[j];
                 self.lambda_raw[i] = old.lambda_raw[j];
                 self.closed[i] = old.closed[j];
+                self.gap[i] = old.gap[j];
                 self.impulse[i] = old.impulse[j];
                 self.lambda_v[i] = old.lambda_v[j];
                 self.lambda_a[i] = old.lambda_a[j];
@@ -126,6 +129,11 @@ impl<T: Real> ContactState<T> {
     /// Which contact each entry belongs to.
     pub fn ids(&self) -> &[ContactId] {
         &self.ids
+    }
+
+    /// Gaps, positive when open.
+    pub fn gaps(&self) -> &[T] {
+        &self.gap
     }
 
     /// Contact forces, compression positive: after correction, consistent with the accelerations of the state.

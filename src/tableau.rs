@@ -453,64 +453,6 @@ fn null_vector(mut a: Vec<Vec<f64>>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn bathe() -> Tableau {
-        let gamma = 2.0 - f64::sqrt(2.0);
-        let q1 = 1.0 / (4.0 - 2.0 * gamma);
-        let q2 = 0.5 - gamma * q1;
-        let q0 = 1.0 - q1 - q2;
-        let v = (2.0 / gamma) * (Z - U[0]) - V[0];
-        let a = (4.0 / (gamma * gamma)) * (Z - U[0] - gamma * V[0]) - A[0];
-        let first = Stage::new(Rows { u: Z, v, a }).ending_at(gamma);
-        let v = (Z - U[1] - q0 * V[1] - q1 * V[0]) / q2;
-        let a = (v - V[1] - q0 * A[1] - q1 * A[0]) / q2;
-        Tableau::staged(vec![first, Stage::new(Rows { u: Z, v, a })])
-    }
-
-    #[test]
-    fn momentum_of_multistep_schemes_is_the_literature_form() {
-        // Houbolt 2 U0 − 3 U1 + U2; BDF2 (3 V0 − V1)/2; Park (10 V0 − 5 V1 + V2)/6.
-        let park = |x: Row, y: [Row; MAX_PAST]| (10.0 * x - 15.0 * y[0] + 6.0 * y[1] - y[2]) / 6.0;
-        let bdf = |x: Row, y: [Row; MAX_PAST]| 1.5 * x - 2.0 * y[0] + 0.5 * y[1];
-        let double = |d: &dyn Fn(Row, [Row; MAX_PAST]) -> Row| {
-            let v = d(Z, U);
-            Tableau::single(Stage::new(Rows { u: Z, v, a: d(v, V) }))
-        };
-        let v = (11.0 * Z - 18.0 * U[0] + 9.0 * U[1] - 2.0 * U[2]) / 6.0;
-        let houbolt = Tableau::single(Stage::new(Rows { u: Z, v, a: 2.0 * Z - 5.0 * U[0] + 4.0 * U[1] - U[2] }));
-        let cases: [(Tableau, Vec<[f64; 3]>); 3] = [
-            (houbolt, vec![[2.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
-            (double(&park), vec![[0.0, 10.0 / 6.0, 0.0], [0.0, -5.0 / 6.0, 0.0], [0.0, 1.0 / 6.0, 0.0]]),
-            (double(&bdf), vec![[0.0, 1.5, 0.0], [0.0, -0.5, 0.0]]),
-        ];
-        for (tableau, expected) in cases {
-            let momentum = tableau.momentum();
-            for (found, expected) in momentum.after_step().iter().zip(&expected) {
-                for (f, e) in found.iter().zip(expected) {
-                    assert!((f - e).abs() < 1e-12, "{:?} against {expected:?}", momentum.after_step());
-                }
-            }
-            assert!((momentum.impulse_weights()[0] - 1.0).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn stages_share_the_impulse_as_in_the_literature() {
-        let momentum = bathe().momentum();
-        let weights = momentum.impulse_weights();
-        assert!((weights[0] - 0.353_553_390_6).abs() < 1e-9, "{weights:?}");
-        assert!((weights[0] + weights[1] - 1.0).abs() < 1e-12, "{weights:?}");
-        assert_eq!(momentum.after_step().len(), 1);
-        assert_eq!(momentum.after_stage(0).len(), 2);
-    }
-
-    #[test]
-    fn past_states_are_counted_from_the_step_start() {
-        assert_eq!(bathe().depth(), 1);
-        // After the first stage: the stage itself (u cancels only against its own) and t_n are read.
-        let read = bathe().read_after(0);
-        assert!(read[0][1] && read[1][0] && !read[2][0]);
-    }
-
     #[test]
     fn malformed_tableaux_are_refused() {
         let good = Stage::new(Rows { u: Z, v: Z - U[0], a: Z - U[0] - V[0] });

@@ -1,7 +1,7 @@
 //! Wrong inputs: a typed error with the numbers, never a panic, and a failed step that leaves everything as it was.
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
-use contact_dynamics::contact::{ContactConstraint, ContactId, GapOffset};
+use contact_dynamics::contact::{ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{Row, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
@@ -287,6 +287,103 @@ fn history_of_another_run_is_refused() {
     refused!(resume(donor(2, 0.02, false)), Error::Parameter { .. }, "step size");
     refused!(resume(donor(2, 0.01, true)), Error::Dimension { .. }, "history");
     assert!(resume(donor(2, 0.01, false)).is_ok());
+}
+
+#[test]
+fn matrices_out_of_order_are_refused() {
+    use contact_dynamics::faer::sparse::SymbolicSparseColMat;
+    let pattern = SymbolicSparseColMat::<usize>::new_unsorted_checked(2, 2, vec![0, 2, 4], None, vec![1, 0, 0, 1]);
+    let k = SparseColMat::new(pattern, vec![-4.0, 4.0, -4.0, 4.0]);
+    refused!(LinearSystem::lumped(vec![1.0; 2], k), Error::Incompatible { .. }, "stiffness", "ascend");
+    let pattern = SymbolicSparseColMat::<usize>::new_checked(2, 2, vec![0, 2, 4], Some(vec![1, 1]), vec![0, 0, 1, 0]);
+    let k = SparseColMat::new(pattern, vec![4.0, 0.0, 4.0, 0.0]);
+    refused!(LinearSystem::lumped(vec![1.0; 2], k), Error::Incompatible { .. }, "slack");
+}
+
+#[test]
+fn a_support_that_moves_to_nowhere_fails_the_step() {
+    // The driven dof has no stiffness to pass its NaN on: nobody else would notice.
+    let k = matrix(2, &[(0, 0, 0.0), (1, 1, 4.0)]);
+    let system = LinearSystem::lumped(vec![1.0; 2], k)
+        .unwrap()
+        .drive(0, |t| if t > 0.05 { [f64::NAN, 0.0, 0.0] } else { [0.0; 3] })
+        .unwrap();
+    let mut run = Simulation::builder(system, Composite, 0.01).build().unwrap();
+    run.run_until(0.05, &mut ()).unwrap();
+    let before = run.state().clone();
+    let found = error(run.step());
+    assert!(matches!(found, Error::SupportNotFinite { dof: 0, .. }), "{found}");
+    assert_eq!(&before, run.state());
+}
+
+#[test]
+fn reservations_beyond_memory_are_errors() {
+    struct Greedy;
+    impl ContactConstraint<f64> for Greedy {
+        fn max_candidates(&self) -> usize {
+            1 << 50
+        }
+        fn max_entries(&self) -> usize {
+            1
+        }
+        fn check(&self, _: usize) -> Result<()> {
+            Ok(())
+        }
+        fn candidates(&self) -> usize {
+            0
+        }
+        fn identity(&self, _: usize) -> (usize, usize) {
+            (0, 0)
+        }
+        fn law(&self, _: usize) -> ContactLaw {
+            ContactLaw::Rigid
+        }
+        fn jacobian(&self, _: &mut ContactJacobian<f64>) {}
+        fn gap(&mut self, _: f64, _: &[f64], _: &mut [f64]) {}
+    }
+    refused!(builder().constraint(Greedy).build(), Error::OutOfMemory { .. }, "memory");
+}
+
+#[test]
+fn a_constraint_that_breaks_its_promises_is_refused() {
+    struct Liar {
+        candidates: usize,
+        rows: usize,
+        dof: usize,
+    }
+    impl ContactConstraint<f64> for Liar {
+        fn max_candidates(&self) -> usize {
+            2
+        }
+        fn max_entries(&self) -> usize {
+            2
+        }
+        fn check(&self, _: usize) -> Result<()> {
+            Ok(())
+        }
+        fn candidates(&self) -> usize {
+            self.candidates
+        }
+        fn identity(&self, row: usize) -> (usize, usize) {
+            (row, 0)
+        }
+        fn law(&self, _: usize) -> ContactLaw {
+            ContactLaw::Rigid
+        }
+        fn jacobian(&self, out: &mut ContactJacobian<f64>) {
+            for _ in 0..self.rows {
+                out.push(&[(self.dof, 1.0)]);
+            }
+        }
+        fn gap(&mut self, _: f64, _: &[f64], out: &mut [f64]) {
+            out.fill(1.0);
+        }
+    }
+    let build = |candidates, rows, dof| builder().constraint(Liar { candidates, rows, dof }).build();
+    refused!(build(3, 3, 0), Error::Dimension { expected: 2, found: 3, .. }, "candidates");
+    refused!(build(1, 2, 0), Error::Dimension { expected: 1, found: 2, .. }, "Jacobian");
+    refused!(build(1, 1, 7), Error::MissingDof { dof: 7, .. }, "contact row");
+    assert!(build(1, 1, 1).is_ok());
 }
 
 /// A load that is NaN in some time window; the run before and after must be that of the good load.

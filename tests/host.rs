@@ -287,7 +287,7 @@ fn observers_pair_up_and_may_stop_the_run() {
     let mut forces = ContactRecorder::new();
     let mut steps = 0;
     let stop = |step: &StepView<'_, f64>| {
-        assert_eq!(step.gaps.len(), 1);
+        assert_eq!(step.state.contacts().gaps().len(), 1);
         steps += 1;
         match step.state.contacts().closed()[0] {
             true => Control::Stop,

@@ -121,4 +121,33 @@ fn weights_of_the_functional_are_those_derived_by_hand() {
     for (k, sign) in [(0, 1.0), (1, -1.0)] {
         assert!((found[k][0] - sign).abs() < 1e-12 && (found[k][1] - sign).abs() < 1e-12 && found[k][2].abs() < 1e-12);
     }
+    // Houbolt 2 U0 − 3 U1 + U2; Park (10 V0 − 5 V1 + V2)/6; BDF2 (3 V0 − V1)/2.
+    let displacement = |c: f64| [c, 0.0, 0.0];
+    let velocity = |c: f64| [0.0, c, 0.0];
+    let cases: [(&dyn TimeIntegrator, Vec<[f64; 3]>); 3] = [
+        (&houbolt(), [2.0, -3.0, 1.0].map(displacement).to_vec()),
+        (&park(), [10.0, -5.0, 1.0].map(|c| velocity(c / 6.0)).to_vec()),
+        (&bdf2(), [1.5, -0.5].map(velocity).to_vec()),
+    ];
+    for (scheme, expected) in cases {
+        let found = psi(scheme);
+        for (found, expected) in found.after_step().iter().flatten().zip(expected.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-12, "{}", scheme.name());
+        }
+        assert!((found.impulse_weights()[0] - 1.0).abs() < 1e-12);
+    }
+    // Bathe: the stages share the impulse as √2/4 and 1 − √2/4.
+    let weights = psi(&bathe()).impulse_weights().to_vec();
+    assert!((weights[0] - 0.125_f64.sqrt()).abs() < 1e-12 && (weights[0] + weights[1] - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn past_states_are_counted_from_the_start_of_the_step() {
+    assert_eq!([bathe().tableau.depth(), park().tableau.depth(), Composite.tableau().depth()], [1, 3, 2]);
+    // After the first stage of Bathe's scheme the second reads v of that stage and u of t_n, nothing older.
+    let read = bathe().tableau.read_after(0);
+    assert!(read[0][1] && read[1][0] && !read[2..].iter().flatten().any(|&read| read));
+    // The composite scheme reads u and v of the last two states, never a.
+    let read = Composite.tableau().read_after(0);
+    assert_eq!(read[..2], [[true, true, false], [true, true, false]]);
 }

@@ -4,6 +4,7 @@ use crate::contact::ContactJacobian;
 use crate::dense::DenseCholesky;
 use crate::error::Result;
 use crate::mass::{InverseMass, Mass};
+use crate::memory;
 use crate::real::Real;
 
 /// The projection behind the λ_v/λ_a correction, usable on a host's own vectors.
@@ -58,29 +59,30 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is not positive on the free dofs.
+    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is not positive on the free dofs,
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
             Mass::Consistent(mass) => mass.nrows(),
         };
-        Ok(Self::with(InverseMass::new(mass, prescribed)?, dofs, rows))
+        Self::with(InverseMass::new(mass, prescribed)?, dofs, rows)
     }
 
-    pub(crate) fn with(inverse: InverseMass<T>, dofs: usize, rows: usize) -> Self {
+    pub(crate) fn with(inverse: InverseMass<T>, dofs: usize, rows: usize) -> Result<Self> {
         let stored = match inverse {
             InverseMass::Lumped(_) => 0,
             InverseMass::Consistent { .. } => rows,
         };
-        Self {
+        Ok(Self {
             inverse,
             dofs,
-            columns: vec![T::zero(); stored * dofs],
+            columns: memory::zeros(stored, dofs, "the columns of M⁻¹Gᵀ")?,
             computed: vec![false; stored],
             closed: Vec::with_capacity(rows),
             factor: DenseCholesky::with_capacity(rows),
             factored: false,
-        }
+        })
     }
 
     /// Forgets everything computed from an earlier G.

@@ -4,6 +4,7 @@ use super::{Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::real::kernels::{Factorization as Kind, Simplicial};
+use crate::sparse;
 use faer::Side;
 use faer::dyn_stack::MemBuffer;
 use faer::sparse::linalg::cholesky::{
@@ -14,7 +15,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 /// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree.
 ///
 /// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
-/// is not positive definite is refused with the dof of the failing pivot. In `f32` fill entries far from the diagonal may
+/// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst entry. In `f32` fill entries far from the diagonal may
 /// become subnormal and slow a factorization down several times; see `docs/design.md`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cholesky {}
@@ -63,6 +64,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        sparse::check_symmetric("effective", a)?;
         T::cholesky(self.kind, &self.symbolic, a, &mut self.values, &mut self.memory)
             .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })
     }

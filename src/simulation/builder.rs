@@ -13,6 +13,7 @@ use crate::integrator::{Newmark, TimeIntegrator};
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass::Mass;
 use crate::real::Real;
+use crate::sparse;
 use crate::state::{Clock, ContactState, History, Motion, State};
 use crate::system::System;
 
@@ -211,7 +212,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             EnergyBalance::Off => None,
             EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
         };
-        let mut simulation = Simulation {
+        Ok(Simulation {
             system,
             constraints,
             g,
@@ -227,10 +228,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             work,
             ledger,
             statistics: Statistics { factorizations, ..Statistics::default() },
-        };
-        let Simulation { constraints, state, work, .. } = &mut simulation;
-        constraints.finite_gaps(state.motion.t, &state.motion.u, &mut work.rows.gaps)?;
-        Ok(simulation)
+        })
     }
 }
 
@@ -279,10 +277,12 @@ fn check_system<T: Real>(system: &dyn System<T>) -> Result<usize> {
         Mass::Consistent(mass) => {
             size("the mass matrix", mass.nrows())?;
             size("the mass matrix", mass.ncols())?;
+            sparse::check_symmetric("mass", mass)?;
         }
     }
     size("the pattern of the tangent", system.pattern().nrows())?;
     size("the pattern of the tangent", system.pattern().ncols())?;
+    sparse::check_pattern("tangent", system.pattern())?;
     let prescribed = system.prescribed();
     if let Some(&dof) = prescribed.iter().find(|&&dof| dof >= dofs) {
         return Err(Error::MissingDof { what: "a support", dof, dofs });

@@ -3,6 +3,7 @@
 use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::real::Real;
 
 /// The constraints in the order given, their rows one after the other.
@@ -10,6 +11,10 @@ pub(crate) struct Constraints<'a, T: Real> {
     parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
+    /// Number of dofs of the system.
+    dofs: usize,
+    /// Whether candidates have changed since the rows were last read.
+    stale: bool,
 }
 
 impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
@@ -27,11 +32,15 @@ impl<'a, T: Real> Constraints<'a, T> {
         for part in &parts {
             part.check(dofs)?;
         }
-        let rows = parts.iter().map(ContactConstraint::max_candidates).sum();
+        let rows: usize = parts.iter().map(ContactConstraint::max_candidates).sum();
         let entries = parts.iter().map(ContactConstraint::max_entries).sum();
+        // Asked for once, so that an absurd promise is an error and not an abort: the largest blocks that are reserved later.
+        memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
+        memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
-        let mut constraints = Self { parts, ids: Vec::with_capacity(rows), laws: Vec::with_capacity(rows) };
-        constraints.rebuild(&mut jacobian);
+        let mut constraints =
+            Self { parts, ids: Vec::with_capacity(rows), laws: Vec::with_capacity(rows), dofs, stale: true };
+        constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
 
@@ -41,31 +50,53 @@ impl<'a, T: Real> Constraints<'a, T> {
     }
 
     pub(crate) fn search(&mut self, t: f64, u: &[T], v: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
-        let mut found = Candidates::Unchanged;
         for part in &mut self.parts {
-            if part.search(t, u, v)? == Candidates::Changed {
-                found = Candidates::Changed;
-            }
+            // Remembered beyond an error of a later part: the rows are read again by the next search that succeeds.
+            self.stale |= part.search(t, u, v)? == Candidates::Changed;
         }
-        if found == Candidates::Changed {
-            self.rebuild(jacobian);
+        if !self.stale {
+            return Ok(Candidates::Unchanged);
         }
-        Ok(found)
+        self.read_rows(jacobian)?;
+        Ok(Candidates::Changed)
     }
 
-    fn rebuild(&mut self, jacobian: &mut ContactJacobian<T>) {
-        let Self { parts, ids, laws } = self;
+    /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.
+    fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
+        let Self { parts, ids, laws, dofs, stale } = self;
         jacobian.clear();
         ids.clear();
         laws.clear();
+        *stale = true;
         for (constraint, part) in parts.iter().enumerate() {
+            let candidates = part.candidates();
+            if candidates > part.max_candidates() {
+                let (expected, found) = (part.max_candidates(), candidates);
+                return Err(Error::Dimension { what: "the list of candidates (at most)", expected, found });
+            }
+            let before = jacobian.rows();
             part.jacobian(jacobian);
-            for row in 0..part.candidates() {
+            if jacobian.rows() - before != candidates {
+                let found = jacobian.rows() - before;
+                return Err(Error::Dimension { what: "the contact Jacobian", expected: candidates, found });
+            }
+            for row in 0..candidates {
                 let (feature, candidate) = part.identity(row);
                 ids.push(ContactId { constraint, feature, candidate });
                 laws.push(part.law(row));
+                for (dof, weight) in jacobian.row(before + row) {
+                    if dof >= *dofs {
+                        return Err(Error::MissingDof { what: "a contact row", dof, dofs: *dofs });
+                    }
+                    if !weight.is_finite() {
+                        let value = weight.value();
+                        return Err(Error::NotFinite { what: "a weight of a contact row (by dof)", index: dof, value });
+                    }
+                }
             }
         }
+        *stale = false;
+        Ok(())
     }
 
     /// Number of rows.

@@ -11,7 +11,6 @@ use crate::state::Motion;
 
 /// Buffers of the contact problem, one entry a candidate unless said otherwise.
 pub(super) struct ContactRowsWork<T> {
-    pub(super) gaps: Vec<T>,
     pub(super) rates: Vec<GapRates<T>>,
     pub(super) tolerance: Vec<T>,
     pub(super) in_problem: Vec<bool>,
@@ -28,7 +27,6 @@ impl<T: Real> ContactRowsWork<T> {
     pub(super) fn new(rows: usize) -> Self {
         let reals = || Vec::with_capacity(rows);
         Self {
-            gaps: vec![T::zero(); rows],
             rates: vec![GapRates::default(); rows],
             tolerance: vec![T::zero(); rows],
             in_problem: vec![false; rows],
@@ -61,8 +59,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         let Self { constraints, g, solver, statistics } = self;
         let Workspace { increment, prescribed, trial, rows, .. } = work;
-        let ContactRowsWork { gaps, tolerance, in_problem, problem, delassus, offset, problem_tolerance, .. } = rows;
+        let ContactRowsWork { tolerance, in_problem, problem, delassus, offset, problem_tolerance, .. } = rows;
         let (bounds, multipliers) = (&mut rows.bounds, &mut rows.multipliers);
+        let gaps = &mut trial.gap;
         let count = constraints.len();
         constraints.finite_gaps(new.t, &new.u, gaps)?;
         let mut needed = false;
@@ -147,14 +146,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { constraints, g, .. } = self;
         let first = work.backup.rotations == 1;
         let Workspace { trial, rows, buffers, was_closed, .. } = work;
-        constraints.finite_gaps(new.t, &new.u, &mut rows.gaps)?;
+        constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
         constraints.rates(new.t, &new.u, &new.v, &mut rows.rates);
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();
         let impulse_weight = T::of(h * stage.impulse_weight);
         for row in 0..constraints.len() {
-            let (gap, raw) = (rows.gaps[row], trial.lambda_raw[row]);
+            let (gap, raw) = (trial.gap[row], trial.lambda_raw[row]);
             let rate = g.product(row, &new.v) + rows.rates[row].rate;
             let tolerance = rounding(g.magnitude(row, &new.u) + gap.abs()) + T::of(1e-10 * h) * rate.abs();
             let closed = raw > T::zero() || gap <= tolerance || constraints.law(row) == ContactLaw::Equality;

@@ -4,6 +4,7 @@ use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
 use crate::linear_solver::{Factorization, LinearSolver};
 use crate::mass::Mass;
+use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
 use crate::state::Motion;
@@ -265,7 +266,7 @@ impl<T: Real> Compiler<'_, T> {
             weights,
             factor,
             dofs,
-            columns: vec![T::zero(); self.rows * dofs],
+            columns: memory::zeros(self.rows, dofs, "the responses of the contact rows")?,
             computed: vec![false; self.rows],
         })
     }

@@ -1,6 +1,7 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
 
 use super::Constraints;
+use super::step::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
@@ -20,7 +21,7 @@ pub(super) struct Start<'s, T: Real> {
 
 /// M⁻¹ on the free dofs with room for `rows` contacts.
 pub(super) fn projection<T: Real>(system: &dyn System<T>, dofs: usize, rows: usize) -> Result<JumpProjection<T>> {
-    Ok(JumpProjection::with(InverseMass::new(system.mass(), system.prescribed())?, dofs, rows))
+    JumpProjection::with(InverseMass::new(system.mass(), system.prescribed())?, dofs, rows)
 }
 
 impl<T: Real> Start<'_, T> {
@@ -39,6 +40,7 @@ impl<T: Real> Start<'_, T> {
         let mut supports = vec![[T::zero(); 3]; prescribed.len()];
         system.prescribed_motion(t, &mut supports);
         let mut motion = Motion { t, u, v, a: vec![T::zero(); dofs] };
+        finite_supports(t, &prescribed, &supports)?;
         for (&dof, support) in prescribed.iter().zip(&supports) {
             put(&mut motion.u[dof], support[0], "displacement", dof)?;
             put(&mut motion.v[dof], support[1], "velocity", dof)?;
@@ -107,9 +109,6 @@ fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) ->
         let (given, prescribed) = (given.value(), prescribed.value());
         return Err(Error::PrescribedStart { what, dof, given, prescribed });
     }
-    if !prescribed.is_finite() {
-        return Err(Error::NotFinite { what: "a prescribed motion", index: dof, value: prescribed.value() });
-    }
     *place = prescribed;
     Ok(())
 }
@@ -122,14 +121,13 @@ fn resting_contacts<T: Real>(
     h: f64,
     contacts: &mut ContactState<T>,
 ) -> Result<Vec<usize>> {
-    let mut gaps = vec![T::zero(); constraints.len()];
     let mut rates = vec![GapRates::default(); constraints.len()];
-    constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
+    constraints.finite_gaps(motion.t, &motion.u, &mut contacts.gap)?;
     constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
     let mut resting = Vec::new();
-    for row in 0..constraints.len() {
-        let rate = g.product(row, &motion.v) + rates[row].rate;
-        let gap = gaps[row];
+    for (row, rates) in rates.iter().enumerate() {
+        let rate = g.product(row, &motion.v) + rates.rate;
+        let gap = contacts.gap[row];
         let tolerance = rounding(g.magnitude(row, &motion.u) + gap.abs()) + T::of(1e-10 * h) * rate.abs();
         let equality = constraints.law(row) == ContactLaw::Equality;
         if gap < -tolerance || (equality && gap > tolerance) {

@@ -148,6 +148,16 @@ impl<T: Real> Simulation<'_, T> {
     }
 }
 
+/// Refuses prescribed motions that are NaN or infinite.
+pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &[[T; 3]]) -> Result<()> {
+    for (&dof, support) in prescribed.iter().zip(supports) {
+        if let Some(value) = support.iter().find(|x| !x.is_finite()) {
+            return Err(Error::SupportNotFinite { t, dof, value: value.value() });
+        }
+    }
+    Ok(())
+}
+
 /// Predicts the new motion at d = 0 and leaves f(t̄, ū, v̄) − M ā there in `work.increment`.
 fn residual<T: Real>(
     stage: &CompiledStage<T>,
@@ -161,6 +171,7 @@ fn residual<T: Real>(
     stage.recovery.predict(past, &mut [&mut new.u, &mut new.v, &mut new.a]);
     if !prescribed.is_empty() {
         system.prescribed_motion(new.t, supports);
+        finite_supports(new.t, prescribed, supports)?;
         for (&dof, support) in prescribed.iter().zip(supports.iter()) {
             (new.u[dof], new.v[dof]) = (support[0], support[1]);
         }
@@ -169,6 +180,7 @@ fn residual<T: Real>(
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
         if !prescribed.is_empty() {
             system.prescribed_motion(t_balance, balance_supports);
+            finite_supports(t_balance, prescribed, balance_supports)?;
             for (&dof, support) in prescribed.iter().zip(balance_supports.iter()) {
                 (balance.u[dof], balance.v[dof]) = (support[0], support[1]);
             }

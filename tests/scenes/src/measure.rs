@@ -86,7 +86,7 @@ pub fn record_run<T: Real>(bars: &Bars, run: &mut Simulation<'_, T>, until: f64)
         record.impulse.push(contacts.impulses()[0].value());
         record.u.push([left, right].map(|dof| state.displacement()[dof].value()));
         record.v.push([left, right].map(|dof| state.velocity()[dof].value()));
-        record.gap.push(step.gaps[0].value());
+        record.gap.push(contacts.gaps()[0].value());
         Control::Continue
     };
     let mut observers = (steps, EnergyRecorder::new());
