@@ -21,7 +21,6 @@ use crate::observer::{Control, Observer, StepView, Wants};
 use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
 use crate::system::System;
-use crate::tableau::Momentum;
 use contact_step::ContactRowsWork;
 use energy::Ledger;
 use program::{Operator, Program};
@@ -80,7 +79,8 @@ pub struct Simulation<'a, T: Real> {
     contact_solver: Box<dyn ContactSolver<T> + 'a>,
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
     integrator: Box<dyn TimeIntegrator + 'a>,
-    momentum: Momentum,
+    /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
+    covectors: Vec<Vec<[f64; 3]>>,
     program: Program<T>,
     /// The one-step scheme of the first steps, dropped once the past is known.
     startup: Option<Program<T>>,
@@ -208,7 +208,7 @@ impl<'a, T: Real> Simulation<'a, T> {
         let h = self.history.clock.h;
         let mut sum = vec![T::zero(); dofs];
         let newest = &self.state.motion;
-        for (k, psi) in self.momentum.after_step().iter().enumerate().take(self.history.known) {
+        for (k, psi) in self.covectors[self.history.known - 1].iter().enumerate() {
             let motion = if k == 0 { newest } else { &self.history.slots[k] };
             // Displacements enter with weights that sum to zero: differences keep their digits.
             for ((sum, &u), &u0) in sum.iter_mut().zip(&motion.u).zip(&newest.u) {

@@ -374,18 +374,7 @@ impl Momentum {
         covector.push([0.0; 3]); // the oldest state leaves the past
         let mut covectors = vec![covector];
         for stage in tableau.stages.iter().skip(1).rev() {
-            let after = &covectors[covectors.len() - 1];
-            let width = after.len() - 1;
-            let map = Tableau::stage_map(stage, 0.0, 0.0, width);
-            let before = (0..width)
-                .map(|k| {
-                    std::array::from_fn(|field| {
-                        let through: f64 = (0..3).map(|new| after[0][new] * map[new][3 * k + field]).sum();
-                        after[k + 1][field] + through
-                    })
-                })
-                .collect();
-            covectors.push(before);
+            covectors.push(pull_back(&covectors[covectors.len() - 1], stage));
         }
         covectors.reverse();
         let weights = tableau
@@ -414,10 +403,29 @@ impl Momentum {
         kept
     }
 
+    /// The covectors while the past is still being built by steps of `start` (one stage): entry m − 1 is the one for m known states.
+    /// Steps of the start conserve them in turn, and the last one is [`after_step`](Self::after_step).
+    pub(crate) fn during_start(&self, start: &Stage) -> Vec<Vec<[f64; 3]>> {
+        let mut covectors = vec![self.after_step()];
+        while covectors[covectors.len() - 1].len() > 1 {
+            covectors.push(pull_back(&covectors[covectors.len() - 1], start));
+        }
+        covectors.reverse();
+        covectors
+    }
+
     /// β of each stage: a raw multiplier λ of the stage adds the impulse h β λ. They sum to 1.
     pub fn impulse_weights(&self) -> &[f64] {
         &self.weights
     }
+}
+
+/// The covector before a stage that has the covector `after` when it is done.
+fn pull_back(after: &[[f64; 3]], stage: &Stage) -> Vec<[f64; 3]> {
+    let width = after.len() - 1;
+    let map = Tableau::stage_map(stage, 0.0, 0.0, width);
+    let through = |k: usize, field: usize| (0..3).map(|new| after[0][new] * map[new][3 * k + field]).sum::<f64>();
+    (0..width).map(|k| std::array::from_fn(|field| after[k + 1][field] + through(k, field))).collect()
 }
 
 /// A vector in the null space of a small matrix of rank deficiency one, by elimination with complete pivoting.

@@ -172,7 +172,6 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
-        let momentum = tableau.momentum();
         let (state, history, projection) = if let Some((state, history)) = self.resumed {
             history.check(dofs, depth + stages)?;
             check_vector("the resumed displacement", &state.motion.u, dofs)?;
@@ -200,9 +199,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         contact_solver.reserve(rows);
 
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, rows };
-        let program = compiler.compile(&tableau, &momentum, &tableau)?;
+        let program = compiler.compile(&tableau)?;
+        let start = Newmark::trapezoidal().tableau();
+        let covectors = tableau.momentum().during_start(&start.stages[0]);
         let startup = match history.known < depth {
-            true => Some(compiler.compile(&Newmark::trapezoidal().tableau(), &momentum, &tableau)?),
+            true => Some(compiler.start(&start, &tableau)?),
             false => None,
         };
         let factorizations =
@@ -219,7 +220,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             contact_solver,
             correctors: self.correctors,
             integrator,
-            momentum,
+            covectors,
             program,
             startup,
             depth,

@@ -1,6 +1,6 @@
 //! The contact problem of a stage: which rows take part, their multipliers, and which contacts are closed afterwards.
 
-use super::program::{CompiledStage, Operator};
+use super::program::Operator;
 use super::{Constraints, Statistics, Workspace};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
@@ -140,7 +140,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         &mut self,
         h: f64,
         new: &Motion<T>,
-        stage: &CompiledStage<T>,
+        impulse_weight: f64,
         work: &mut Workspace<T>,
     ) -> Result<()> {
         let Self { constraints, g, .. } = self;
@@ -151,7 +151,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();
-        let impulse_weight = T::of(h * stage.impulse_weight);
+        let impulse_weight = T::of(h * impulse_weight);
         for row in 0..constraints.len() {
             let (gap, raw) = (trial.gap[row], trial.lambda_raw[row]);
             let rate = g.product(row, &new.v) + rows.rates[row].rate;

@@ -9,7 +9,7 @@ use crate::real::Real;
 use crate::sparse::Combination;
 use crate::state::Motion;
 use crate::system::{System, TangentWeights};
-use crate::tableau::{MAX_PAST, Momentum, Row, Rows, Stage, Tableau};
+use crate::tableau::{MAX_PAST, Row, Rows, Stage, Tableau};
 
 /// One term of a row: coefficient times one field of one past state.
 ///
@@ -117,9 +117,18 @@ pub(crate) struct CompiledStage<T> {
     /// Pure z-weights of the acceleration rows, recovery and balance.
     pub(crate) acceleration: f64,
     pub(crate) balance_acceleration: f64,
-    pub(crate) impulse_weight: f64,
+    /// Change of (U, V, A) by a unit multiplier on a unit mass, in units of h²: with the covector, the impulse weight β.
+    pub(crate) response: [f64; 3],
+    /// Momentum covector after the stage.
     pub(crate) covector: Vec<[f64; 3]>,
     pub(crate) read: Vec<[bool; 3]>,
+}
+
+impl<T> CompiledStage<T> {
+    /// β: a raw multiplier λ of the stage changes the momentum by h β λ.
+    pub(crate) fn impulse_weight(&self, covector: &[[f64; 3]]) -> f64 {
+        self.response.iter().zip(&covector[0]).map(|(response, psi)| response * psi).sum()
+    }
 }
 
 /// A factorized effective matrix and the responses A⁻¹ Gᵀ computed with it so far.
@@ -185,36 +194,43 @@ pub(crate) struct Compiler<'c, T: Real> {
 }
 
 impl<T: Real> Compiler<'_, T> {
-    /// Compiles `tableau`; covectors and read flags are those of `momentum` and `reader`, the scheme that goes on afterwards.
-    pub(crate) fn compile(&mut self, tableau: &Tableau, momentum: &Momentum, reader: &Tableau) -> Result<Program<T>> {
+    /// Compiles the scheme of a run.
+    pub(crate) fn compile(&mut self, tableau: &Tableau) -> Result<Program<T>> {
+        let momentum = tableau.momentum();
+        let books = |s: usize| (momentum.after_stage(s).to_vec(), tableau.read_after(s));
+        self.stages(&tableau.stages, books)
+    }
+
+    /// Compiles the one-step scheme that starts a multistep one: what it leaves behind is read by `reader`. Its covectors change from
+    /// step to step and are not part of the program.
+    pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
+        self.stages(&start.stages, |_| (Vec::new(), reader.read_after(reader.stages.len() - 1)))
+    }
+
+    fn stages(
+        &mut self,
+        stages: &[Stage],
+        books: impl Fn(usize) -> (Vec<[f64; 3]>, Vec<[bool; 3]>),
+    ) -> Result<Program<T>> {
         let mut program = Program { stages: Vec::new(), operators: Vec::new() };
-        let own = std::ptr::eq(tableau, reader);
-        for (s, stage) in tableau.stages.iter().enumerate() {
+        for (s, stage) in stages.iter().enumerate() {
             let weights = stage.balance.each().map(|row| row.z);
             let bits = |weights: [f64; 3]| weights.map(f64::to_bits);
             let shared = program.operators.iter().position(|operator| bits(operator.weights) == bits(weights));
             if shared.is_none() {
                 program.operators.push(self.operator(stage, weights)?);
             }
-            let operator = shared.unwrap_or(program.operators.len() - 1);
             let increment = stage.increment();
-            let (covector, read) = if own {
-                (momentum.after_stage(s).to_vec(), tableau.read_after(s))
-            } else {
-                // A start-up step: what follows is read by the scheme that is being started.
-                (momentum.after_step(), reader.read_after(reader.stages.len() - 1))
-            };
-            let response = stage.recovery.each().map(|row| row.z / stage.balance.a.z);
-            let impulse_weight = response.iter().zip(covector[0]).map(|(r, p)| r * p).sum();
+            let (covector, read) = books(s);
             program.stages.push(CompiledStage {
                 recovery: ScaledRows::new(&increment.recovery, self.h),
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
                 load: stage.load,
                 end: stage.end,
-                operator,
+                operator: shared.unwrap_or(program.operators.len() - 1),
                 acceleration: stage.recovery.a.z,
                 balance_acceleration: stage.balance.a.z,
-                impulse_weight,
+                response: stage.recovery.each().map(|row| row.z / stage.balance.a.z),
                 covector,
                 read,
             });

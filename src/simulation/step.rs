@@ -76,12 +76,14 @@ impl<T: Real> Simulation<'_, T> {
     /// All stages of a step. On entry slot 0 of the history holds the current motion.
     fn stages(&mut self) -> Result<()> {
         let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, .. } = self;
-        let program = match &mut self.startup {
-            Some(startup) => startup,
-            None => &mut self.program,
+        let (program, start_covector) = match &mut self.startup {
+            // The covector of one state more than is known now.
+            Some(startup) => (startup, Some(&self.covectors[history.known])),
+            None => (&mut self.program, None),
         };
         let clock = history.clock;
         for stage in &program.stages {
+            let covector = start_covector.unwrap_or(&stage.covector);
             history.slots.rotate_right(1);
             work.backup.rotations += 1;
             let Some((new, past)) = history.slots.split_first_mut() else {
@@ -113,8 +115,12 @@ impl<T: Real> Simulation<'_, T> {
                 new.a[dof] = support[2];
             }
             if constraints.len() > 0 {
-                ContactStep { constraints, g, solver: &mut **contact_solver, statistics }
-                    .close(clock.h, new, stage, work)?;
+                ContactStep { constraints, g, solver: &mut **contact_solver, statistics }.close(
+                    clock.h,
+                    new,
+                    stage.impulse_weight(covector),
+                    work,
+                )?;
                 if let Some(projection) = work.projection.as_mut().filter(|_| !work.buffers.closed.is_empty()) {
                     let mut correction = Correction {
                         h: clock.h,
@@ -122,7 +128,7 @@ impl<T: Real> Simulation<'_, T> {
                         scheme: Scheme {
                             acceleration: stage.acceleration,
                             balance: stage.balance_acceleration,
-                            covector: &stage.covector,
+                            covector,
                             read: &stage.read,
                         },
                         g,
