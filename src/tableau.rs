@@ -196,15 +196,14 @@ impl Stage {
     }
 }
 
-/// A time-integration scheme as data: its stages, and where in the step the stored velocity and acceleration live.
+/// A time-integration scheme as data: its stages.
+///
+/// u, v and a of the last stage are the state at the end of the step. Schemes whose stored velocity lives elsewhere (half-step
+/// velocities of explicit schemes) are not covered by this version.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tableau {
     /// Stages in the order in which they are solved.
     pub stages: Vec<Stage>,
-    /// Fraction of the step, counted from the step's start, at which the stored velocity lives.
-    pub v_at: f64,
-    /// The same for the stored acceleration.
-    pub a_at: f64,
 }
 
 impl Tableau {
@@ -216,7 +215,7 @@ impl Tableau {
     /// A scheme of several stages. After a stage its state is past state 0 for the next one; after the last stage the
     /// intermediate states are dropped.
     pub fn staged(stages: Vec<Stage>) -> Self {
-        Self { stages, v_at: 1.0, a_at: 1.0 }
+        Self { stages }
     }
 
     /// Refuses tableaux that no step could be made of.

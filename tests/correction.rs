@@ -1,4 +1,5 @@
 //! The λ_v/λ_a correction against the paper's equations (as derived in docs/theory.md) and against closed forms.
+#![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
 use approx::assert_relative_eq;
 use contact_dynamics::corrector::Parts;
@@ -305,4 +306,11 @@ fn mass_views_multiply_as_matrices() {
     for (y, m) in y.iter().zip(bars.lumped_mass::<f64>()) {
         assert_relative_eq!(*y, 2.0 * m, max_relative = 1e-14);
     }
+    // A diagonal matrix is recognized as lumped.
+    let diagonal: Vec<_> = (0..bars.dofs()).map(|i| Triplet::new(i, i, 1.0 + i as f64)).collect();
+    let diagonal = SparseColMat::<usize, f64>::try_new_from_triplets(bars.dofs(), bars.dofs(), &diagonal).unwrap();
+    let system = LinearSystem::new(diagonal, bars.stiffness()).unwrap();
+    assert!(matches!(system.mass(), Mass::Lumped(mass) if mass.len() == bars.dofs() && mass[2] == 3.0));
+    let system = LinearSystem::new(consistent, bars.stiffness()).unwrap();
+    assert!(matches!(system.mass(), Mass::Consistent(_)));
 }
