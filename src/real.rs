@@ -6,6 +6,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::{ldlt::factor::LdltError, llt::factor::LltError};
 use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::traits::RealField;
 use faer::{Conj, MatMut, Par, Side};
@@ -28,7 +29,7 @@ pub trait Real:
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
-    use super::{SparseColMatRef, SymbolicCholesky, SymbolicCholeskyRaw};
+    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw};
     use faer::Spec;
     use faer::linalg::cholesky::{ldlt::factor::LdltRegularization, llt::factor::LltRegularization};
 
@@ -65,12 +66,13 @@ pub(crate) mod kernels {
         fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
         /// `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
         fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
-        /// Factorizes; `Err` holds the failing index in the numbering of the caller.
+        /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller.
         fn cholesky(
             kind: Factorization,
             symbolic: &SymbolicCholesky<usize>,
             a: SparseColMatRef<'_, usize, Self>,
             values: &mut [Self],
+            pivots: &mut [Self],
             memory: &mut MemBuffer,
         ) -> Result<(), usize>;
         /// Solves in place for the columns of `rhs` with a supernodal factor.
@@ -121,6 +123,7 @@ pub(crate) mod kernels {
         symbolic: &SymbolicCholesky<usize>,
         a: SparseColMatRef<'_, usize, T>,
         values: &mut [T],
+        pivots: &mut [T],
         memory: &mut MemBuffer,
     ) -> Result<(), usize> {
         let stack = MemStack::new(memory);
@@ -156,16 +159,23 @@ pub(crate) mod kernels {
             let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
             return Err(original(index.saturating_sub(base)));
         }
-        // LDLᵀ of an indefinite matrix succeeds: the signs of D decide. The first entry of a simplicial column is D.
-        if let (Factorization::Ldlt, SymbolicCholeskyRaw::Simplicial(raw)) = (kind, symbolic.raw()) {
-            let pivots = &raw.col_ptr()[..symbolic.nrows()];
-            let bad = |&start: &usize| !(values[start] > T::zero_impl() && T::is_finite_impl(&values[start]));
-            if let Some(k) = pivots.iter().position(bad) {
-                return Err(original(k));
+        // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of rounding.
+        match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(raw) => {
+                for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
+                    pivots[original(k)] = values[start].clone();
+                    // The sweeps multiply by 1/D.
+                    values[start] = T::recip_impl(&values[start]);
+                }
             }
-            // The sweeps multiply by 1/D.
-            for &start in pivots {
-                values[start] = T::recip_impl(&values[start]);
+            SymbolicCholeskyRaw::Supernodal(raw) => {
+                for s in 0..raw.n_supernodes() {
+                    let (start, block) =
+                        (raw.supernode_begin()[s], SupernodalLltRef::new(raw, values).supernode(s).val());
+                    for j in 0..block.ncols() {
+                        pivots[original(start + j)] = T::abs2_impl(&block[(j, j)]);
+                    }
+                }
             }
         }
         Ok(())
@@ -245,9 +255,10 @@ pub(crate) mod kernels {
                     symbolic: &SymbolicCholesky<usize>,
                     a: SparseColMatRef<'_, usize, Self>,
                     values: &mut [Self],
+                    pivots: &mut [Self],
                     memory: &mut MemBuffer,
                 ) -> Result<(), usize> {
-                    cholesky(kind, symbolic, a, values, memory)
+                    cholesky(kind, symbolic, a, values, pivots, memory)
                 }
                 fn supernodal_solve(
                     symbolic: &SymbolicCholesky<usize>,

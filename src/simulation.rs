@@ -105,6 +105,8 @@ struct Workspace<T: Real> {
     /// Whether M couples prescribed dofs with free ones.
     coupled_mass: bool,
     trial: ContactState<T>,
+    /// Closed flags at the start of the step, and before the present stage.
+    closed_at_start: Vec<bool>,
     was_closed: Vec<bool>,
     rows: ContactRowsWork<T>,
     buffers: Buffers<T>,

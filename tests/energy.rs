@@ -81,3 +81,30 @@ fn works_of_load_damping_and_support_balance_on_smooth_motion() {
     let (coarse, fine) = (remainder(4e-3), remainder(2e-3));
     assert!(((coarse / fine).log2() - 2.0).abs() < 0.1, "{coarse:e} {fine:e}");
 }
+
+#[test]
+fn correction_against_a_moving_stop_books_the_change_of_kinetic_energy() {
+    use contact_dynamics::LinearRows;
+    use contact_dynamics::contact::GapOffset;
+    use contact_dynamics::corrector::Parts;
+    // A mass of 2 with velocity 1 meets a stop that comes toward it with 0.5.
+    let run = |parts| {
+        let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let stop = GapOffset::moving(|t| [0.1234 - 0.5 * t, -0.5, 0.0]);
+        let mut run = Simulation::builder(LinearSystem::lumped(vec![2.0], k).unwrap(), Composite, 0.01)
+            .velocity(vec![1.0])
+            .constraint(LinearRows::new().unilateral(&[(0, -1.0)], stop))
+            .corrector(PersistencyCorrection::new().parts(parts))
+            .energy_balance()
+            .build()
+            .unwrap();
+        while run.state().contacts().raw_forces()[0] == 0.0 {
+            run.step().unwrap();
+        }
+        run.energy()
+    };
+    let (kept, corrected) = (run(Parts::Acceleration), run(Parts::Velocity));
+    let change = corrected.kinetic - kept.kinetic;
+    let booked = corrected.works.unwrap().corrections;
+    assert!(change.abs() > 1e-3 && (booked - change).abs() < 1e-13, "{booked} for {change}");
+}

@@ -266,7 +266,7 @@ impl<T: Real> Correction<'_, T> {
     /// None at present.
     pub fn push_velocity(&mut self) -> Result<()> {
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
-        let Buffers { closed, impulses, jump, change, damping, .. } = &mut **buffers;
+        let Buffers { closed, impulses, jump, rates, change, damping, .. } = &mut **buffers;
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
         }
@@ -276,9 +276,9 @@ impl<T: Real> Correction<'_, T> {
             contacts.lambda_a[row] = -T::of(self.h) * impulse;
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
-        // Work of the impulses: impulse times mean gap rate, ½ (before + after).
-        for ((&row, &impulse), &before) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
-            **energy += impulse * (before + T::of(0.5) * g.product(row, change));
+        // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the obstacle's.
+        for ((&row, &impulse), &jump) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
+            **energy += impulse * (jump - rates[row].rate + T::of(0.5) * g.product(row, change));
         }
         T::axpy(T::one(), change, &mut new.v);
         if system.0.damping(change, damping) == Damping::Present {
@@ -326,8 +326,9 @@ impl<T: Real> Correction<'_, T> {
         }
         let rows = std::mem::take(&mut self.buffers.engaged);
         let closing = self.projection.close(self.g, &rows).map_err(|row| self.dependent(row));
-        let places = self.past.len().min(self.scheme.read.len().saturating_sub(1));
-        if closing.is_ok() && self.scheme.read[1..].iter().flatten().any(|&read| read) {
+        // States not known yet, while a multistep scheme is started, have no covector.
+        let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
+        if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
             self.backup.keep(self.past);
             for k in 1..=places {
                 for field in 0..3 {

@@ -27,8 +27,15 @@ struct Factor<T: Real> {
     memory: MemBuffer,
     /// Right-hand sides that `memory` has room for.
     columns: usize,
+    /// Pivots in the numbering of the matrix.
+    pivots: Vec<T>,
     /// One right-hand side in the order of elimination; simplicial factors only.
     sweep: Vec<T>,
+}
+
+/// A pivot that keeps less than this share of its diagonal entry is what rounding leaves of zero.
+fn negligible<T: Real>() -> T {
+    T::of(8.0) * T::epsilon()
 }
 
 impl<T: Real> std::fmt::Debug for Factor<T> {
@@ -54,19 +61,27 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let scratch = T::cholesky_scratch(kind, &symbolic, 1);
         let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
         let values = vec![T::zero(); symbolic.len_val()];
+        let pivots = vec![T::zero(); symbolic.nrows()];
         let sweep = match kind {
             Kind::Ldlt => vec![T::zero(); symbolic.nrows()],
             Kind::Llt => Vec::new(),
         };
-        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, sweep }))
+        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, pivots, sweep }))
     }
 }
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         sparse::check_symmetric("effective", a)?;
-        T::cholesky(self.kind, &self.symbolic, a, &mut self.values, &mut self.memory)
-            .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })
+        let Self { symbolic, kind, values, pivots, memory, .. } = self;
+        let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
+        T::cholesky(*kind, symbolic, a, values, pivots, memory).map_err(singular)?;
+        // Written so that NaN is refused too.
+        let sound = |(dof, &pivot): (usize, &T)| pivot > negligible::<T>() * sparse::entry(a, dof, dof);
+        match pivots.iter().enumerate().position(|pivot| !sound(pivot)) {
+            Some(dof) => Err(singular(dof)),
+            None => Ok(()),
+        }
     }
 
     fn solve(&mut self, rhs: &mut [T]) {

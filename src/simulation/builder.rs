@@ -125,7 +125,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs about one K-product a step.
+    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with C a step, with
+    /// supports one evaluation of f as well.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
         self.balance = EnergyBalance::On;
@@ -254,6 +255,7 @@ fn workspace<T: Real>(
         coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
         prescribed,
         trial: ContactState::with_capacity(rows),
+        closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
         rows: ContactRowsWork::new(rows),
         buffers: Buffers::new(rows, dofs),

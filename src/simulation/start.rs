@@ -145,11 +145,10 @@ fn resting_contacts<T: Real>(
     Ok(resting)
 }
 
-/// Whether accelerations move nothing within a step beyond rounding: then the straight-line past is exact.
+/// Whether accelerations change no velocity within a step beyond rounding: then the straight-line past is exact.
 pub(super) fn is_free_flight<T: Real>(motion: &Motion<T>, h: f64) -> bool {
-    let (h, tolerance) = (T::of(h), T::of(64.0) * T::epsilon());
-    let Motion { u, v, a, .. } = motion;
-    u.iter().zip(v).zip(a).all(|((&u, &v), &a)| a.abs() * h * h <= tolerance * (u.abs() + h * v.abs()))
+    let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+    T::of(h) * largest(&motion.a) <= T::of(64.0) * T::epsilon() * largest(&motion.v)
 }
 
 /// Fills past states 1, 2, … with u − k h v, v, 0.

@@ -32,6 +32,7 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         work.trial.carry_over(&state.contacts, &constraints.ids);
+        work.closed_at_start.clone_from(&work.trial.closed);
         work.backup.begin();
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
@@ -60,9 +61,8 @@ impl<T: Real> Simulation<'_, T> {
         let stages = work.backup.rotations;
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
-        let old = &state.contacts.closed;
-        let changed = |(i, &closed): (usize, &bool)| closed != old.get(i).copied().unwrap_or(false);
-        statistics.contact_changes += work.trial.closed.iter().enumerate().filter(|&x| changed(x)).count() as u64;
+        let flags = work.trial.closed.iter().zip(&work.closed_at_start);
+        statistics.contact_changes += flags.filter(|(now, before)| now != before).count() as u64;
         std::mem::swap(&mut state.contacts, &mut work.trial);
         history.known = (history.known + 1).min(self.depth);
         history.clock.steps += 1;

@@ -1,0 +1,138 @@
+//! Linear solvers on every kind of factor: chains, arrows, grids (simplicial and supernodal), dense blocks; both precisions.
+
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{Automatic, Cholesky, Diagonal, Error, LinearSolver, Real};
+
+/// A symmetric positive definite matrix with the given pairs as off-diagonal entries.
+fn matrix<T: Real>(n: usize, pairs: &[(usize, usize)], shift: f64) -> SparseColMat<usize, T> {
+    let mut triplets: Vec<Triplet<usize, usize, f64>> = (0..n).map(|i| Triplet::new(i, i, shift)).collect();
+    for (k, &(i, j)) in pairs.iter().enumerate() {
+        let stiffness = 1.0 + 0.5 * ((k * 37 % 11) as f64);
+        for (r, c, x) in [(i, i, stiffness), (j, j, stiffness), (i, j, -stiffness), (j, i, -stiffness)] {
+            triplets.push(Triplet::new(r, c, x));
+        }
+    }
+    let (pattern, values) = SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap().into_parts();
+    SparseColMat::new(pattern, values.into_iter().map(T::of).collect())
+}
+
+fn chain(n: usize) -> Vec<(usize, usize)> {
+    (1..n).map(|i| (i - 1, i)).collect()
+}
+
+/// A chain whose nodes are numbered at random: the elimination order is not the given one.
+fn shuffled_chain(n: usize) -> Vec<(usize, usize)> {
+    (1..n).map(|i| ((i - 1) * 7 % n, i * 7 % n)).collect()
+}
+
+fn arrow(n: usize) -> Vec<(usize, usize)> {
+    (0..n - 1).map(|i| (i, n - 1)).chain(chain(n - 1)).collect()
+}
+
+fn grid(side: usize) -> Vec<(usize, usize)> {
+    let at = |x: usize, y: usize| x + side * y;
+    let mut pairs = Vec::new();
+    for y in 0..side {
+        for x in 0..side {
+            // Eight neighbors: enough fill for a supernodal factor on the larger grid.
+            let right = (x + 1 < side).then(|| (at(x, y), at(x + 1, y)));
+            let up = (y + 1 < side).then(|| (at(x, y), at(x, y + 1)));
+            let diagonal = (x + 1 < side && y + 1 < side).then(|| (at(x, y), at(x + 1, y + 1)));
+            pairs.extend([right, up, diagonal].into_iter().flatten());
+        }
+    }
+    pairs
+}
+
+fn dense(n: usize) -> Vec<(usize, usize)> {
+    (0..n).flat_map(|i| (0..i).map(move |j| (j, i))).collect()
+}
+
+fn check<T: Real>(n: usize, pairs: &[(usize, usize)], tolerance: f64) {
+    let pattern_of = matrix::<T>(n, pairs, 0.1);
+    let mut factor = LinearSolver::<T>::analyze(&Automatic, pattern_of.symbolic()).unwrap();
+    assert!(factor.stored_values() >= n);
+    // The same analysis serves other values.
+    for shift in [0.1, 3.0] {
+        let a = matrix::<T>(n, pairs, shift);
+        factor.factorize(a.as_ref()).unwrap();
+        for columns in [1, 3] {
+            let x: Vec<T> = (0..n * columns).map(|i| T::of((i as f64 * 0.7).sin())).collect();
+            let mut b = vec![T::zero(); n * columns];
+            for (x, b) in x.chunks(n).zip(b.chunks_mut(n)) {
+                for (j, &xj) in x.iter().enumerate() {
+                    let a = a.as_ref();
+                    for (&i, &value) in a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)) {
+                        b[i] += value * xj;
+                    }
+                }
+            }
+            factor.solve(&mut b);
+            let worst = b.iter().zip(&x).map(|(&b, &x)| (b - x).abs().value()).fold(0.0, f64::max);
+            assert!(worst < tolerance, "{n} dofs, {} pairs, {columns} columns: {worst:e}", pairs.len());
+        }
+    }
+}
+
+#[test]
+fn solutions_are_right_whatever_the_structure() {
+    let cases: [(usize, Vec<(usize, usize)>); 8] = [
+        (1, vec![]),
+        (7, vec![]),
+        (2, chain(2)),
+        (50, chain(50)),
+        (50, shuffled_chain(50)),
+        (40, arrow(40)),
+        (900, grid(30)),
+        (60, dense(60)),
+    ];
+    for (n, pairs) in cases {
+        check::<f64>(n, &pairs, 1e-10);
+        check::<f32>(n, &pairs, 5e-2);
+    }
+}
+
+#[test]
+fn cholesky_refuses_what_is_not_symmetric_positive_definite() {
+    for pairs in [chain(30), grid(30), dense(30)] {
+        let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
+        let good = matrix::<f64>(n, &pairs, 1.0);
+        let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), good.symbolic()).unwrap();
+        let (pattern, values) = good.into_parts();
+        let broken = |change: &dyn Fn(usize, usize, f64) -> f64| {
+            let mut values = values.clone();
+            for j in 0..n {
+                for at in pattern.as_ref().col_range(j) {
+                    values[at] = change(pattern.row_idx()[at], j, values[at]);
+                }
+            }
+            SparseColMat::new(pattern.clone(), values)
+        };
+        let negative = broken(&|i, j, x| if (i, j) == (5, 5) { -x } else { x });
+        assert!(matches!(factor.factorize(negative.as_ref()), Err(Error::Singular { .. })));
+        let one_sided = broken(&|i, j, x| if (i, j) == (1, 0) { 0.5 * x } else { x });
+        assert!(matches!(factor.factorize(one_sided.as_ref()), Err(Error::Asymmetric { row: 1, column: 0, .. })));
+        let infinite = broken(&|i, j, x| if (i, j) == (3, 3) { f64::INFINITY } else { x });
+        assert!(matches!(factor.factorize(infinite.as_ref()), Err(Error::MatrixNotFinite { row: 3, column: 3, .. })));
+        // A free body: its rigid mode leaves a pivot of rounding.
+        let free = broken(&|i, j, x| if i == j { x - 1.0 } else { x });
+        let found = factor.factorize(free.as_ref());
+        assert!(matches!(found, Err(Error::Singular { .. })), "{found:?}");
+        // A failure does not spoil the analysis.
+        factor.factorize(SparseColMat::new(pattern.clone(), values.clone()).as_ref()).unwrap();
+    }
+}
+
+#[test]
+fn diagonal_solver_takes_diagonal_matrices_only() {
+    let a = matrix::<f64>(3, &[], 4.0);
+    let mut factor = LinearSolver::<f64>::analyze(&Diagonal, a.symbolic()).unwrap();
+    factor.factorize(a.as_ref()).unwrap();
+    let mut x = [4.0, 8.0, -2.0, 1.0, 2.0, 3.0];
+    factor.solve(&mut x);
+    assert!(x.iter().zip([1.0, 2.0, -0.5, 0.25, 0.5, 0.75]).all(|(x, y)| (x - y).abs() < 1e-15));
+    let chain = matrix::<f64>(3, &chain(3), 1.0);
+    assert!(matches!(LinearSolver::<f64>::analyze(&Diagonal, chain.symbolic()), Err(Error::Incompatible { .. })));
+    let zero = matrix::<f64>(3, &[], 0.0);
+    assert!(matches!(factor.factorize(zero.as_ref()), Err(Error::Singular { dof: 0, .. })));
+}
