@@ -28,7 +28,8 @@ use crate::real::Real;
 ///     }
 ///     fn correct(&self, step: &mut Correction<'_, f64>) -> Result<()> {
 ///         step.solve_velocity_jumps()?;
-///         step.push_velocity()
+///         step.push_velocity();
+///         Ok(())
 ///     }
 /// }
 /// let correctors: Vec<Box<dyn Corrector<f64>>> = vec![Box::new(Plastic), Box::new(PersistencyCorrection::new())];

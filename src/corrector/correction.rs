@@ -140,13 +140,14 @@ pub(crate) struct Buffers<T> {
     /// One a candidate.
     rates: Vec<GapRates<T>>,
     gaps: Vec<T>,
-    /// One a dof.
+    /// Change of v and the damping force it makes, one a dof; empty without damping.
     change: Vec<T>,
     damping: Vec<T>,
 }
 
 impl<T: Real> Buffers<T> {
-    pub(crate) fn new(rows: usize, dofs: usize) -> Self {
+    /// Room for `rows` contacts, and for velocity changes of `damped` dofs (0 without damping).
+    pub(crate) fn new(rows: usize, damped: usize) -> Self {
         let reals = |n| Vec::with_capacity(n);
         Self {
             closed: Vec::with_capacity(rows),
@@ -159,8 +160,8 @@ impl<T: Real> Buffers<T> {
             s: reals(rows * rows),
             rates: vec![GapRates::default(); rows],
             gaps: vec![T::zero(); rows],
-            change: vec![T::zero(); dofs],
-            damping: vec![T::zero(); dofs],
+            change: vec![T::zero(); damped],
+            damping: vec![T::zero(); damped],
         }
     }
 }
@@ -260,32 +261,32 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping forces to a.
-    ///
-    /// # Errors
-    ///
-    /// None at present.
-    pub fn push_velocity(&mut self) -> Result<()> {
+    pub fn push_velocity(&mut self) {
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
         let Buffers { closed, impulses, jump, rates, change, damping, .. } = &mut **buffers;
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
-            return Ok(());
+            return;
         }
-        change.fill(T::zero());
         for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
-            projection.push(g, row, impulse, change);
+            projection.push(g, row, impulse, &mut new.v);
             contacts.lambda_a[row] = -T::of(self.h) * impulse;
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
         // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the obstacle's.
         for ((&row, &impulse), &jump) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
-            **energy += impulse * (jump - rates[row].rate + T::of(0.5) * g.product(row, change));
+            let (before, after) = (jump - rates[row].rate, g.product(row, &new.v));
+            **energy += impulse * T::of(0.5) * (before + after);
         }
-        T::axpy(T::one(), change, &mut new.v);
-        if system.0.damping(change, damping) == Damping::Present {
-            projection.apply_inverse(damping);
-            T::axpy(-T::one(), damping, &mut new.a);
+        if !change.is_empty() {
+            change.fill(T::zero());
+            for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
+                projection.push(g, row, impulse, change);
+            }
+            if system.0.damping(change, damping) == Damping::Present {
+                projection.apply_inverse(damping);
+                T::axpy(-T::one(), damping, &mut new.a);
+            }
         }
-        Ok(())
     }
 
     /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative (touching rows).

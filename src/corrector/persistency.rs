@@ -107,7 +107,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.solve_velocity_jumps()?;
         if self.parts != Parts::Acceleration {
-            step.push_velocity()?;
+            step.push_velocity();
         }
         if self.parts != Parts::Velocity {
             step.solve_acceleration_jumps()?;

@@ -15,7 +15,7 @@ use crate::mass::Mass;
 use crate::real::Real;
 use crate::sparse;
 use crate::state::{Clock, ContactState, History, Motion, State};
-use crate::system::System;
+use crate::system::{Damping, System};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
 pub struct SimulationBuilder<'a, T: Real> {
@@ -209,7 +209,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let factorizations =
             program.operators.len() as u64 + startup.as_ref().map_or(0, |program| program.operators.len() as u64);
-        let work = workspace(&*system, &program, &self.correctors, projection, rows, depth + stages);
+        let work = workspace(&mut *system, &program, &self.correctors, projection, rows, depth + stages);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
             EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
@@ -236,7 +236,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 
 /// Memory of the steps: nothing is allocated after this.
 fn workspace<T: Real>(
-    system: &dyn System<T>,
+    system: &mut dyn System<T>,
     program: &Program<T>,
     correctors: &[Box<dyn Corrector<T> + '_>],
     projection: JumpProjection<T>,
@@ -244,6 +244,11 @@ fn workspace<T: Real>(
     slots: usize,
 ) -> Workspace<T> {
     let dofs = system.dofs();
+    let (still, mut force) = (vec![T::zero(); dofs], vec![T::zero(); dofs]);
+    let damped = match system.damping(&still, &mut force) {
+        Damping::Present if !correctors.is_empty() => dofs,
+        _ => 0,
+    };
     let prescribed = system.prescribed().to_vec();
     let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
     let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
@@ -258,7 +263,7 @@ fn workspace<T: Real>(
         closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
         rows: ContactRowsWork::new(rows),
-        buffers: Buffers::new(rows, dofs),
+        buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
         backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         correction_energy: T::zero(),
