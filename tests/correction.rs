@@ -314,3 +314,86 @@ fn mass_views_multiply_as_matrices() {
     let system = LinearSystem::new(consistent, bars.stiffness()).unwrap();
     assert!(matches!(system.mass(), Mass::Consistent(_)));
 }
+
+#[test]
+fn an_impact_on_a_grid_point_belongs_to_that_step() {
+    // The gap of 1/4 closes with 2/64 a step: exactly at the eighth, without any pressure.
+    let h = 1.0 / 64.0;
+    let schemes: [Box<dyn TimeIntegrator>; 2] = [Box::new(Composite), Box::new(park())];
+    for scheme in schemes {
+        let name = scheme.name();
+        let mut run = Simulation::builder(free(&[1.0, 1.0]), scheme, h)
+            .velocity(vec![1.0, -1.0])
+            .constraint(LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.25))
+            .corrector(FULL)
+            .build()
+            .unwrap();
+        run.run_until(8.0 * h, &mut ()).unwrap();
+        let contacts = run.state().contacts();
+        assert!(contacts.closed()[0] && contacts.raw_forces()[0] == 0.0, "{name}: {contacts:?}");
+        assert!(run.state().velocity().iter().all(|v| v.abs() < 1e-14), "{name}: {:?}", run.state().velocity());
+        assert_relative_eq!(contacts.impulses()[0], 1.0, max_relative = 1e-10);
+        // The past that later steps read no longer approaches.
+        let (u, v, _) = run.history().past(1).unwrap();
+        assert!((u[1] - u[0] + 0.25).abs() < 1e-14 && (v[1] - v[0]).abs() < 1e-14, "{name}: {u:?} {v:?}");
+        run.run_until(12.0 * h, &mut ()).unwrap();
+        assert!(run.gaps()[0].abs() < 1e-14 && run.statistics().contact_changes == 1, "{name}: {:?}", run.gaps());
+    }
+}
+
+#[test]
+fn reported_force_of_a_generalized_scheme_balances_its_own_rows() {
+    // Chung and Hulbert: M ā + K ū = Gᵀ p' at the balance rows, with the corrected acceleration in ā; the factor is 1 − α_m.
+    use contact_dynamics_scenes::schemes::chung_hulbert;
+    for rho in [0.0, 0.8, 1.0] {
+        let (am, af) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+        let bars = Bars::paper(20).delayed(0.3, 1e-3);
+        let mut run = start(&bars, chung_hulbert(rho), PersistencyCorrection::new(), 1e-3);
+        let (mass, mut system) = (bars.lumped_mass::<f64>(), bars.system::<f64>());
+        let [left, right] = bars.contact_dofs();
+        let mut scale = 1e-3_f64;
+        for _ in 0..180 {
+            let old = run.state().clone();
+            run.step().unwrap();
+            let new = run.state();
+            let mix = |x: f64, y: &[f64], z: &[f64]| -> Vec<f64> {
+                y.iter().zip(z).map(|(y, z)| (1.0 - x) * y + x * z).collect()
+            };
+            let u = mix(af, new.displacement(), old.displacement());
+            let a = mix(am, new.acceleration(), old.acceleration());
+            let mut residual = vec![0.0; bars.dofs()];
+            system.force(0.0, &u, &a, &mut residual).unwrap();
+            residual[left] -= new.contacts().forces()[0];
+            residual[right] += new.contacts().forces()[0];
+            scale = scale.max(new.contacts().raw_forces()[0]);
+            for (i, r) in residual.iter().enumerate() {
+                assert!((r - mass[i] * a[i]).abs() < 1e-11 * scale, "ρ = {rho}, t = {}, dof {i}", run.time());
+            }
+        }
+        assert!(scale > 1e-2, "the impact is part of the run");
+    }
+}
+
+#[test]
+fn a_touching_row_is_not_held_back_by_an_impact_elsewhere() {
+    // A node slides along the floor (touching, no pressure) and meets an oblique wall on a grid point: the wall throws it off the
+    // floor with 0.6 of its normal velocity along (0.6, 0.8); holding the floor's gap would be adhesion.
+    let h = 1.0 / 64.0;
+    for scheme in [true, false] {
+        let integrator: Box<dyn TimeIntegrator> =
+            if scheme { Box::new(Composite) } else { Box::new(Newmark::trapezoidal()) };
+        let mut run = Simulation::builder(free(&[1.0, 1.0]), integrator, h)
+            .velocity(vec![-1.0, 0.0])
+            .constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0).unilateral(&[(0, 0.6), (1, 0.8)], 0.6 * 8.0 * h))
+            .corrector(FULL)
+            .build()
+            .unwrap();
+        run.run_until(8.0 * h, &mut ()).unwrap();
+        assert_eq!(run.state().contacts().closed(), [true, true]);
+        assert_eq!(run.state().contacts().raw_forces(), [0.0, 0.0]);
+        assert_relative_eq!(run.state().velocity()[0], -0.64, max_relative = 1e-12);
+        assert_relative_eq!(run.state().velocity()[1], 0.48, max_relative = 1e-12);
+        let impulses = run.state().contacts().impulses();
+        assert!(impulses[0].abs() < 1e-14 && (impulses[1] - 0.6).abs() < 1e-12, "{impulses:?}");
+    }
+}
