@@ -47,6 +47,12 @@ impl<T: Real> ContactProblem<'_, T> {
         multipliers.iter().enumerate().fold(self.offset[i], |y, (j, &lambda)| y + self.delassus(i, j) * lambda)
     }
 
+    /// What of y_i is rounding: its tolerance, and that of the sum `(W λ + q)_i` itself.
+    pub fn rounding(&self, i: usize, multipliers: &[T]) -> T {
+        let terms = multipliers.iter().enumerate().map(|(j, &lambda)| (self.delassus(i, j) * lambda).abs());
+        self.tolerance[i] + T::of(32.0) * T::epsilon() * (self.offset[i].abs() + terms.sum::<T>())
+    }
+
     /// The row that misses complementarity most, and by how much (unit of y): max over `|min(y_i, W_ii λ_i)|`, or `|y_i|` for free rows.
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
         let miss = |i: usize| {

@@ -3,6 +3,7 @@
 use contact_dynamics::corrector::Parts;
 use contact_dynamics::{Composite, Corrector, Newmark, PersistencyCorrection, TimeIntegrator};
 use contact_dynamics_scenes::measure::{Figures, figures};
+use contact_dynamics_scenes::schemes::bathe;
 use contact_dynamics_scenes::{Bars, record};
 
 const H: f64 = 1e-3;
@@ -12,12 +13,14 @@ const UNTIL: f64 = 0.4;
 enum Scheme {
     Newmark,
     Composite,
+    Bathe,
 }
 
 fn integrator(scheme: Scheme) -> Box<dyn TimeIntegrator> {
     match scheme {
         Scheme::Newmark => Box::new(Newmark::trapezoidal()),
         Scheme::Composite => Box::new(Composite),
+        Scheme::Bathe => Box::new(bathe()),
     }
 }
 
@@ -64,7 +67,7 @@ struct Expected {
 }
 
 fn table() -> Vec<Expected> {
-    use Scheme::{Composite as C, Newmark as N};
+    use Scheme::{Bathe as B, Composite as C, Newmark as N};
     let velocity = PAPER.parts(Parts::Velocity);
     let row = |n, scheme, correction, phase_0, worst| Expected { n, scheme, correction, phase_0, worst };
     vec![
@@ -83,6 +86,9 @@ fn table() -> Vec<Expected> {
         row(20, N, Some(PAPER), [0.122, 1.10, 0.975], None),
         row(50, N, Some(PAPER), [0.076, 1.12, 0.990], None),
         row(100, N, Some(PAPER), [0.058, 1.17, 0.995], None),
+        row(20, B, Some(PAPER), [0.122, 1.09, 0.975], None),
+        row(50, B, Some(PAPER), [0.074, 1.10, 0.988], None),
+        row(100, B, Some(PAPER), [0.052, 1.13, 0.990], None),
     ]
 }
 
