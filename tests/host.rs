@@ -1,14 +1,16 @@
 //! A host's own parts behind every trait, chosen at run time, in both precisions.
 
-use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw};
+use contact_dynamics::contact::{Candidates, ContactConstraint, ContactJacobian, ContactLaw};
 use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
 use contact_dynamics::corrector::Correction;
-use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::faer::sparse::{
+    SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet,
+};
 use contact_dynamics::observer::{ContactRecorder, DofRecorder};
 use contact_dynamics::{
     ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, Damping, Error, Factorization,
-    LinearSolver, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation, StepView, System,
-    TangentWeights, TimeIntegrator,
+    LinearSolver, LinearSystem, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation,
+    StepView, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use std::sync::Arc;
@@ -86,13 +88,13 @@ impl<T: Real> ContactConstraint<T> for Floor {
         assert_eq!(dofs, 1);
         Ok(())
     }
-    fn search(&mut self, _: f64, u: &[T], _: &[T]) -> Result<contact_dynamics::contact::Candidates> {
+    fn search(&mut self, _: f64, u: &[T], _: &[T]) -> Result<Candidates> {
         let near = u[0].value() < -0.5 * self.depth;
         let changed = near != self.near;
         self.near = near;
         Ok(match changed {
-            true => contact_dynamics::contact::Candidates::Changed,
-            false => contact_dynamics::contact::Candidates::Unchanged,
+            true => Candidates::Changed,
+            false => Candidates::Unchanged,
         })
     }
     fn candidates(&self) -> usize {
@@ -314,4 +316,122 @@ fn time_is_counted_not_summed() {
     run.run_until(0.9, &mut ()).unwrap();
     assert_eq!(run.time().to_bits(), (900.0_f64 * 1e-3).to_bits());
     assert_eq!(run.statistics().steps, 900);
+}
+
+/// Floors under two masses; a mass has a candidate only near its floor, so that the places in the list change.
+struct Floors {
+    depths: [f64; 2],
+    near: [bool; 2],
+}
+
+impl Floors {
+    fn rows(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..2).filter(|&mass| self.near[mass])
+    }
+}
+
+impl ContactConstraint<f64> for Floors {
+    fn max_candidates(&self) -> usize {
+        2
+    }
+    fn max_entries(&self) -> usize {
+        2
+    }
+    fn check(&self, _: usize) -> Result<()> {
+        Ok(())
+    }
+    fn search(&mut self, _: f64, u: &[f64], _: &[f64]) -> Result<Candidates> {
+        let near = [0, 1].map(|mass| u[mass] < 0.3 - self.depths[mass]);
+        let found = if near == self.near { Candidates::Unchanged } else { Candidates::Changed };
+        self.near = near;
+        Ok(found)
+    }
+    fn candidates(&self) -> usize {
+        self.rows().count()
+    }
+    fn identity(&self, row: usize) -> (usize, usize) {
+        (self.rows().nth(row).unwrap(), 0)
+    }
+    fn law(&self, _: usize) -> ContactLaw {
+        ContactLaw::Rigid
+    }
+    fn jacobian(&self, out: &mut ContactJacobian<f64>) {
+        self.rows().for_each(|mass| out.push(&[(mass, 1.0)]));
+    }
+    fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
+        for (mass, gap) in self.rows().zip(out) {
+            *gap = u[mass] + self.depths[mass];
+        }
+    }
+}
+
+/// A constraint without rows whose search fails when it is told to.
+struct Moody(Arc<AtomicUsize>);
+
+impl ContactConstraint<f64> for Moody {
+    fn max_candidates(&self) -> usize {
+        0
+    }
+    fn max_entries(&self) -> usize {
+        0
+    }
+    fn check(&self, _: usize) -> Result<()> {
+        Ok(())
+    }
+    fn search(&mut self, _: f64, _: &[f64], _: &[f64]) -> Result<Candidates> {
+        match self.0.load(Ordering::Relaxed) {
+            0 => Ok(Candidates::Unchanged),
+            _ => Err(Error::Host { callback: "search", source: "moody".into() }),
+        }
+    }
+    fn candidates(&self) -> usize {
+        0
+    }
+    fn identity(&self, _: usize) -> (usize, usize) {
+        (0, 0)
+    }
+    fn law(&self, _: usize) -> ContactLaw {
+        ContactLaw::Rigid
+    }
+    fn jacobian(&self, _: &mut ContactJacobian<f64>) {}
+    fn gap(&mut self, _: f64, _: &[f64], _: &mut [f64]) {}
+}
+
+#[test]
+fn multipliers_and_flags_follow_their_contact_through_the_list() {
+    // Mass 1 lands at t = 0.32, mass 0 at 0.45 under g = 10: its candidate comes in before that of mass 1.
+    let broken = Arc::new(AtomicUsize::new(0));
+    let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
+    let system =
+        LinearSystem::lumped(vec![1.0, 2.0], k).unwrap().load(|_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -20.0]));
+    let mut run = Simulation::builder(system, Composite, 1e-3)
+        .constraint(Floors { depths: [1.0, 0.5], near: [false; 2] })
+        .constraint(Moody(broken.clone()))
+        .corrector(PersistencyCorrection::with_history_projection())
+        .build()
+        .unwrap();
+    let mut seen = Vec::new();
+    while run.time() < 0.6 {
+        // Every third search fails after the floors have looked: what they found must not be lost.
+        if run.statistics().steps % 3 == 0 {
+            broken.store(1, Ordering::Relaxed);
+            let before = run.state().clone();
+            assert!(matches!(run.step(), Err(Error::Host { callback: "search", .. })));
+            assert_eq!(&before, run.state());
+            broken.store(0, Ordering::Relaxed);
+        }
+        run.step().unwrap();
+        seen.push(run.state().contacts().ids().iter().map(|id| id.feature).collect::<Vec<_>>());
+        // Once it has landed, mass 1 carries its weight at every step, whoever joins the list.
+        if run.time() > 0.33 {
+            let contacts = run.state().contacts();
+            let row = contacts.ids().iter().position(|id| id.feature == 1).unwrap();
+            assert!(contacts.closed()[row] && (contacts.forces()[row] - 20.0).abs() < 1e-8, "{contacts:?}");
+        }
+    }
+    seen.dedup();
+    assert_eq!(seen, [vec![], vec![1], vec![0, 1]]);
+    assert_eq!(run.statistics().contact_changes, 2);
+    assert!((run.state().contacts().forces()[0] - 10.0).abs() < 1e-8);
 }

@@ -117,6 +117,8 @@ fn bar_between_support_and_stop_rests_with_the_static_forces() {
                 .build()
                 .unwrap();
             assert_relative_eq!(run.state().contacts().forces()[0], stop, max_relative = 1e-11);
+            assert_relative_eq!(run.state().contacts().raw_forces()[0], stop, max_relative = 1e-11);
+            assert!(run.state().contacts().closed()[0]);
             run.run_until(2.0, &mut ()).unwrap();
             assert_relative_eq!(run.state().contacts().forces()[0], stop, max_relative = 1e-9);
             // The support carries the rest of the load.
@@ -217,5 +219,61 @@ fn equality_row_is_a_support_by_multiplier() {
         }
         let reaction = fixed.reactions().unwrap()[0];
         assert_relative_eq!(reaction, tied.state().contacts().forces()[0], max_relative = 1e-8);
+    }
+}
+
+#[test]
+fn a_driven_dof_is_a_moving_obstacle() {
+    // A bar flies against a heavy slide that is driven toward it; once as a dof of the system, once as a moving gap.
+    let (n, k, m) = (8, 300.0, 0.4);
+    let path = |t: f64| [0.3 - 0.4 * t + 0.1 * t * t, -0.4 + 0.2 * t, 0.2];
+    for scheme in SCHEMES {
+        for kind in [Kind::Lumped, Kind::Consistent] {
+            // The slide is one element away from nothing: dofs n + 1 and n + 2 belong to it, n + 1 is driven.
+            let with_slide = |diagonal: f64, off: f64, slide: [f64; 2]| {
+                let mut triplets = Vec::new();
+                for e in 0..n {
+                    for (i, j, x) in [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)] {
+                        triplets.push(Triplet::new(i, j, x));
+                    }
+                }
+                let (p, q) = (n + 1, n + 2);
+                for (i, j, x) in [(p, p, slide[0]), (q, q, slide[0]), (p, q, slide[1]), (q, p, slide[1])] {
+                    triplets.push(Triplet::new(i, j, x));
+                }
+                SparseColMat::<usize, f64>::try_new_from_triplets(n + 3, n + 3, &triplets).unwrap()
+            };
+            let mass = match kind {
+                Kind::Lumped => with_slide(m / 2.0, 0.0, [5.0, 0.0]),
+                Kind::Consistent => with_slide(m / 3.0, m / 6.0, [5.0, 2.0]),
+            };
+            let system = LinearSystem::new(mass, with_slide(k, -k, [70.0, -70.0])).unwrap().drive(n + 1, path).unwrap();
+            let mut velocity = vec![0.5; n + 3];
+            (velocity[n + 1], velocity[n + 2]) = (-0.4, -0.4);
+            let mut as_dof = Simulation::builder(system, scheme(), 2e-3)
+                .velocity(velocity)
+                .constraint(LinearRows::new().unilateral(&[(n, -1.0), (n + 1, 1.0)], 0.0))
+                .corrector(PersistencyCorrection::with_history_projection())
+                .build()
+                .unwrap();
+            let mut as_gap = Simulation::builder(bar(n, k, m, kind), scheme(), 2e-3)
+                .velocity(vec![0.5; n + 1])
+                .constraint(LinearRows::new().unilateral(&[(n, -1.0)], GapOffset::moving(path)))
+                .corrector(PersistencyCorrection::with_history_projection())
+                .build()
+                .unwrap();
+            for step in 0..500 {
+                as_dof.step().unwrap();
+                as_gap.step().unwrap();
+                let t = as_dof.time();
+                assert_relative_eq!(as_dof.state().displacement()[n + 1], path(t)[0], max_relative = 1e-13);
+                for (x, y) in as_dof.state().displacement()[..=n].iter().zip(as_gap.state().displacement()) {
+                    assert_relative_eq!(x, y, epsilon = 1e-9);
+                }
+                let (x, y) = (as_dof.state().contacts().forces()[0], as_gap.state().contacts().forces()[0]);
+                assert!((x - y).abs() < 1e-6 * (1.0 + y.abs()), "{}, {kind:?}, step {step}: {x} {y}", scheme().name());
+            }
+            assert!(as_gap.statistics().contact_solves > 5, "the impact is part of the run");
+        }
     }
 }
