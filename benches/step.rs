@@ -1,7 +1,7 @@
 //! Cost of a step of the two-bar scene beside the bare triangular solve and the bare K product, in one run.
 //!
-//! `cargo bench --bench step` prints medians in microseconds and ratios. The machine may be shared: the samples of all rows
-//! are interleaved, and only ratios within one run mean something elsewhere.
+//! `cargo bench --bench step` prints medians in microseconds and ratios. The machine may be shared: the samples of all
+//! rows are interleaved, and only ratios within one run mean something elsewhere.
 
 use contact_dynamics::faer::dyn_stack::{MemBuffer, MemStack};
 use contact_dynamics::faer::linalg::cholesky::ldlt::factor::LdltRegularization;

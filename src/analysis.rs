@@ -6,8 +6,8 @@
 use crate::tableau::Tableau;
 use faer::{Mat, c64};
 
-/// The amplification matrix of one step: (U, V, A) of the newest state, of the one before, … to the same after the step, with
-/// U = u, V = h v, A = h² a.
+/// The amplification matrix of one step: (U, V, A) of the newest state, of the one before, … to the same after the
+/// step, with U = u, V = h v, A = h² a.
 ///
 /// ```
 /// use contact_dynamics::{Newmark, TimeIntegrator, analysis};
@@ -41,11 +41,11 @@ pub fn spectral_radius(tableau: &Tableau, omega: f64, xi: f64) -> f64 {
     moduli.fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
 }
 
-/// Relative elongation of the (damped) period and damping ratio of the principal root at `h_over_period` = h/T, for ξ of the
-/// equation. `None` if the principal roots are real (no oscillation is left).
+/// Relative elongation of the (damped) period and damping ratio of the principal root at `h_over_period` = h/T, for ξ
+/// of the equation. `None` if the principal roots are real (no oscillation is left).
 ///
-/// The damping ratio is −ln|root| over the angle of the root, as the literature tabulates it: numerical and physical damping
-/// together, ξ/√(1 − ξ²) for an exact scheme.
+/// The damping ratio is −ln|root| over the angle of the root, as the literature tabulates it: numerical and physical
+/// damping together, ξ/√(1 − ξ²) for an exact scheme.
 pub fn period_and_damping(tableau: &Tableau, h_over_period: f64, xi: f64) -> Option<(f64, f64)> {
     let omega = 2.0 * std::f64::consts::PI * h_over_period;
     // The principal root is the complex one nearest to the exact exp(−ξΩ ± i Ω√(1 − ξ²)).

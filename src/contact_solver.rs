@@ -17,8 +17,8 @@ pub enum Bound {
 
 /// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
 ///
-/// W is the Delassus operator (symmetric, positive definite on independent rows). y has the unit of a gap, and so have the
-/// tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
+/// W is the Delassus operator (symmetric, positive definite on independent rows). y has the unit of a gap, and so have
+/// the tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactProblem<'a, T> {
     /// W, column-major, size × size.
@@ -53,7 +53,8 @@ impl<T: Real> ContactProblem<'_, T> {
         self.tolerance[i] + T::of(32.0) * T::epsilon() * (self.offset[i].abs() + terms.sum::<T>())
     }
 
-    /// The row that misses complementarity most, and by how much (unit of y): max over `|min(y_i, W_ii λ_i)|`, or `|y_i|` for free rows.
+    /// The row that misses complementarity most, and by how much (unit of y): max over `|min(y_i, W_ii λ_i)|`, or
+    /// `|y_i|` for free rows.
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
         let miss = |i: usize| {
             let y = self.gap(i, multipliers);
@@ -107,8 +108,8 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
     /// Reserves memory for problems of up to `size` rows, so that [`solve`](Self::solve) does not allocate.
     fn reserve(&mut self, size: usize);
 
-    /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are taken as active first) and the solution on exit.
-    /// The guess may change the work, never the result beyond rounding. Returns the number of iterations.
+    /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are taken as active first) and the solution on
+    /// exit. The guess may change the work, never the result beyond rounding. Returns the number of iterations.
     ///
     /// # Errors
     ///

@@ -48,7 +48,8 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`](crate::Error::DependentContacts), [`Error::Contact`](crate::Error::Contact); the step is then undone.
+    /// [`Error::DependentContacts`](crate::Error::DependentContacts), [`Error::Contact`](crate::Error::Contact); the
+    /// step is then undone.
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()>;
 }
 

@@ -32,8 +32,8 @@ pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Incompatible`](crate::Error::Incompatible) for a pattern the solver cannot
-    /// handle.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Incompatible`](crate::Error::Incompatible) for a
+    /// pattern the solver cannot handle.
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>>;
 }
 
@@ -49,7 +49,8 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::Singular`](crate::Error::Singular) with the failing dof; the factorization is then unusable until the next success.
+    /// [`Error::Singular`](crate::Error::Singular) with the failing dof; the factorization is then unusable until the
+    /// next success.
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()>;
 
     /// Solves in place; `rhs` holds one or more columns of the system's size, one after the other.

@@ -159,7 +159,8 @@ pub(crate) mod kernels {
             let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
             return Err(original(index.saturating_sub(base)));
         }
-        // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of rounding.
+        // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
+        // rounding.
         match symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(raw) => {
                 for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
@@ -183,8 +184,8 @@ pub(crate) mod kernels {
 
     /// Permute, sweep forward, divide, sweep backward, permute back.
     ///
-    /// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory takes
-    /// longer than the arithmetic.
+    /// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through
+    /// memory takes longer than the arithmetic.
     #[inline]
     fn simplicial_solve<T: Real>(factor: &Simplicial<'_, T>, rhs: &mut [T], x: &mut [T]) {
         let Simplicial { pointers, rows, values, order } = *factor;

@@ -197,7 +197,8 @@ impl<'a, T: Real> Simulation<'a, T> {
         &*self.system
     }
 
-    /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme conserves.
+    /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme
+    /// conserves.
     ///
     /// # Errors
     ///

@@ -48,7 +48,8 @@ pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<
             worst = (difference, Some((row, column, value, mirrored)));
         }
     };
-    // Entries below the diagonal meet those of the upper triangle in ascending order: one cursor a column finds the partners.
+    // Entries below the diagonal meet those of the upper triangle in ascending order: one cursor a column finds the
+    // partners.
     let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
     let mut cursor: Vec<usize> = pointers[..n].to_vec();
     for column in 0..n {
@@ -91,8 +92,8 @@ pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, colum
     rows.binary_search(&row).map_or(T::zero(), |at| a.val_of_col(column)[at])
 }
 
-/// A fixed pattern that holds weighted sums of several symmetric matrices, with rows and columns of some dofs replaced by
-/// those of the identity; entries are moved by precomputed slots.
+/// A fixed pattern that holds weighted sums of several symmetric matrices, with rows and columns of some dofs replaced
+/// by those of the identity; entries are moved by precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {
     pattern: SymbolicSparseColMat<usize>,

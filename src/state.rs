@@ -31,8 +31,8 @@ impl<T: Real> Motion<T> {
 
 /// The state of a simulation at a time: motion and contacts.
 ///
-/// Together with [`History`] it is everything a later step reads: continue from clones of both and the run goes on bit for
-/// bit.
+/// Together with [`History`] it is everything a later step reads: continue from clones of both and the run goes on bit
+/// for bit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<T> {
     pub(crate) motion: Motion<T>,
@@ -156,7 +156,8 @@ impl<T: Real> ContactState<T> {
         &self.impulse
     }
 
-    /// The paper's λ_v of the last correction (momentum, kg m/s): it corrected the acceleration; zero without correction.
+    /// The paper's λ_v of the last correction (momentum, kg m/s): it corrected the acceleration; zero without
+    /// correction.
     pub fn lambda_v(&self) -> &[T] {
         &self.lambda_v
     }
@@ -193,8 +194,8 @@ impl<T: Real> History<T> {
         self.known <= 1
     }
 
-    /// Displacement, velocity and acceleration of past state k = 1 (the one before the current), 2, …, as later steps read
-    /// them: after a history projection they differ from what an observer saw.
+    /// Displacement, velocity and acceleration of past state k = 1 (the one before the current), 2, …, as later steps
+    /// read them: after a history projection they differ from what an observer saw.
     pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
         let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
         Some((&motion.u, &motion.v, &motion.a))

@@ -30,8 +30,9 @@ pub enum Damping {
 /// A mechanical system `M a = f(t, u, v) + Gᵀ λ`, with f the external minus the internal force.
 ///
 /// Vectors have full length, supports included; the solver reads prescribed dofs from [`prescribed`](Self::prescribed)
-/// and never solves for them. In this version f is affine in u and v (constant K and C). Evaluations are pure: they may use
-/// scratch, but two calls with the same arguments give the same result; only [`commit`](Self::commit) moves history.
+/// and never solves for them. In this version f is affine in u and v (constant K and C). Evaluations are pure: they may
+/// use scratch, but two calls with the same arguments give the same result; only [`commit`](Self::commit) moves
+/// history.
 ///
 /// `&mut S` is a system too, so a host lends its model. Most hosts have matrices and take [`LinearSystem`].
 pub trait System<T: Real>: Send {

@@ -198,8 +198,8 @@ impl Stage {
 
 /// A time-integration scheme as data: its stages.
 ///
-/// u, v and a of the last stage are the state at the end of the step. Schemes whose stored velocity lives elsewhere (half-step
-/// velocities of explicit schemes) are not covered by this version.
+/// u, v and a of the last stage are the state at the end of the step. Schemes whose stored velocity lives elsewhere
+/// (half-step velocities of explicit schemes) are not covered by this version.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tableau {
     /// Stages in the order in which they are solved.
@@ -222,8 +222,8 @@ impl Tableau {
     ///
     /// # Errors
     ///
-    /// [`Error::Tableau`] names the stage and what is wrong: no stage, a coefficient that is not finite, an acceleration
-    /// row without the unknown, or a last stage that does not end at the end of the step.
+    /// [`Error::Tableau`] names the stage and what is wrong: no stage, a coefficient that is not finite, an
+    /// acceleration row without the unknown, or a last stage that does not end at the end of the step.
     pub fn check(&self, integrator: &str) -> Result<()> {
         let refuse = |stage, reason| Err(Error::Tableau { integrator: integrator.to_owned(), stage, reason });
         for (s, stage) in self.stages.iter().enumerate() {
@@ -275,8 +275,8 @@ impl Tableau {
             mark(stage, &|k| k.checked_sub(later - s - 1));
         }
         for (next, stage) in self.stages.iter().enumerate() {
-            // State k of the next step's stage `next`: its own stages first, then the newest state, then the past of t_n,
-            // which after stage s lies behind the s + 1 states of this step.
+            // State k of the next step's stage `next`: its own stages first, then the newest state, then the past of
+            // t_n, which after stage s lies behind the s + 1 states of this step.
             let place = |k: usize| match k.checked_sub(next) {
                 None => None,
                 Some(0) => (s + 1 == stages).then_some(0),
@@ -335,8 +335,8 @@ impl Tableau {
 /// The linear functional of the past that is the momentum of a scheme, and what each stage's multiplier adds to it.
 ///
 /// ψ is the left eigenvector for the eigenvalue 1 of the step at K = C = 0, scaled so that free flight with velocity V
-/// gives V: momentum = 1ᵀ M ψ·(past)/h. A raw multiplier λ of stage s changes it by `h β_s λ`; an edit of the state or of
-/// the past by M ψ·(edit)/h.
+/// gives V: momentum = 1ᵀ M ψ·(past)/h. A raw multiplier λ of stage s changes it by `h β_s λ`; an edit of the state or
+/// of the past by M ψ·(edit)/h.
 ///
 /// ```
 /// use contact_dynamics::{Composite, TimeIntegrator};
@@ -402,8 +402,8 @@ impl Momentum {
         kept
     }
 
-    /// The covectors while the past is still being built by steps of `start` (one stage): entry m − 1 is the one for m known states.
-    /// Steps of the start conserve them in turn, and the last one is [`after_step`](Self::after_step).
+    /// The covectors while the past is still being built by steps of `start` (one stage): entry m − 1 is the one for m
+    /// known states. Steps of the start conserve them in turn, and the last one is [`after_step`](Self::after_step).
     pub(crate) fn during_start(&self, start: &Stage) -> Vec<Vec<[f64; 3]>> {
         let mut covectors = vec![self.after_step()];
         while covectors[covectors.len() - 1].len() > 1 {

@@ -162,7 +162,8 @@ fn without_history_projection_contact_is_lost_after_an_early_impact() {
 
 #[test]
 fn rows_that_share_a_body_are_projected_together() {
-    // Three free masses in a row, all gaps closing in the same step: one common velocity, total momentum over total mass.
+    // Three free masses in a row, all gaps closing in the same step: one common velocity, total momentum over total
+    // mass.
     let masses = [2.0, 0.5, 3.0];
     let velocity = [1.0, 0.3, -0.9];
     let common = masses.iter().zip(velocity).map(|(m, v)| m * v).sum::<f64>() / 5.5;
@@ -195,8 +196,8 @@ fn rows_that_share_a_body_are_projected_together() {
 
 #[test]
 fn several_rows_at_one_node_stop_it_in_a_corner() {
-    // A node with two dofs flies into an acute corner of two oblique walls: both rows share both dofs, and what stops it at one
-    // wall presses it against the other.
+    // A node with two dofs flies into an acute corner of two oblique walls: both rows share both dofs, and what stops
+    // it at one wall presses it against the other.
     let mut run = Simulation::builder(free(&[1.5, 1.5]), Composite, 0.01)
         .velocity(vec![-1.0, 0.2])
         .constraint(LinearRows::new().unilateral(&[(0, 0.8), (1, 0.6)], 0.3).unilateral(&[(0, 0.28), (1, -0.96)], 0.2))
@@ -343,7 +344,8 @@ fn an_impact_on_a_grid_point_belongs_to_that_step() {
 
 #[test]
 fn reported_force_of_a_generalized_scheme_balances_its_own_rows() {
-    // Chung and Hulbert: M ā + K ū = Gᵀ p' at the balance rows, with the corrected acceleration in ā; the factor is 1 − α_m.
+    // Chung and Hulbert: M ā + K ū = Gᵀ p' at the balance rows, with the corrected acceleration in ā; the factor is 1 −
+    // α_m.
     use contact_dynamics_scenes::schemes::chung_hulbert;
     for rho in [0.0, 0.8, 1.0] {
         let (am, af) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
@@ -376,8 +378,8 @@ fn reported_force_of_a_generalized_scheme_balances_its_own_rows() {
 
 #[test]
 fn a_touching_row_is_not_held_back_by_an_impact_elsewhere() {
-    // A node slides along the floor (touching, no pressure) and meets an oblique wall on a grid point: the wall throws it off the
-    // floor with 0.6 of its normal velocity along (0.6, 0.8); holding the floor's gap would be adhesion.
+    // A node slides along the floor (touching, no pressure) and meets an oblique wall on a grid point: the wall throws
+    // it off the floor with 0.6 of its normal velocity along (0.6, 0.8); holding the floor's gap would be adhesion.
     let h = 1.0 / 64.0;
     for scheme in [true, false] {
         let integrator: Box<dyn TimeIntegrator> =

@@ -28,8 +28,8 @@ fn trapezoidal_rule_conserves_the_energy_of_free_vibration() {
 
 #[test]
 fn corrections_take_exactly_the_energy_of_the_velocity_jump() {
-    // Impact at the fraction θ of a step: closing the gap leaves the trapezoidal rule with the closing speed (2θ − 1) V at its end,
-    // and the correction takes ½ m_c of its square; with what the raw multiplier took, ½ m_c V² is lost.
+    // Impact at the fraction θ of a step: closing the gap leaves the trapezoidal rule with the closing speed (2θ − 1) V
+    // at its end, and the correction takes ½ m_c of its square; with what the raw multiplier took, ½ m_c V² is lost.
     for (mass, loss) in [(MassKind::Lumped, 0.5 / 50.0), (MassKind::Consistent, 0.288_675 / 50.0)] {
         for theta in [0.1, 0.35, 0.5, 0.8] {
             let bars = Bars::paper(50).delayed(theta, 1e-5).with_mass(mass);

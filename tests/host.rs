@@ -435,3 +435,28 @@ fn multipliers_and_flags_follow_their_contact_through_the_list() {
     assert_eq!(run.statistics().contact_changes, 2);
     assert!((run.state().contacts().forces()[0] - 10.0).abs() < 1e-8);
 }
+
+#[test]
+fn a_corrector_that_hides_its_edits_is_refused() {
+    #[derive(Debug)]
+    struct Sly;
+    impl Corrector<f64> for Sly {
+        fn name(&self) -> String {
+            "sly".into()
+        }
+        fn correct(&self, step: &mut Correction<'_, f64>) -> Result<()> {
+            step.solve_velocity_jumps()?;
+            step.project_past()
+        }
+    }
+    let bars = Bars::paper(10);
+    let mut run = Simulation::builder(bars.system::<f64>(), Composite, 1e-3)
+        .velocity(bars.velocities())
+        .constraint(bars.contact())
+        .corrector(Sly)
+        .build()
+        .unwrap();
+    let error = run.run_until(0.2, &mut ()).unwrap_err();
+    assert!(matches!(error, Error::Incompatible { .. }), "{error}");
+    assert!((run.time() - 0.1).abs() < 2e-3);
+}

@@ -1,4 +1,5 @@
-//! Linear solvers on every kind of factor: chains, arrows, grids (simplicial and supernodal), dense blocks; both precisions.
+//! Linear solvers on every kind of factor: chains, arrows, grids (simplicial and supernodal), dense blocks; both
+//! precisions.
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{Automatic, Cholesky, Diagonal, Error, LinearSolver, Real};

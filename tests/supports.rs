@@ -36,8 +36,8 @@ fn bar(n: usize, k: f64, m: f64, kind: Kind) -> LinearSystem<'static, f64> {
     LinearSystem::new(mass, assemble(k, -k)).unwrap()
 }
 
-/// Steady vibration of a bar whose left end is driven by U sin ωt: u_j = U cos κ(n−j)/cos κn sin ωt solves the semi-discrete
-/// equations exactly. Errors of u, v, a and of the driving force at the end of the run.
+/// Steady vibration of a bar whose left end is driven by U sin ωt: u_j = U cos κ(n−j)/cos κn sin ωt solves the
+/// semi-discrete equations exactly. Errors of u, v, a and of the driving force at the end of the run.
 fn driven_bar_error(scheme: Scheme, kind: Kind, steps: u32) -> [f64; 4] {
     let (n, k, m, amplitude, omega) = (12, 500.0, 0.2, 0.03, 9.0);
     let cosine: f64 = match kind {
@@ -132,7 +132,8 @@ fn bar_between_support_and_stop_rests_with_the_static_forces() {
 
 #[test]
 fn bar_pushed_against_a_stop_shows_the_staircase_of_forces() {
-    // The left end starts with velocity V: (2j + 1) ZV at the drive in [2jT, 2(j+1)T], 2j ZV at the stop in [(2j−1)T, (2j+1)T].
+    // The left end starts with velocity V: (2j + 1) ZV at the drive in [2jT, 2(j+1)T], 2j ZV at the stop in [(2j−1)T,
+    // (2j+1)T].
     let (n, velocity) = (100, 0.02);
     let (k, m) = (100.0 * n as f64, 1.0 / n as f64); // EA = 100, ρA = 1, L = 1: c = 10, Z = 10
     let (travel, force) = (0.1, 10.0 * velocity);
@@ -155,7 +156,8 @@ fn bar_pushed_against_a_stop_shows_the_staircase_of_forces() {
         }
         for j in 0..4 {
             let expected = (2 * j + 1) as f64 * force;
-            // The jump of the driven velocity at t = 0 meets the half mass of the first node: an impulse that no force shows.
+            // The jump of the driven velocity at t = 0 meets the half mass of the first node: an impulse that no force
+            // shows.
             let node = if j == 0 { 0.5 * m * velocity / (400.0 * h) } else { 0.0 };
             assert!((drive[j] + node - expected).abs() < 0.03 * expected, "{}: drive {drive:?}", scheme().name());
         }

@@ -57,7 +57,8 @@ fn best(figures: &[Figures], f: impl Fn(&Figures) -> f64) -> f64 {
     figures.iter().map(f).fold(f64::MAX, f64::min)
 }
 
-/// Figures of the prototypes at phase 0: (force RMS, max, energy), and worst force RMS and lowest energy of a phase sweep.
+/// Figures of the prototypes at phase 0: (force RMS, max, energy), and worst force RMS and lowest energy of a phase
+/// sweep.
 struct Expected {
     n: usize,
     scheme: Scheme,
@@ -120,7 +121,8 @@ fn figures_at_other_phases_stay_inside_the_sweep_bounds() {
 
 #[test]
 fn corrected_forces_are_bounded_at_every_phase() {
-    // H1: force RMS ≤ .15 / .11 / .10, max ≤ 1.15 F0 (1.2 at n = 100), no force outside the contact interval, momentum 1e-10.
+    // H1: force RMS ≤ .15 / .11 / .10, max ≤ 1.15 F0 (1.2 at n = 100), no force outside the contact interval, momentum
+    // 1e-10.
     for (n, rms, max) in [(20, 0.15, 1.15), (50, 0.11, 1.15), (100, 0.10, 1.2)] {
         for scheme in [Scheme::Composite, Scheme::Newmark] {
             for phase in std::iter::once(0.0).chain(phases()) {

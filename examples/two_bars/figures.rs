@@ -117,8 +117,8 @@ fn time_axis() -> Axis {
     Axis { label: "time (s)", range: 0.0..END, ticks: vec![0.0, 0.1, 0.2, 0.3, 0.4] }
 }
 
-/// A panel of contact forces with ticks at halves or multiples of the exact force; says how high the curves reach if the axis
-/// cuts them off.
+/// A panel of contact forces with ticks at halves or multiples of the exact force; says how high the curves reach if
+/// the axis cuts them off.
 fn force_panel(experiment: &Experiment, title: String, curves: Vec<Curve>) -> Panel {
     let plateau = 1e3 * experiment.plateau();
     let peak = curves.iter().flat_map(Curve::values).fold(0.0, f64::max) / plateau;

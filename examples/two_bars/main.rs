@@ -5,8 +5,9 @@
 //! cargo run --release --example two_bars -- --help  # options
 //! ```
 //!
-//! Prints how well each integrator reproduces the exact solution without correction, with the persistency correction, and with
-//! the correction and the projection of the past. Writes the same table, figures and time histories to `output/two_bars/`.
+//! Prints how well each integrator reproduces the exact solution without correction, with the persistency correction,
+//! and with the correction and the projection of the past. Writes the same table, figures and time histories to
+//! `output/two_bars/`.
 //!
 //! `experiment.rs` shows how the library is used; the other modules only present the results.
 #![allow(clippy::print_stdout)] // A table on the terminal is what this program is for.

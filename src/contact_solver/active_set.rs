@@ -6,10 +6,10 @@ use crate::real::Real;
 
 /// Primal–dual active set (semismooth Newton) on the dense Delassus operator, safeguarded by Murty's least-index rule.
 ///
-/// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain, this can
-/// cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go on only while
-/// the number of violations falls, otherwise a single row, the last one, is exchanged until it falls again. That is finite for
-/// every positive definite W. Steady contact takes one iteration.
+/// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
+/// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
+/// on only while the number of violations falls, otherwise a single row, the last one, is exchanged until it falls
+/// again. That is finite for every positive definite W. Steady contact takes one iteration.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     factor: DenseCholesky<T>,

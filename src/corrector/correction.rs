@@ -1,4 +1,5 @@
-//! What a corrector works with: the jumps of a stage, the projection that removes them, and the books on impulse and energy.
+//! What a corrector works with: the jumps of a stage, the projection that removes them, and the books on impulse and
+//! energy.
 
 use super::JumpProjection;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
@@ -10,9 +11,10 @@ use crate::system::{Damping, System};
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
 ///
-/// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw multiplier
-/// positive, or equality rows) and those that touch and approach; a row that touches and separates is left alone. Every edit is booked as
-/// an impulse of its contact, so that Σ h β p + Σ J is the change of momentum to rounding.
+/// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw
+/// multiplier positive, or equality rows) and those that touch and approach; a row that touches and separates is left
+/// alone. Every edit is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of momentum to
+/// rounding.
 #[derive(Debug)]
 pub struct Correction<'a, T: Real> {
     pub(crate) h: f64,
@@ -98,6 +100,17 @@ impl<T: Real> Backup<T> {
     /// Forgets the copy: the step begins.
     pub(crate) fn begin(&mut self) {
         (self.rotations, self.kept) = (0, None);
+    }
+
+    /// Refuses edits that could not be undone.
+    fn check(&self) -> Result<()> {
+        match self.slots.is_empty() {
+            false => Ok(()),
+            true => Err(Error::Incompatible {
+                part: "a corrector that projects the past".into(),
+                reason: "its `edits` does not say so, and no room was kept to undo a failed step",
+            }),
+        }
     }
 
     fn keep(&mut self, past: &[Motion<T>]) {
@@ -212,7 +225,8 @@ impl<T: Real> Correction<'_, T> {
         self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row) == ContactLaw::Equality
     }
 
-    /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching rows), and the engaged rows.
+    /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching
+    /// rows), and the engaged rows.
     ///
     /// # Errors
     ///
@@ -260,7 +274,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping forces to a.
+    /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping
+    /// forces to a.
     pub fn push_velocity(&mut self) {
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
         let Buffers { closed, impulses, jump, rates, change, damping, .. } = &mut **buffers;
@@ -272,7 +287,8 @@ impl<T: Real> Correction<'_, T> {
             contacts.lambda_a[row] = -T::of(self.h) * impulse;
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
-        // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the obstacle's.
+        // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
+        // obstacle's.
         for ((&row, &impulse), &jump) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
             let (before, after) = (jump - rates[row].rate, g.product(row, &new.v));
             **energy += impulse * T::of(0.5) * (before + after);
@@ -289,7 +305,8 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
-    /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative (touching rows).
+    /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative
+    /// (touching rows).
     ///
     /// # Errors
     ///
@@ -303,7 +320,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported contact force.
+    /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
+    /// contact force.
     pub fn push_acceleration(&mut self) {
         let Self { buffers, contacts, projection, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
@@ -315,16 +333,18 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
-    /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in all past
-    /// values that later rows read (`docs/theory.md`, history projection).
+    /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
+    /// all past values that later rows read (`docs/theory.md`, history projection).
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`].
+    /// [`Error::DependentContacts`]; [`Error::Incompatible`] if the corrector's [`edits`](super::Corrector::edits) is
+    /// not [`Edits::Past`](super::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
         if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
             return Ok(());
         }
+        self.backup.check()?;
         let rows = std::mem::take(&mut self.buffers.engaged);
         let closing = self.projection.close(self.g, &rows).map_err(|row| self.dependent(row));
         // States not known yet, while a multistep scheme is started, have no covector.

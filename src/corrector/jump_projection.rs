@@ -9,13 +9,14 @@ use crate::real::Real;
 
 /// The projection behind the λ_v/λ_a correction, usable on a host's own vectors.
 ///
-/// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the mass norm:
-/// momentum is conserved (rows of G that sum to zero), kinetic energy falls by `½ jumpᵀ S⁻¹ jump`, never rises. For a lumped
-/// mass everything is local to the contact nodes; for a consistent one a factor of M is kept and every dof changes. Rows that
-/// share nodes or dofs are projected together. Prescribed dofs are not moved.
+/// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the mass
+/// norm: momentum is conserved (rows of G that sum to zero), kinetic energy falls by `½ jumpᵀ S⁻¹ jump`, never rises.
+/// For a lumped mass everything is local to the contact nodes; for a consistent one a factor of M is kept and every dof
+/// changes. Rows that share nodes or dofs are projected together. Prescribed dofs are not moved.
 ///
-/// The correction of Zhang et al. (Eng. Mech. 40 (Suppl.), 2023, eqs. (12), (13), in the form derived in `docs/theory.md`),
-/// in a loop of one's own, after the contact problem of a step gave u, v, a and the raw multiplier p:
+/// The correction of Zhang et al. (Eng. Mech. 40 (Suppl.), 2023, eqs. (12), (13), in the form derived in
+/// `docs/theory.md`), in a loop of one's own, after the contact problem of a step gave u, v, a and the raw multiplier
+/// p:
 ///
 /// ```
 /// use contact_dynamics::contact::ContactJacobian;
@@ -59,8 +60,8 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is not positive on the free dofs,
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is not positive on the
+    /// free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
@@ -91,7 +92,8 @@ impl<T: Real> JumpProjection<T> {
         self.factored = false;
     }
 
-    /// Chooses the rows of G whose jumps are removed, and factorizes their S. Choosing the same rows again costs nothing.
+    /// Chooses the rows of G whose jumps are removed, and factorizes their S. Choosing the same rows again costs
+    /// nothing.
     ///
     /// # Errors
     ///
@@ -113,8 +115,8 @@ impl<T: Real> JumpProjection<T> {
 
     /// `x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ)` on the closed rows; `multipliers` becomes `S⁻¹ (G x − γ)` of the x given.
     ///
-    /// `target` is γ, the velocity or acceleration of the obstacle along each closed row (zero between bodies). Both slices have
-    /// one entry a closed row, in the order given to [`close`](Self::close).
+    /// `target` is γ, the velocity or acceleration of the obstacle along each closed row (zero between bodies). Both
+    /// slices have one entry a closed row, in the order given to [`close`](Self::close).
     pub fn remove_jump(&self, g: &ContactJacobian<T>, target: &[T], x: &mut [T], multipliers: &mut [T]) {
         for ((multiplier, &row), &target) in multipliers.iter_mut().zip(&self.closed).zip(target) {
             *multiplier = g.product(row, x) - target;

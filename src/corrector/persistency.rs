@@ -26,8 +26,8 @@ pub enum HistoryProjection {
     On,
 }
 
-/// The λ_v/λ_a correction of Zhang, Li, Zhang, Luo and Gao (Eng. Mech. 40 (Suppl.), 2023), for any tableau, any rows of G,
-/// lumped or consistent mass, with damping.
+/// The λ_v/λ_a correction of Zhang, Li, Zhang, Luo and Gao (Eng. Mech. 40 (Suppl.), 2023), for any tableau, any rows of
+/// G, lumped or consistent mass, with damping.
 ///
 /// After the contact problem of a stage, on closed rows, with S = G M⁻¹ Gᵀ and γ the motion of the obstacle:
 ///
@@ -37,13 +37,13 @@ pub enum HistoryProjection {
 /// p' = p − (w_ā/w_a) S⁻¹ (G a − γ_a)
 /// ```
 ///
-/// p' is the reported force; the raw p keeps deciding release. Rows that touch without pressure are corrected on approach only.
-/// Linear momentum is conserved, kinetic energy never rises: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n) of the energy of
-/// two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed contact are projected too;
-/// multistep schemes need it, one-step schemes that read no past ignore it.
+/// p' is the reported force; the raw p keeps deciding release. Rows that touch without pressure are corrected on
+/// approach only. Linear momentum is conserved, kinetic energy never rises: an impact costs ½ jumpᵀ S⁻¹ jump, which is
+/// 1/(2n) of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly
+/// closed contact are projected too; multistep schemes need it, one-step schemes that read no past ignore it.
 ///
-/// Known failure: it cannot restore the energy of the contact nodes' mass, and at release the velocity keeps the overshoot that
-/// any scheme shows there.
+/// Known failure: it cannot restore the energy of the contact nodes' mass, and at release the velocity keeps the
+/// overshoot that any scheme shows there.
 ///
 /// ```
 /// use contact_dynamics::corrector::Parts;

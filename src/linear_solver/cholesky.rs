@@ -15,8 +15,9 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 /// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree.
 ///
 /// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
-/// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst entry. In `f32` fill entries far from the diagonal may
-/// become subnormal and slow a factorization down several times; see `docs/design.md`.
+/// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst
+/// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
+/// see `docs/design.md`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cholesky {}
 

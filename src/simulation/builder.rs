@@ -125,16 +125,16 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with C a step, with
-    /// supports one evaluation of f as well.
+    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with
+    /// C a step, with supports one evaluation of f as well.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
         self.balance = EnergyBalance::On;
         self
     }
 
-    /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit. Initial values
-    /// and start time given elsewhere are ignored.
+    /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit.
+    /// Initial values and start time given elsewhere are ignored.
     #[must_use]
     pub fn resume(mut self, state: State<T>, history: History<T>) -> Self {
         self.resumed = Some((state, history));
@@ -145,8 +145,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// # Errors
     ///
-    /// Any [`Error`] that names a wrong input: sizes, NaN, parameters, masses, supports, contact rows on missing or prescribed dofs,
-    /// duplicated rows, initial penetration, a singular effective matrix, parts that do not fit together.
+    /// Any [`Error`] that names a wrong input: sizes, NaN, parameters, masses, supports, contact rows on missing or
+    /// prescribed dofs, duplicated rows, initial penetration, a singular effective matrix, parts that do not fit
+    /// together.
     pub fn build(self) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         if !(h > 0.0 && h.is_finite()) {

@@ -34,7 +34,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         let rows: usize = parts.iter().map(ContactConstraint::max_candidates).sum();
         let entries = parts.iter().map(ContactConstraint::max_entries).sum();
-        // Asked for once, so that an absurd promise is an error and not an abort: the largest blocks that are reserved later.
+        // Asked for once, so that an absurd promise is an error and not an abort: the largest blocks that are reserved
+        // later.
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);

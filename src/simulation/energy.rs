@@ -24,8 +24,8 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Works done on the system since the start, by the trapezoidal rule over the steps; all but `remainder` are what physics
-/// says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
+/// Works done on the system since the start, by the trapezoidal rule over the steps; all but `remainder` are what
+/// physics says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Works<T> {
     /// Work of the external load.

@@ -13,8 +13,8 @@ use crate::tableau::{MAX_PAST, Row, Rows, Stage, Tableau};
 
 /// One term of a row: coefficient times one field of one past state.
 ///
-/// Displacements of older states (field 0, state ≥ 1) enter as differences from the newest: their coefficients times u would leave
-/// eps u/h in a velocity, the differences are exact.
+/// Displacements of older states (field 0, state ≥ 1) enter as differences from the newest: their coefficients times u
+/// would leave eps u/h in a velocity, the differences are exact.
 #[derive(Clone, Copy, Debug)]
 struct Term<T> {
     c: T,
@@ -49,7 +49,8 @@ impl<T: Real> ScaledRows<T> {
             _ => 1.0 / (h * h),
         };
         let compile = |i: usize, row: Row| {
-            // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own rounding.
+            // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own
+            // rounding.
             let sum: f64 = row.u.iter().sum();
             let size: f64 = row.u.iter().map(|c| c.abs()).sum();
             let nearest = if (sum - sum.round()).abs() <= 8.0 * f64::EPSILON * size { sum.round() } else { sum };
@@ -117,7 +118,8 @@ pub(crate) struct CompiledStage<T> {
     /// Pure z-weights of the acceleration rows, recovery and balance.
     pub(crate) acceleration: f64,
     pub(crate) balance_acceleration: f64,
-    /// Change of (U, V, A) by a unit multiplier on a unit mass, in units of h²: with the covector, the impulse weight β.
+    /// Change of (U, V, A) by a unit multiplier on a unit mass, in units of h²: with the covector, the impulse weight
+    /// β.
     pub(crate) response: [f64; 3],
     /// Momentum covector after the stage.
     pub(crate) covector: Vec<[f64; 3]>,
@@ -201,8 +203,8 @@ impl<T: Real> Compiler<'_, T> {
         self.stages(&tableau.stages, books)
     }
 
-    /// Compiles the one-step scheme that starts a multistep one: what it leaves behind is read by `reader`. Its covectors change from
-    /// step to step and are not part of the program.
+    /// Compiles the one-step scheme that starts a multistep one: what it leaves behind is read by `reader`. Its
+    /// covectors change from step to step and are not part of the program.
     pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
         self.stages(&start.stages, |_| (Vec::new(), reader.read_after(reader.stages.len() - 1)))
     }

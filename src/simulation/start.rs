@@ -113,7 +113,8 @@ fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) ->
     Ok(())
 }
 
-/// Marks closed contacts; returns those at rest. A contact that approaches is left to the first step, one that separates is open.
+/// Marks closed contacts; returns those at rest. A contact that approaches is left to the first step, one that
+/// separates is open.
 fn resting_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,

@@ -16,8 +16,8 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::DependentContacts`], [`Error::Contact`], or what the host's own parts return. State and
-    /// history are then as they were.
+    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::DependentContacts`], [`Error::Contact`], or what
+    /// the host's own parts return. State and history are then as they were.
     pub fn step(&mut self) -> Result<()> {
         if let Some(ledger) = &mut self.ledger {
             ledger.begin(&self.state);
@@ -197,7 +197,8 @@ fn residual<T: Real>(
         system.force(t_balance, &new.u, &new.v, increment)?;
         (&stage.recovery, supports)
     };
-    // ā at d = 0: the past's part on free dofs (none where the balance holds at the recovered state), and the motion of the supports.
+    // ā at d = 0: the past's part on free dofs (none where the balance holds at the recovered state), and the motion of
+    // the supports.
     if rows.reads_past(2) || *coupled_mass {
         let acceleration = match (&stage.balance, balance.as_mut()) {
             (Some(_), Some(balance)) => &mut balance.a,

@@ -73,8 +73,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`] for
-    /// a diagonal mass that is not positive.
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`]
+    /// for a diagonal mass that is not positive.
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
         sparse::check_symmetric("mass", mass.as_ref())?;
         let n = mass.nrows();
@@ -178,7 +178,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         self.prescribe(dof, None)
     }
 
-    /// Drives a dof: the closure gives displacement, velocity and acceleration at t. They must be derivatives of each other.
+    /// Drives a dof: the closure gives displacement, velocity and acceleration at t. They must be derivatives of each
+    /// other.
     ///
     /// # Errors
     ///

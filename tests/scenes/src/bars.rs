@@ -26,7 +26,8 @@ pub struct Bars {
 }
 
 impl Bars {
-    /// The paper's data (1-D equivalent): L = 10, E = 100, ρ = 0.01, A = 0.25, v = ±0.05, gap 0.01; impact at 0.1, release at 0.3.
+    /// The paper's data (1-D equivalent): L = 10, E = 100, ρ = 0.01, A = 0.25, v = ±0.05, gap 0.01; impact at 0.1,
+    /// release at 0.3.
     pub fn paper(elements: usize) -> Self {
         Self {
             elements: [elements; 2],

@@ -110,7 +110,8 @@ pub struct Figures {
     pub force_max: f64,
     /// Total variation Σ|δp'|/F0 (exact: 2).
     pub variation: f64,
-    /// RMS of the error of the left contact node's velocity over [0.8, 3.4] impact times, relative to half the closing speed.
+    /// RMS of the error of the left contact node's velocity over [0.8, 3.4] impact times, relative to half the closing
+    /// speed.
     pub velocity_rms: f64,
     /// Energy at the end over energy at the start.
     pub energy: f64,
