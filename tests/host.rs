@@ -460,3 +460,65 @@ fn a_corrector_that_hides_its_edits_is_refused() {
     assert!(matches!(error, Error::Incompatible { .. }), "{error}");
     assert!((run.time() - 0.1).abs() < 2e-3);
 }
+
+/// A floor for one mass after the other: the same place in the list, another row of G.
+struct Relay {
+    mass: usize,
+}
+
+impl ContactConstraint<f64> for Relay {
+    fn max_candidates(&self) -> usize {
+        1
+    }
+    fn max_entries(&self) -> usize {
+        1
+    }
+    fn check(&self, _: usize) -> Result<()> {
+        Ok(())
+    }
+    fn search(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<Candidates> {
+        let mass = usize::from(t > 0.15);
+        let found = if mass == self.mass { Candidates::Unchanged } else { Candidates::Changed };
+        self.mass = mass;
+        Ok(found)
+    }
+    fn candidates(&self) -> usize {
+        1
+    }
+    fn identity(&self, _: usize) -> (usize, usize) {
+        (self.mass, 0)
+    }
+    fn law(&self, _: usize) -> ContactLaw {
+        ContactLaw::Rigid
+    }
+    fn jacobian(&self, out: &mut ContactJacobian<f64>) {
+        out.push(&[(self.mass, 1.0)]);
+    }
+    fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
+        out[0] = u[self.mass] + [0.1, 0.3][self.mass];
+    }
+}
+
+#[test]
+fn what_was_computed_for_one_row_is_not_used_for_the_next() {
+    // Masses of 1 and 5 fall with unit velocity on floors 0.1 and 0.3 below them.
+    let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
+    let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0, 5.0], k).unwrap(), Composite, 0.007)
+        .velocity(vec![-1.0, -1.0])
+        .constraint(Relay { mass: 0 })
+        .corrector(PersistencyCorrection::with_history_projection())
+        .build()
+        .unwrap();
+    let mut impulses = [0.0; 2];
+    while run.time() < 0.5 {
+        run.step().unwrap();
+        let contacts = run.state().contacts();
+        let mass = contacts.ids()[0].feature;
+        impulses[mass] += contacts.impulses()[0];
+        // Stopped at once, not little by little.
+        assert!(!contacts.closed()[0] || run.state().velocity()[mass].abs() < 1e-12, "{:?}", run.state());
+    }
+    assert!(run.state().velocity().iter().all(|v| v.abs() < 1e-12), "{:?}", run.state().velocity());
+    assert!((impulses[0] - 1.0).abs() < 1e-12 && (impulses[1] - 5.0).abs() < 1e-12, "{impulses:?}");
+}

@@ -137,3 +137,17 @@ fn diagonal_solver_takes_diagonal_matrices_only() {
     let zero = matrix::<f64>(3, &[], 0.0);
     assert!(matches!(factor.factorize(zero.as_ref()), Err(Error::Singular { dof: 0, .. })));
 }
+
+#[test]
+fn free_bodies_are_recognized_by_a_pivot_of_rounding() {
+    // The last pivot of a free body is a rounding error of either sign: refused in every case, whatever the factor.
+    for n in 2..60 {
+        for pairs in [chain(n), shuffled_chain(n), arrow(n.max(3)), dense(n)] {
+            let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
+            let a = matrix::<f64>(n, &pairs, 0.0);
+            let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic()).unwrap();
+            let found = factor.factorize(a.as_ref());
+            assert!(matches!(found, Err(Error::Singular { .. })), "{n} dofs, {} pairs", pairs.len());
+        }
+    }
+}

@@ -162,6 +162,10 @@ fn terms_that_cancel_in_increment_form_are_gone() {
             let rows = Newmark::new(beta, gamma).unwrap().tableau().stages[0].increment().recovery;
             assert_eq!([rows.v.u[0].to_bits(), rows.a.u[0].to_bits()], [0, 0], "β = {beta}, γ = {gamma}");
         }
+        // The same in the balance rows of Chung and Hulbert, mixed from old and new.
+        let rho = 0.025 * f64::from(i);
+        let balance = chung_hulbert(rho).tableau.stages[0].increment().balance;
+        assert_eq!([balance.v.u[0].to_bits(), balance.a.u[0].to_bits()], [0, 0], "ρ = {rho}");
     }
 }
 

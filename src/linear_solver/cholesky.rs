@@ -34,9 +34,9 @@ struct Factor<T: Real> {
     sweep: Vec<T>,
 }
 
-/// A pivot that keeps less than this share of its diagonal entry is what rounding leaves of zero.
-fn negligible<T: Real>() -> T {
-    T::of(8.0) * T::epsilon()
+/// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of zero.
+fn negligible<T: Real>(n: usize) -> T {
+    T::of(16.0 * (n as f64).sqrt()) * T::epsilon()
 }
 
 impl<T: Real> std::fmt::Debug for Factor<T> {
@@ -77,8 +77,9 @@ impl<T: Real> Factorization<T> for Factor<T> {
         let Self { symbolic, kind, values, pivots, memory, .. } = self;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
         T::cholesky(*kind, symbolic, a, values, pivots, memory).map_err(singular)?;
+        let negligible = negligible::<T>(pivots.len());
         // Written so that NaN is refused too.
-        let sound = |(dof, &pivot): (usize, &T)| pivot > negligible::<T>() * sparse::entry(a, dof, dof);
+        let sound = |(dof, &pivot): (usize, &T)| pivot > negligible * sparse::entry(a, dof, dof);
         match pivots.iter().enumerate().position(|pivot| !sound(pivot)) {
             Some(dof) => Err(singular(dof)),
             None => Ok(()),
