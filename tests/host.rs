@@ -495,30 +495,32 @@ impl ContactConstraint<f64> for Relay {
         out.push(&[(self.mass, 1.0)]);
     }
     fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
-        out[0] = u[self.mass] + [0.1, 0.3][self.mass];
+        out[0] = u[self.mass] + [0.1, 0.5][self.mass];
     }
 }
 
 #[test]
 fn what_was_computed_for_one_row_is_not_used_for_the_next() {
-    // Masses of 1 and 5 fall with unit velocity on floors 0.1 and 0.3 below them.
+    // Masses of 1 and 5 fall under g = 10 on floors 0.1 and 0.5 below them; the first is pressed until it loses its floor.
     let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
     let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
-    let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0, 5.0], k).unwrap(), Composite, 0.007)
+    let weight = |_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -50.0]);
+    let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0, 5.0], k).unwrap().load(weight), Composite, 0.007)
         .velocity(vec![-1.0, -1.0])
         .constraint(Relay { mass: 0 })
         .corrector(PersistencyCorrection::with_history_projection())
         .build()
         .unwrap();
-    let mut impulses = [0.0; 2];
+    let mut pressed = [0; 2];
     while run.time() < 0.5 {
         run.step().unwrap();
         let contacts = run.state().contacts();
         let mass = contacts.ids()[0].feature;
-        impulses[mass] += contacts.impulses()[0];
-        // Stopped at once, not little by little.
-        assert!(!contacts.closed()[0] || run.state().velocity()[mass].abs() < 1e-12, "{:?}", run.state());
+        if contacts.closed()[0] {
+            pressed[mass] += 1;
+            // Stopped at once, not little by little.
+            assert!(run.state().velocity()[mass].abs() < 1e-12, "{:?}", run.state());
+        }
     }
-    assert!(run.state().velocity().iter().all(|v| v.abs() < 1e-12), "{:?}", run.state().velocity());
-    assert!((impulses[0] - 1.0).abs() < 1e-12 && (impulses[1] - 5.0).abs() < 1e-12, "{impulses:?}");
+    assert!(pressed[0] > 5 && pressed[1] > 20, "{pressed:?}");
 }
