@@ -10,7 +10,6 @@
 //! `output/two_bars/`.
 //!
 //! `experiment.rs` shows how the library is used; the other modules only present the results.
-#![allow(clippy::print_stdout)] // A table on the terminal is what this program is for.
 
 mod experiment;
 mod figures;
@@ -24,6 +23,7 @@ use options::{Command, HELP, Options};
 use std::error::Error;
 use std::fmt;
 use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 use table::Table;
 
@@ -33,7 +33,7 @@ fn main() -> Result<(), Failure> {
 
 fn run() -> Result<(), Box<dyn Error>> {
     match options::parse(std::env::args().skip(1))? {
-        Command::Help => print!("{HELP}"),
+        Command::Help => write!(io::stdout(), "{HELP}")?,
         Command::Run(options) => present(&options)?,
     }
     Ok(())
@@ -58,7 +58,8 @@ fn present(options: &Options) -> Result<(), Box<dyn Error>> {
         }
     }
     let table = Table::new(&experiment, &runs, options.repetitions);
-    println!("{}", table.text());
+    // Not println!: a reader who closes the pipe early ends the program with a message, not with a panic.
+    writeln!(io::stdout(), "{}", table.text())?;
 
     let output = &options.output;
     fs::create_dir_all(output).map_err(|error| format!("cannot create {}: {error}", output.display()))?;
@@ -86,6 +87,5 @@ fn write_histories(output: &Path, experiment: &Experiment, runs: &[Run]) -> Resu
 fn write(directory: &Path, name: &str, content: &str) -> Result<(), Box<dyn Error>> {
     let path = directory.join(name);
     fs::write(&path, content).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-    println!("wrote {}", path.display());
-    Ok(())
+    Ok(writeln!(io::stdout(), "wrote {}", path.display())?)
 }
