@@ -60,13 +60,13 @@ pub trait System<T: Real>: Send {
     fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()>;
 
     /// `out = C v`, or [`Damping::None`] without touching `out`.
-    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping;
+    fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping;
 
     /// Elastic energy ½ uᵀ K u, if the system has one. The potential of loads is not part of it.
     fn potential_energy(&mut self, u: &[T]) -> Option<T>;
 
     /// `out = external load at t`, for the energy balance. The default is no load.
-    fn load(&mut self, t: f64, out: &mut [T]) {
+    fn external_load(&mut self, t: f64, out: &mut [T]) {
         let _ = t;
         out.fill(T::zero());
     }
@@ -113,14 +113,14 @@ macro_rules! forward {
             fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
                 (**self).tangent(weights, out)
             }
-            fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
-                (**self).damping(v, out)
+            fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping {
+                (**self).damping_force(v, out)
             }
             fn potential_energy(&mut self, u: &[T]) -> Option<T> {
                 (**self).potential_energy(u)
             }
-            fn load(&mut self, t: f64, out: &mut [T]) {
-                (**self).load(t, out);
+            fn external_load(&mut self, t: f64, out: &mut [T]) {
+                (**self).external_load(t, out);
             }
             fn prescribed(&self) -> &[usize] {
                 (**self).prescribed()

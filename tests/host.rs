@@ -55,7 +55,7 @@ impl<T: Real> System<T> for Oscillator<T> {
         out[0] = weights.stiffness * self.stiffness + weights.damping * self.damping;
         Ok(())
     }
-    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
+    fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping {
         out[0] = self.damping * v[0];
         Damping::Present
     }

@@ -298,7 +298,7 @@ impl<T: Real> Correction<'_, T> {
             for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
                 projection.push(g, row, impulse, change);
             }
-            if system.0.damping(change, damping) == Damping::Present {
+            if system.0.damping_force(change, damping) == Damping::Present {
                 projection.apply_inverse(damping);
                 T::axpy(-T::one(), damping, &mut new.a);
             }

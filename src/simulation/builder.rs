@@ -246,7 +246,7 @@ fn workspace<T: Real>(
 ) -> Workspace<T> {
     let dofs = system.dofs();
     let (still, mut force) = (vec![T::zero(); dofs], vec![T::zero(); dofs]);
-    let damped = match system.damping(&still, &mut force) {
+    let damped = match system.damping_force(&still, &mut force) {
         Damping::Present if !correctors.is_empty() => dofs,
         _ => 0,
     };

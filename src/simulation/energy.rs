@@ -84,13 +84,13 @@ impl<T: Real> Ledger<T> {
         };
         ledger.start = energy(system, state, None).total();
         ledger.power = ledger.damping_power(system, state.velocity());
-        system.load(state.time(), &mut ledger.load);
+        system.external_load(state.time(), &mut ledger.load);
         ledger.reactions = reactions(system, state, g)?;
         Ok(ledger)
     }
 
     fn damping_power(&mut self, system: &mut dyn System<T>, v: &[T]) -> T {
-        match system.damping(v, &mut self.residual) {
+        match system.damping_force(v, &mut self.residual) {
             Damping::None => T::zero(),
             Damping::Present => -dot(&self.residual, v),
         }
@@ -134,7 +134,7 @@ impl<T: Real> Ledger<T> {
             *reaction = self.residual[dof];
         }
         std::mem::swap(&mut self.load, &mut self.old_load);
-        system.load(new.t, &mut self.load);
+        system.external_load(new.t, &mut self.load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&new, &old)| half * (new + old));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();

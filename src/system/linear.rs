@@ -121,7 +121,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         })
     }
 
-    /// Adds a damping matrix C.
+    /// Damping by a matrix C; replaces damping given before.
     ///
     /// # Errors
     ///
@@ -134,7 +134,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         Ok(self)
     }
 
-    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s).
+    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s); replaces damping given before.
     ///
     /// # Errors
     ///
@@ -162,7 +162,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         Ok(self)
     }
 
-    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry.
+    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces a load given
+    /// before.
     #[must_use]
     pub fn load(mut self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
         self.load = Some(Box::new(load));
@@ -242,7 +243,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     }
 
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        self.load(t, out);
+        self.external_load(t, out);
         let minus = -T::one();
         match &self.damping {
             StoredDamping::None => T::symmetric_product(minus, self.stiffness.as_ref(), u, out),
@@ -284,7 +285,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         Ok(())
     }
 
-    fn damping(&mut self, v: &[T], out: &mut [T]) -> Damping {
+    fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping {
         match &self.damping {
             StoredDamping::None => return Damping::None,
             StoredDamping::General(c) => {
@@ -309,7 +310,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         Some(T::of(0.5) * (0..u.len()).map(energy).sum::<T>())
     }
 
-    fn load(&mut self, t: f64, out: &mut [T]) {
+    fn external_load(&mut self, t: f64, out: &mut [T]) {
         out.fill(T::zero());
         if let Some(load) = &mut self.load {
             load(t, out);
