@@ -176,6 +176,8 @@ pub struct History<T> {
     /// Number of states known, the current one included.
     pub(crate) known: usize,
     pub(crate) clock: Clock,
+    /// Name of the integrator: another one would read other things out of the same states.
+    pub(crate) scheme: String,
 }
 
 impl<T: Real> History<T> {

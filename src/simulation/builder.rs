@@ -179,6 +179,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_vector("the resumed displacement", &state.motion.u, dofs)?;
             check_vector("the resumed velocity", &state.motion.v, dofs)?;
             check_vector("the resumed acceleration", &state.motion.a, dofs)?;
+            if history.scheme != integrator.name() {
+                let part = format!("a history of {} in a run by {}", history.scheme, integrator.name());
+                return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
+            }
             if history.clock.h.to_bits() != h.to_bits() {
                 let value = history.clock.h;
                 return Err(Error::Parameter { name: "the step size of the history", value, range: "h of the run" });
@@ -196,7 +200,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
                 start::straight_past(&motion, h, &mut slots[1..depth]);
             }
             let clock = Clock { reference: t, steps: 0, h };
-            (State { motion, contacts }, History { slots, known, clock }, projection)
+            let scheme = integrator.name();
+            (State { motion, contacts }, History { slots, known, clock, scheme }, projection)
         };
         contact_solver.reserve(rows);
 
