@@ -4,6 +4,7 @@ mod builder;
 mod constraints;
 mod contact_step;
 mod energy;
+mod operator;
 mod program;
 mod start;
 mod step;
@@ -23,7 +24,8 @@ use crate::state::{ContactState, History, Motion, State};
 use crate::system::System;
 use contact_step::ContactRowsWork;
 use energy::Ledger;
-use program::{Operator, Program};
+use operator::Operator;
+use program::Program;
 
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

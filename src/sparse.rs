@@ -106,7 +106,27 @@ pub(crate) struct Combination {
 const DROPPED: usize = usize::MAX;
 
 impl Combination {
+    /// The union of the patterns of the sources and the diagonal.
     pub(crate) fn new(n: usize, identity: &[usize], sources: &[SymbolicSparseColMatRef<'_, usize>]) -> Result<Self> {
+        Self::within(n, identity, sources, sources)
+    }
+
+    /// The diagonal alone: other entries of the sources are dropped.
+    pub(crate) fn diagonal(
+        n: usize,
+        identity: &[usize],
+        sources: &[SymbolicSparseColMatRef<'_, usize>],
+    ) -> Result<Self> {
+        Self::within(n, identity, &[], sources)
+    }
+
+    /// A sum of `sources` in the union of `patterns` and the diagonal.
+    fn within(
+        n: usize,
+        identity: &[usize],
+        patterns: &[SymbolicSparseColMatRef<'_, usize>],
+        sources: &[SymbolicSparseColMatRef<'_, usize>],
+    ) -> Result<Self> {
         let out_of_memory = |_| Error::OutOfMemory { what: "the pattern of the effective matrix" };
         let kept = |dof: &usize| identity.binary_search(dof).is_err();
         let mut pointers = Vec::with_capacity(n + 1);
@@ -118,7 +138,7 @@ impl Combination {
             column_rows.clear();
             column_rows.push(column);
             if kept(&column) {
-                for source in sources {
+                for source in patterns {
                     column_rows.extend(source.row_idx_of_col_raw(column).iter().copied().filter(|row| kept(row)));
                 }
             }

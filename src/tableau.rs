@@ -150,6 +150,41 @@ impl Rows {
     }
 }
 
+/// At which level, and where, a stage imposes contact.
+///
+/// `lead` is the fraction of the step by which the contact condition looks ahead of the stage's state, reached with the
+/// acceleration of that state: u + lead h v + ½ lead² h² a, and v + lead h a. Explicit schemes need it: the unknown
+/// multiplier of theirs moves the body only later.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactLevel {
+    /// 0 ≤ g ⊥ λ ≥ 0 on displacements.
+    Position {
+        /// How far ahead of the stage's state.
+        lead: f64,
+    },
+    /// 0 ≤ ġ ⊥ λ ≥ 0 on velocities, for contacts whose gap is forecast to be closed.
+    Velocity {
+        /// How far ahead of the stage's state.
+        lead: f64,
+        /// Displacements at which the forecast takes the gap; a row without the unknown.
+        forecast: Row,
+        /// Time of the forecast, as a fraction of the step.
+        forecast_at: f64,
+    },
+}
+
+impl ContactLevel {
+    /// Positions of the stage's own state.
+    pub const POSITION: Self = Self::Position { lead: 0.0 };
+
+    /// How far ahead of the stage's state, as a fraction of the step.
+    pub fn lead(&self) -> f64 {
+        match *self {
+            Self::Position { lead } | Self::Velocity { lead, .. } => lead,
+        }
+    }
+}
+
 /// One stage of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {
@@ -161,12 +196,14 @@ pub struct Stage {
     pub load: f64,
     /// Fraction of the step at which the stage's state (and its gap) lives.
     pub end: f64,
+    /// Where contact is imposed.
+    pub contact: ContactLevel,
 }
 
 impl Stage {
-    /// A stage whose balance holds at the new state, at the end of the step.
+    /// A stage whose balance holds at the new state, at the end of the step, with contact imposed on its displacements.
     pub fn new(recovery: Rows) -> Self {
-        Self { recovery, balance: recovery, load: 1.0, end: 1.0 }
+        Self { recovery, balance: recovery, load: 1.0, end: 1.0, contact: ContactLevel::POSITION }
     }
 
     /// The same stage with its own balance rows, holding at `t_n + load h`.
@@ -179,6 +216,35 @@ impl Stage {
     #[must_use]
     pub fn ending_at(self, end: f64) -> Self {
         Self { end, load: end, ..self }
+    }
+
+    /// The same stage with contact imposed at another level or place.
+    #[must_use]
+    pub fn with_contact(self, contact: ContactLevel) -> Self {
+        Self { contact, ..self }
+    }
+
+    /// The quantity that contact constrains, as a row: displacements, or h v at velocity level.
+    pub fn contact_row(&self) -> Row {
+        let Rows { u, v, a } = self.recovery;
+        match self.contact {
+            ContactLevel::Position { lead } => u + lead * v + (0.5 * lead * lead) * a,
+            ContactLevel::Velocity { lead, .. } => v + lead * a,
+        }
+    }
+
+    /// Fraction of the step at which contact is imposed.
+    pub fn contact_at(&self) -> f64 {
+        self.end + self.contact.lead()
+    }
+
+    /// Everything the stage reads: recovery, balance and forecast.
+    fn rows(&self) -> Vec<Row> {
+        let forecast = match self.contact {
+            ContactLevel::Position { .. } => None,
+            ContactLevel::Velocity { forecast, .. } => Some(forecast),
+        };
+        self.recovery.each().into_iter().chain(self.balance.each()).chain(forecast).collect()
     }
 
     /// Whether the balance holds at the recovered state itself.
@@ -198,8 +264,8 @@ impl Stage {
 
 /// A time-integration scheme as data: its stages.
 ///
-/// u, v and a of the last stage are the state at the end of the step. Schemes whose stored velocity lives elsewhere
-/// (half-step velocities of explicit schemes) are not covered by this version.
+/// u of the last stage is the displacement at the end of the step. Stored v and a may live elsewhere, as the
+/// accelerations of generalized-α do: [`analysis::order`](crate::analysis::order) finds out where.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tableau {
     /// Stages in the order in which they are solved.
@@ -227,9 +293,18 @@ impl Tableau {
     pub fn check(&self, integrator: &str) -> Result<()> {
         let refuse = |stage, reason| Err(Error::Tableau { integrator: integrator.to_owned(), stage, reason });
         for (s, stage) in self.stages.iter().enumerate() {
-            let rows = [stage.recovery.each(), stage.balance.each()].concat();
-            if !rows.iter().all(Row::is_finite) || !stage.load.is_finite() || !stage.end.is_finite() {
+            let lead = stage.contact.lead();
+            let numbers = [stage.load, stage.end, lead];
+            if !stage.rows().iter().all(Row::is_finite) || !numbers.iter().all(|x| x.is_finite()) {
                 return refuse(s, "a coefficient is not finite");
+            }
+            if lead < 0.0 {
+                return refuse(s, "contact cannot be imposed before the stage's state");
+            }
+            if let ContactLevel::Velocity { forecast, forecast_at, .. } = stage.contact
+                && (forecast.z != 0.0 || !forecast_at.is_finite())
+            {
+                return refuse(s, "the forecast of contact must be known before the stage is solved");
             }
             if stage.recovery.a.z == 0.0 || stage.balance.a.z == 0.0 {
                 return refuse(s, "the acceleration rows must contain the unknown");
@@ -246,10 +321,8 @@ impl Tableau {
 
     /// Number of states, the current one included, that a step reads at its start (at least 1).
     pub fn depth(&self) -> usize {
-        let read = |(s, stage): (usize, &Stage)| {
-            let rows = [stage.recovery.each(), stage.balance.each()].concat();
-            rows.iter().map(Row::depth).max().unwrap_or(0).saturating_sub(s)
-        };
+        let read =
+            |(s, stage): (usize, &Stage)| stage.rows().iter().map(Row::depth).max().unwrap_or(0).saturating_sub(s);
         self.stages.iter().enumerate().map(read).max().unwrap_or(0).max(1)
     }
 
@@ -260,7 +333,7 @@ impl Tableau {
         // In increment form: what cancels is not read.
         let mut mark = |stage: &Stage, entry: &dyn Fn(usize) -> Option<usize>| {
             let stage = stage.increment();
-            for row in [stage.recovery.each(), stage.balance.each()].concat() {
+            for row in stage.rows() {
                 for k in 0..MAX_PAST {
                     let Some(place) = entry(k) else { continue };
                     for (field, c) in row.past(k).into_iter().enumerate() {

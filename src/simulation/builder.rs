@@ -16,6 +16,7 @@ use crate::real::Real;
 use crate::sparse;
 use crate::state::{Clock, ContactState, History, Motion, State};
 use crate::system::{Damping, System};
+use crate::tableau::{ContactLevel, Tableau};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
 pub struct SimulationBuilder<'a, T: Real> {
@@ -162,11 +163,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let (depth, stages) = (tableau.depth(), tableau.stages.len());
         let (mut constraints, mut g) = Constraints::new(constraints, dofs)?;
         let rows = constraints.capacity();
-        if rows > 0 && tableau.stages.iter().any(|stage| stage.recovery.u.z == 0.0) {
-            return Err(Error::Incompatible {
-                part: integrator.name(),
-                reason: "its displacements do not contain the unknown, so a gap cannot be closed by a multiplier",
-            });
+        if rows > 0 {
+            check_contact(&*integrator, &tableau, &self.correctors)?;
         }
         let initial = |what, values: Option<Vec<T>>| {
             let values = values.unwrap_or_else(|| vec![T::zero(); dofs]);
@@ -257,6 +255,10 @@ fn workspace<T: Real>(
     };
     let prescribed = system.prescribed().to_vec();
     let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+    let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
+    let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
+    let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
+    let supports = prescribed.len();
     let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
     Workspace {
         increment: vec![T::zero(); dofs],
@@ -268,12 +270,52 @@ fn workspace<T: Real>(
         trial: ContactState::with_capacity(rows),
         closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
-        rows: ContactRowsWork::new(rows),
+        rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
         backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         correction_energy: T::zero(),
     }
+}
+
+/// Refuses schemes whose contact condition no multiplier can meet, and corrections of contact that is not imposed on
+/// the displacements of the state.
+fn check_contact<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    correctors: &[Box<dyn Corrector<T> + '_>],
+) -> Result<()> {
+    let refuse = |part: String, reason| Err(Error::Incompatible { part, reason });
+    for stage in &tableau.stages {
+        if stage.contact_row().z == 0.0 {
+            let reason = match stage.contact {
+                ContactLevel::Position { .. } => {
+                    "its displacements do not contain the unknown, so a multiplier cannot close a gap; contact would need a \
+                     compliant law"
+                }
+                ContactLevel::Velocity { .. } => {
+                    "its velocities do not contain the unknown, so a multiplier cannot stop an approach; contact would need \
+                     a compliant law"
+                }
+            };
+            return refuse(integrator.name(), reason);
+        }
+        let Some(corrector) = correctors.first() else { continue };
+        let part = || format!("the correction {} with {}", corrector.name(), integrator.name());
+        match stage.contact {
+            ContactLevel::POSITION => {}
+            ContactLevel::Position { .. } => {
+                return refuse(
+                    part(),
+                    "the scheme imposes contact ahead of the state, whose velocity still approaches",
+                );
+            }
+            ContactLevel::Velocity { .. } => {
+                return refuse(part(), "the scheme imposes contact on velocities, which leaves no jump to correct");
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Sizes and supports of a host's system.

@@ -1,15 +1,13 @@
-//! A tableau compiled for one system and one step size: scaled coefficients and factorized effective matrices.
+//! A tableau compiled for one system and one step size: scaled coefficients, and which operator each stage solves with.
 
-use crate::contact::ContactJacobian;
-use crate::error::{Error, Result};
-use crate::linear_solver::{Factorization, LinearSolver};
-use crate::mass::Mass;
-use crate::memory;
+use super::operator::Operator;
+use crate::error::Result;
+use crate::linear_solver::LinearSolver;
 use crate::real::Real;
-use crate::sparse::Combination;
 use crate::state::Motion;
-use crate::system::{System, TangentWeights};
-use crate::tableau::{MAX_PAST, Row, Rows, Stage, Tableau};
+use crate::system::System;
+use crate::tableau::{ContactLevel, MAX_PAST, Row, Rows, Stage, Tableau};
+use std::ops::Range;
 
 /// One term of a row: coefficient times one field of one past state.
 ///
@@ -28,80 +26,125 @@ impl<T> Term<T> {
     }
 }
 
-/// Three rows with h multiplied in: parts of u, v, a that come from the past, and the weights of the increment d.
+/// A row with h multiplied in: the part of u, v or a that comes from the past, and the weight of the increment d.
 #[derive(Debug)]
-pub(crate) struct ScaledRows<T> {
-    terms: [Vec<Term<T>>; 3],
-    pub(crate) weights: [T; 3],
+pub(crate) struct ScaledRow<T> {
+    terms: Vec<Term<T>>,
+    pub(crate) weight: T,
 }
 
 /// Dofs a block: what it touches stays in the first-level cache.
 const BLOCK: usize = 1024;
 
-impl<T: Real> ScaledRows<T> {
-    fn new(rows: &Rows, h: f64) -> Self {
-        // Row i gives h^i times its quantity, column j of a past state is h^j times the stored one.
-        let scale = |row: usize, field: usize| match field.abs_diff(row) {
+impl<T: Real> ScaledRow<T> {
+    /// Scales a row that gives h^`power` times its quantity: 0 for u (and h v as a length), 1 for v, 2 for a.
+    fn new(row: Row, power: usize, h: f64) -> Self {
+        // Column j of a past state is h^j times the stored one.
+        let scale = |field: usize| match field.abs_diff(power) {
             0 => 1.0,
-            1 if field > row => h,
+            1 if field > power => h,
             1 => 1.0 / h,
-            _ if field > row => h * h,
+            _ if field > power => h * h,
             _ => 1.0 / (h * h),
         };
-        let compile = |i: usize, row: Row| {
-            // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own
-            // rounding.
-            let sum: f64 = row.u.iter().sum();
-            let size: f64 = row.u.iter().map(|c| c.abs()).sum();
-            let nearest = if (sum - sum.round()).abs() <= 8.0 * f64::EPSILON * size { sum.round() } else { sum };
-            let coefficient = |state: usize, field: usize| match (state, field) {
-                (0, 0) => nearest,
-                _ => row.past(state)[field],
-            };
-            let mut terms: Vec<_> = (0..MAX_PAST)
-                .flat_map(|state| (0..3).map(move |field| (state, field)))
-                .map(|(state, field)| Term { c: T::of(coefficient(state, field) * scale(i, field)), state, field })
-                .filter(|term| term.c != T::zero())
-                .collect();
-            // Differences last: the first term overwrites.
-            terms.sort_by_key(|term: &Term<T>| (term.is_difference(), term.state, term.field));
-            terms
+        // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own rounding.
+        let sum: f64 = row.u.iter().sum();
+        let size: f64 = row.u.iter().map(|c| c.abs()).sum();
+        let nearest = if (sum - sum.round()).abs() <= 8.0 * f64::EPSILON * size { sum.round() } else { sum };
+        let coefficient = |state: usize, field: usize| match (state, field) {
+            (0, 0) => nearest,
+            _ => row.past(state)[field],
         };
-        let [u, v, a] = rows.each();
-        Self {
-            terms: [compile(0, u), compile(1, v), compile(2, a)],
-            weights: [T::of(u.z), T::of(v.z * scale(1, 0)), T::of(a.z * scale(2, 0))],
+        let mut terms: Vec<_> = (0..MAX_PAST)
+            .flat_map(|state| (0..3).map(move |field| (state, field)))
+            .map(|(state, field)| Term { c: T::of(coefficient(state, field) * scale(field)), state, field })
+            .filter(|term| term.c != T::zero())
+            .collect();
+        // Differences last: the first term overwrites.
+        terms.sort_by_key(|term: &Term<T>| (term.is_difference(), term.state, term.field));
+        Self { terms, weight: T::of(row.z * scale(0)) }
+    }
+
+    /// Writes the part that comes from the past to a block of dofs; without a term the output is left as it is.
+    fn predict_block(&self, past: &[Motion<T>], block: &Range<usize>, out: &mut [T]) {
+        for (i, term) in self.terms.iter().enumerate() {
+            let source = &past[term.state].field(term.field)[block.clone()];
+            match (i, term.is_difference()) {
+                (0, false) => T::scale_into(term.c, source, out),
+                (_, false) => T::axpy(term.c, source, out),
+                (i, true) => {
+                    if i == 0 {
+                        out.fill(T::zero());
+                    }
+                    T::axpy_difference(term.c, source, &past[0].u[block.clone()], out);
+                }
+            }
         }
+    }
+
+    /// Writes the part that comes from the past.
+    pub(crate) fn predict(&self, past: &[Motion<T>], out: &mut [T]) {
+        for block in blocks(out.len()) {
+            self.predict_block(past, &block, &mut out[block.clone()]);
+        }
+    }
+}
+
+fn blocks(dofs: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..dofs).step_by(BLOCK).map(move |start| start..dofs.min(start + BLOCK))
+}
+
+/// The rows of u, v and a, scaled.
+#[derive(Debug)]
+pub(crate) struct ScaledRows<T>([ScaledRow<T>; 3]);
+
+impl<T: Real> ScaledRows<T> {
+    fn new(rows: &Rows, h: f64) -> Self {
+        let [u, v, a] = rows.each();
+        Self([ScaledRow::new(u, 0, h), ScaledRow::new(v, 1, h), ScaledRow::new(a, 2, h)])
+    }
+
+    /// Weights of the increment d in u, v and a.
+    pub(crate) fn weights(&self) -> [T; 3] {
+        [0, 1, 2].map(|field| self.0[field].weight)
     }
 
     /// Whether the past has a part in u, v or a.
     pub(crate) fn reads_past(&self, field: usize) -> bool {
-        !self.terms[field].is_empty()
+        !self.0[field].terms.is_empty()
     }
 
     /// Writes the parts that come from the past, block by block; fields without a term are left as they are.
     pub(crate) fn predict(&self, past: &[Motion<T>], outputs: &mut [&mut [T]; 3]) {
-        let dofs = outputs[0].len();
-        let mut start = 0;
-        while start < dofs {
-            let block = start..dofs.min(start + BLOCK);
-            for (terms, output) in self.terms.iter().zip(outputs.iter_mut()) {
-                let out = &mut output[block.clone()];
-                for (i, term) in terms.iter().enumerate() {
-                    let source = &past[term.state].field(term.field)[block.clone()];
-                    match (i, term.is_difference()) {
-                        (0, false) => T::scale_into(term.c, source, out),
-                        (_, false) => T::axpy(term.c, source, out),
-                        (i, true) => {
-                            if i == 0 {
-                                out.fill(T::zero());
-                            }
-                            T::axpy_difference(term.c, source, &past[0].u[block.clone()], out);
-                        }
-                    }
-                }
+        for block in blocks(outputs[0].len()) {
+            for (row, output) in self.0.iter().zip(outputs.iter_mut()) {
+                row.predict_block(past, &block, &mut output[block.clone()]);
             }
-            start = block.end;
+        }
+    }
+}
+
+/// What contact constrains, where it is not the displacement of the stage's own state.
+#[derive(Debug)]
+pub(crate) struct ContactTarget<T> {
+    /// Displacements ahead of the state, or h times a velocity: lengths both.
+    pub(crate) row: ScaledRow<T>,
+    /// Where in the step the target lives.
+    pub(crate) at: f64,
+    /// At velocity level: displacements of the forecast, and where in the step they live.
+    pub(crate) forecast: Option<(ScaledRow<T>, f64)>,
+}
+
+impl<T: Real> ContactTarget<T> {
+    fn new(stage: &Stage, h: f64) -> Option<Self> {
+        let row = ScaledRow::new(stage.increment().contact_row(), 0, h);
+        match stage.contact {
+            ContactLevel::POSITION => None,
+            ContactLevel::Position { .. } => Some(Self { row, at: stage.contact_at(), forecast: None }),
+            ContactLevel::Velocity { forecast, forecast_at, .. } => {
+                let forecast = Some((ScaledRow::new(forecast, 0, h), forecast_at));
+                Some(Self { row, at: stage.contact_at(), forecast })
+            }
         }
     }
 }
@@ -112,6 +155,8 @@ pub(crate) struct CompiledStage<T> {
     pub(crate) recovery: ScaledRows<T>,
     /// Only where the balance does not hold at the recovered state.
     pub(crate) balance: Option<ScaledRows<T>>,
+    /// Only where contact is not imposed on the displacements of the stage's own state.
+    pub(crate) contact: Option<ContactTarget<T>>,
     pub(crate) load: f64,
     pub(crate) end: f64,
     pub(crate) operator: usize,
@@ -130,52 +175,6 @@ impl<T> CompiledStage<T> {
     /// β: a raw multiplier λ of the stage changes the momentum by h β λ.
     pub(crate) fn impulse_weight(&self, covector: &[[f64; 3]]) -> f64 {
         self.response.iter().zip(&covector[0]).map(|(response, psi)| response * psi).sum()
-    }
-}
-
-/// A factorized effective matrix and the responses A⁻¹ Gᵀ computed with it so far.
-#[derive(Debug)]
-pub(crate) struct Operator<T> {
-    /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
-    weights: [f64; 3],
-    factor: Box<dyn Factorization<T>>,
-    dofs: usize,
-    columns: Vec<T>,
-    computed: Vec<bool>,
-}
-
-impl<T: Real> Operator<T> {
-    /// `x ← A⁻¹ x`.
-    pub(crate) fn solve(&mut self, x: &mut [T]) {
-        self.factor.solve(x);
-    }
-
-    /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response).
-    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, row: usize, prescribed: &[usize]) {
-        if !self.computed[row] {
-            let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];
-            column.fill(T::zero());
-            g.scatter(row, T::one(), column);
-            for &dof in prescribed {
-                column[dof] = T::zero();
-            }
-            self.factor.solve(column);
-            self.computed[row] = true;
-        }
-    }
-
-    /// A⁻¹ G_rowᵀ.
-    pub(crate) fn response(&self, row: usize) -> &[T] {
-        &self.columns[row * self.dofs..(row + 1) * self.dofs]
-    }
-
-    /// Forgets responses to rows that have changed.
-    pub(crate) fn reset(&mut self) {
-        self.computed.fill(false);
-    }
-
-    pub(crate) fn stored_values(&self) -> usize {
-        self.factor.stored_values()
     }
 }
 
@@ -217,16 +216,16 @@ impl<T: Real> Compiler<'_, T> {
         let mut program = Program { stages: Vec::new(), operators: Vec::new() };
         for (s, stage) in stages.iter().enumerate() {
             let weights = stage.balance.each().map(|row| row.z);
-            let bits = |weights: [f64; 3]| weights.map(f64::to_bits);
-            let shared = program.operators.iter().position(|operator| bits(operator.weights) == bits(weights));
+            let shared = program.operators.iter().position(|operator| operator.serves(weights));
             if shared.is_none() {
-                program.operators.push(self.operator(stage, weights)?);
+                program.operators.push(Operator::new(self.system, self.solver, weights, self.h, self.rows)?);
             }
             let increment = stage.increment();
             let (covector, read) = books(s);
             program.stages.push(CompiledStage {
                 recovery: ScaledRows::new(&increment.recovery, self.h),
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
+                contact: ContactTarget::new(stage, self.h),
                 load: stage.load,
                 end: stage.end,
                 operator: shared.unwrap_or(program.operators.len() - 1),
@@ -238,54 +237,5 @@ impl<T: Real> Compiler<'_, T> {
             });
         }
         Ok(program)
-    }
-
-    /// Assembles and factorizes w_ū K + w_v̄/h C + w_ā/h² M, identity on the prescribed dofs.
-    fn operator(&mut self, stage: &Stage, weights: [f64; 3]) -> Result<Operator<T>> {
-        let h = self.h;
-        let dofs = self.system.dofs();
-        let pattern = self.system.pattern();
-        let mut tangent = vec![T::zero(); pattern.row_idx().len()];
-        let (combination, explicit) = {
-            // Without K and C in the effective matrix its pattern is that of M.
-            let explicit = weights[0] == 0.0 && weights[1] == 0.0;
-            let mass_pattern = match self.system.mass() {
-                Mass::Lumped(_) => None,
-                Mass::Consistent(mass) => Some(mass.symbolic()),
-            };
-            let sources: Vec<_> = (!explicit).then_some(pattern).into_iter().chain(mass_pattern).collect();
-            (Combination::new(dofs, self.system.prescribed(), &sources)?, explicit)
-        };
-        if !explicit {
-            let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
-            self.system.tangent(weights, &mut tangent)?;
-        }
-        let mut values = vec![T::zero(); combination.len()];
-        let inertia = T::of(stage.balance.a.z / (h * h));
-        let tangent = (!explicit).then_some((T::one(), &tangent[..]));
-        match self.system.mass() {
-            Mass::Lumped(mass) => {
-                let sources: Vec<_> = tangent.into_iter().collect();
-                combination.fill(&sources, Some((inertia, mass)), &mut values);
-            }
-            Mass::Consistent(mass) => {
-                let sources: Vec<_> = tangent.into_iter().chain([(inertia, mass.val())]).collect();
-                combination.fill(&sources, None, &mut values);
-            }
-        }
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let column = combination.pattern().col_ptr().partition_point(|&p| p <= at) - 1;
-            let (row, value) = (combination.pattern().row_idx()[at], values[at].value());
-            return Err(Error::MatrixNotFinite { matrix: "effective", row, column, value });
-        }
-        let mut factor = self.solver.analyze(combination.pattern())?;
-        factor.factorize(combination.view(&values))?;
-        Ok(Operator {
-            weights,
-            factor,
-            dofs,
-            columns: memory::zeros(self.rows, dofs, "the responses of the contact rows")?,
-            computed: vec![false; self.rows],
-        })
     }
 }

@@ -2,7 +2,8 @@
 
 use super::contact_step::ContactStep;
 use super::energy::StepBooks;
-use super::program::{CompiledStage, Operator};
+use super::operator::Operator;
+use super::program::CompiledStage;
 use super::{Simulation, Workspace};
 use crate::contact::Candidates;
 use crate::corrector::{Correction, Erased, ErasedGaps, Scheme};
@@ -99,11 +100,16 @@ impl<T: Real> Simulation<'_, T> {
                 let value = work.increment[dof].value();
                 return Err(Error::StepNotFinite { t: clock.at(0.0), h: clock.h, what: "the increment", dof, value });
             }
-            let [w_u, w_v, w_a] = stage.recovery.weights;
+            let [w_u, w_v, w_a] = stage.recovery.weights();
             T::axpy(w_u, &work.increment, &mut new.u);
             if constraints.len() > 0 {
-                ContactStep { constraints, g, solver: &mut **contact_solver, statistics }
-                    .solve(operator, w_u, new, work)?;
+                ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.solve(
+                    &mut **system,
+                    operator,
+                    new,
+                    past,
+                    work,
+                )?;
             }
             T::axpy(w_v, &work.increment, &mut new.v);
             if stage.recovery.reads_past(2) {
@@ -115,8 +121,7 @@ impl<T: Real> Simulation<'_, T> {
                 new.a[dof] = support[2];
             }
             if constraints.len() > 0 {
-                ContactStep { constraints, g, solver: &mut **contact_solver, statistics }.close(
-                    clock.h,
+                ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.close(
                     new,
                     stage.impulse_weight(covector),
                     work,
