@@ -1,12 +1,42 @@
 //! Time integrators: how u, v and a follow from the unknown of a step.
 
+mod bathe;
+mod bdf2;
+mod cd_lagrange;
+mod central_difference;
+mod chung_lee;
 mod composite;
+mod generalized_alpha;
+mod gssss;
+mod houbolt;
+mod hulbert_chung;
+mod moreau_jean;
 mod newmark;
+mod noh_bathe;
+mod oalts;
+mod park;
+mod tchamwa_wielgosz;
 
+pub use bathe::Bathe;
+pub use bdf2::Bdf2;
+pub use cd_lagrange::CdLagrange;
+pub use central_difference::CentralDifference;
+pub use chung_lee::ChungLee;
 pub use composite::Composite;
+pub use generalized_alpha::GeneralizedAlpha;
+pub use gssss::Gssss;
+pub use houbolt::Houbolt;
+pub use hulbert_chung::HulbertChung;
+pub use moreau_jean::MoreauJean;
 pub use newmark::Newmark;
+pub use noh_bathe::NohBathe;
+pub use oalts::Oalts;
+pub use park::Park;
+pub use tchamwa_wielgosz::TchamwaWielgosz;
 
+use crate::error::{Error, Result};
 use crate::tableau::Tableau;
+use std::ops::RangeInclusive;
 
 /// A time-integration scheme: a name and a [`Tableau`], nothing else.
 ///
@@ -50,5 +80,13 @@ impl<I: TimeIntegrator + ?Sized> TimeIntegrator for Box<I> {
     }
     fn tableau(&self) -> Tableau {
         (**self).tableau()
+    }
+}
+
+/// A parameter of a scheme, refused outside its range (NaN as well); `range` is the range in words.
+fn within(name: &'static str, value: f64, allowed: RangeInclusive<f64>, range: &'static str) -> Result<f64> {
+    match allowed.contains(&value) {
+        true => Ok(value),
+        false => Err(Error::Parameter { name, value, range }),
     }
 }

@@ -30,7 +30,7 @@ pub use contact_solver::{ActiveSet, ContactSolver};
 pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
 pub use error::{Error, Result};
 pub use faer;
-pub use integrator::{Composite, Newmark, TimeIntegrator};
+pub use integrator::*;
 pub use linear_solver::{Automatic, Cholesky, Diagonal, Factorization, LinearSolver};
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};

@@ -1,7 +1,8 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
-use contact_dynamics::{Composite, Newmark, PersistencyCorrection, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::schemes::{bathe, chung_hulbert};
+use contact_dynamics::{
+    Bathe, Composite, GeneralizedAlpha, Newmark, PersistencyCorrection, Simulation, TimeIntegrator,
+};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 #[test]
@@ -9,8 +10,8 @@ fn steps_do_not_allocate() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] = [
         || Box::new(Composite),
         || Box::new(Newmark::trapezoidal()),
-        || Box::new(bathe()),
-        || Box::new(chung_hulbert(0.8)),
+        || Box::new(Bathe::default()),
+        || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
     ];
     for scheme in schemes {
         for mass in [MassKind::Lumped, MassKind::Consistent] {

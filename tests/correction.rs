@@ -5,9 +5,9 @@ use approx::assert_relative_eq;
 use contact_dynamics::corrector::Parts;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Composite, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Simulation, System, TimeIntegrator,
+    Bathe, Composite, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, Mass, Newmark, Park, PersistencyCorrection,
+    Simulation, System, TimeIntegrator,
 };
-use contact_dynamics_scenes::schemes::{bathe, houbolt, park};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 const FULL: PersistencyCorrection = PersistencyCorrection::with_history_projection();
@@ -84,7 +84,7 @@ fn corrected_state_satisfies_the_equation_of_motion_with_the_reported_force() {
         for mass in [MassKind::Lumped, MassKind::Consistent] {
             for parts in [Parts::Both, Parts::Velocity, Parts::Acceleration] {
                 let schemes: [Box<dyn TimeIntegrator>; 4] =
-                    [Box::new(Composite), Box::new(Newmark::trapezoidal()), Box::new(bathe()), Box::new(park())];
+                    [Box::new(Composite), Box::new(Newmark::trapezoidal()), Box::new(Bathe::default()), Box::new(Park)];
                 for scheme in schemes {
                     let name = scheme.name();
                     let bars = Bars::paper(20).delayed(0.3, 1e-3).with_mass(mass);
@@ -123,7 +123,7 @@ fn corrected_state_satisfies_the_equation_of_motion_with_the_reported_force() {
 #[test]
 fn nothing_is_corrected_in_persistent_contact() {
     // With the past projected, λ_v and λ_a vanish from the step after the impact on.
-    let schemes: [Box<dyn TimeIntegrator>; 3] = [Box::new(Composite), Box::new(houbolt()), Box::new(park())];
+    let schemes: [Box<dyn TimeIntegrator>; 3] = [Box::new(Composite), Box::new(Houbolt), Box::new(Park)];
     for scheme in schemes {
         let name = scheme.name();
         let mut run = start(&Bars::paper(20).delayed(0.3, 1e-3), scheme, FULL, 1e-3);
@@ -171,7 +171,7 @@ fn rows_that_share_a_body_are_projected_together() {
     // The gaps are such that both contacts close within the fifth step.
     let gaps = [0.7 * 4.3 * h, 1.2 * 4.6 * h];
     let schemes: [Box<dyn TimeIntegrator>; 3] =
-        [Box::new(Composite), Box::new(Newmark::trapezoidal()), Box::new(bathe())];
+        [Box::new(Composite), Box::new(Newmark::trapezoidal()), Box::new(Bathe::default())];
     for scheme in schemes {
         let name = scheme.name();
         let mut run = Simulation::builder(free(&masses), scheme, h)
@@ -320,7 +320,7 @@ fn mass_views_multiply_as_matrices() {
 fn an_impact_on_a_grid_point_belongs_to_that_step() {
     // The gap of 1/4 closes with 2/64 a step: exactly at the eighth, without any pressure.
     let h = 1.0 / 64.0;
-    let schemes: [Box<dyn TimeIntegrator>; 2] = [Box::new(Composite), Box::new(park())];
+    let schemes: [Box<dyn TimeIntegrator>; 2] = [Box::new(Composite), Box::new(Park)];
     for scheme in schemes {
         let name = scheme.name();
         let mut run = Simulation::builder(free(&[1.0, 1.0]), scheme, h)
@@ -346,11 +346,10 @@ fn an_impact_on_a_grid_point_belongs_to_that_step() {
 fn reported_force_of_a_generalized_scheme_balances_its_own_rows() {
     // Chung and Hulbert: M ā + K ū = Gᵀ p' at the balance rows, with the corrected acceleration in ā; the factor is 1 −
     // α_m.
-    use contact_dynamics_scenes::schemes::chung_hulbert;
     for rho in [0.0, 0.8, 1.0] {
         let (am, af) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
         let bars = Bars::paper(20).delayed(0.3, 1e-3);
-        let mut run = start(&bars, chung_hulbert(rho), PersistencyCorrection::new(), 1e-3);
+        let mut run = start(&bars, GeneralizedAlpha::chung_hulbert(rho).unwrap(), PersistencyCorrection::new(), 1e-3);
         let (mass, mut system) = (bars.lumped_mass::<f64>(), bars.system::<f64>());
         let [left, right] = bars.contact_dofs();
         let mut scale = 1e-3_f64;

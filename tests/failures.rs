@@ -286,7 +286,7 @@ fn history_of_another_run_is_refused() {
     refused!(resume(donor(3, 0.01, false)), Error::Dimension { .. }, "history");
     refused!(resume(donor(2, 0.02, false)), Error::Parameter { .. }, "step size");
     refused!(resume(donor(2, 0.01, true)), Error::Dimension { .. }, "history");
-    let same_size = Simulation::builder(system(), contact_dynamics_scenes::schemes::bdf2(), 0.01).build().unwrap();
+    let same_size = Simulation::builder(system(), contact_dynamics::Bdf2, 0.01).build().unwrap();
     let other = (same_size.state().clone(), same_size.history().clone());
     refused!(resume(other), Error::Incompatible { .. }, "BDF2", "composite");
     assert!(resume(donor(2, 0.01, false)).is_ok());
@@ -398,7 +398,7 @@ fn a_failed_step_leaves_state_and_history_bit_for_bit() {
                 match scheme {
                     0 => Box::new(Composite),
                     1 => Box::new(Newmark::trapezoidal()),
-                    _ => Box::new(contact_dynamics_scenes::schemes::bathe()),
+                    _ => Box::new(contact_dynamics::Bathe::default()),
                 }
             };
             let bars = Bars::paper(20).delayed(0.3, 1e-3).with_mass(mass);

@@ -1,8 +1,10 @@
 //! Momentum in the form each scheme conserves, and the closure of impulses.
 
 use contact_dynamics::tableau::{A, Rows, Stage, Tableau, U, V, Z};
-use contact_dynamics::{Composite, Corrector, Newmark, PersistencyCorrection, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::schemes::{Listed, bathe, bdf2, chung_hulbert, houbolt, park};
+use contact_dynamics::{
+    Bathe, Bdf2, Composite, Corrector, GeneralizedAlpha, Houbolt, Newmark, Park, PersistencyCorrection, Simulation,
+    TimeIntegrator,
+};
 use contact_dynamics_scenes::{Bars, MassKind, Record, record};
 
 type Scheme = fn() -> Box<dyn TimeIntegrator>;
@@ -10,11 +12,10 @@ type Scheme = fn() -> Box<dyn TimeIntegrator>;
 const ONE_STEP: [Scheme; 4] = [
     || Box::new(Newmark::trapezoidal()),
     || Box::new(Newmark::new(0.3025, 0.6).unwrap()),
-    || Box::new(chung_hulbert(0.8)),
-    || Box::new(bathe()),
+    || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+    || Box::new(Bathe::default()),
 ];
-const MULTISTEP: [Scheme; 4] =
-    [|| Box::new(Composite), || Box::new(houbolt()), || Box::new(park()), || Box::new(bdf2())];
+const MULTISTEP: [Scheme; 4] = [|| Box::new(Composite), || Box::new(Houbolt), || Box::new(Park), || Box::new(Bdf2)];
 
 fn corrections() -> [Option<PersistencyCorrection>; 5] {
     use contact_dynamics::corrector::Parts;
@@ -115,7 +116,7 @@ fn weights_of_the_functional_are_those_derived_by_hand() {
     let found = psi(&Newmark::new(0.3025, 0.6).unwrap()).after_step();
     assert!((found[0][1] - 1.0).abs() < 1e-12 && (found[0][2] - 0.4).abs() < 1e-12 && found[0][0].abs() < 1e-12);
     let (alpha_m, gamma) = (0.6 / 1.8, 0.5 - 0.6 / 1.8 + 0.8 / 1.8);
-    let found = psi(&chung_hulbert(0.8)).after_step();
+    let found = psi(&GeneralizedAlpha::chung_hulbert(0.8).unwrap()).after_step();
     assert!((found[0][2] - (1.0 - gamma - alpha_m)).abs() < 1e-12, "{found:?}");
     // Composite: (U0 − U1) + (V0 − V1).
     let found = psi(&Composite).after_step();
@@ -126,9 +127,9 @@ fn weights_of_the_functional_are_those_derived_by_hand() {
     let displacement = |c: f64| [c, 0.0, 0.0];
     let velocity = |c: f64| [0.0, c, 0.0];
     let cases: [(&dyn TimeIntegrator, Vec<[f64; 3]>); 3] = [
-        (&houbolt(), [2.0, -3.0, 1.0].map(displacement).to_vec()),
-        (&park(), [10.0, -5.0, 1.0].map(|c| velocity(c / 6.0)).to_vec()),
-        (&bdf2(), [1.5, -0.5].map(velocity).to_vec()),
+        (&Houbolt, [2.0, -3.0, 1.0].map(displacement).to_vec()),
+        (&Park, [10.0, -5.0, 1.0].map(|c| velocity(c / 6.0)).to_vec()),
+        (&Bdf2, [1.5, -0.5].map(velocity).to_vec()),
     ];
     for (scheme, expected) in cases {
         let found = psi(scheme);
@@ -138,15 +139,15 @@ fn weights_of_the_functional_are_those_derived_by_hand() {
         assert!((found.impulse_weights()[0] - 1.0).abs() < 1e-12);
     }
     // Bathe: the stages share the impulse as √2/4 and 1 − √2/4.
-    let weights = psi(&bathe()).impulse_weights().to_vec();
+    let weights = psi(&Bathe::default()).impulse_weights().to_vec();
     assert!((weights[0] - 0.125_f64.sqrt()).abs() < 1e-12 && (weights[0] + weights[1] - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn past_states_are_counted_from_the_start_of_the_step() {
-    assert_eq!([bathe().tableau.depth(), park().tableau.depth(), Composite.tableau().depth()], [1, 3, 2]);
+    assert_eq!([Bathe::default().tableau().depth(), Park.tableau().depth(), Composite.tableau().depth()], [1, 3, 2]);
     // After the first stage of Bathe's scheme the second reads v of that stage and u of t_n, nothing older.
-    let read = bathe().tableau.read_after(0);
+    let read = Bathe::default().tableau().read_after(0);
     assert!(read[0][1] && read[1][0] && !read[2..].iter().flatten().any(|&read| read));
     // The composite scheme reads u and v of the last two states, never a.
     let read = Composite.tableau().read_after(0);
@@ -164,19 +165,27 @@ fn terms_that_cancel_in_increment_form_are_gone() {
         }
         // The same in the balance rows of Chung and Hulbert, mixed from old and new.
         let rho = 0.025 * f64::from(i);
-        let balance = chung_hulbert(rho).tableau.stages[0].increment().balance;
+        let balance = GeneralizedAlpha::chung_hulbert(rho).unwrap().tableau().stages[0].increment().balance;
         assert_eq!([balance.v.u[0].to_bits(), balance.a.u[0].to_bits()], [0, 0], "ρ = {rho}");
     }
 }
 
 /// The composite rows behind a first stage that they do not read: two stages, two operators, a past of two steps.
-fn composite_in_two_stages() -> Listed {
-    let v = 4.0 * (Z - U[0]) - V[0];
-    let half = Stage::new(Rows { u: Z, v, a: 16.0 * (Z - U[0] - 0.5 * V[0]) - A[0] }).ending_at(0.5);
-    let v = 1.5 * Z - 2.0 * U[1] + 0.5 * U[2];
-    let a = (Z - 2.0 * U[1] + U[2]) + (v - 2.0 * V[1] + V[2]);
-    let tableau = Tableau::staged(vec![half, Stage::new(Rows { u: Z, v, a })]);
-    Listed { name: "composite behind a half step", tableau }
+#[derive(Debug)]
+struct CompositeInTwoStages;
+
+impl TimeIntegrator for CompositeInTwoStages {
+    fn name(&self) -> String {
+        "composite behind a half step".into()
+    }
+
+    fn tableau(&self) -> Tableau {
+        let v = 4.0 * (Z - U[0]) - V[0];
+        let half = Stage::new(Rows { u: Z, v, a: 16.0 * (Z - U[0] - 0.5 * V[0]) - A[0] }).ending_at(0.5);
+        let v = 1.5 * Z - 2.0 * U[1] + 0.5 * U[2];
+        let a = (Z - 2.0 * U[1] + U[2]) + (v - 2.0 * V[1] + V[2]);
+        Tableau::staged(vec![half, Stage::new(Rows { u: Z, v, a })])
+    }
 }
 
 #[test]
@@ -188,7 +197,7 @@ fn stages_between_drop_out_of_the_past() {
         run.run_until(2.0, &mut ()).unwrap();
         run.state().clone()
     };
-    let (one, two) = (run(Box::new(Composite)), run(Box::new(composite_in_two_stages())));
+    let (one, two) = (run(Box::new(Composite)), run(Box::new(CompositeInTwoStages)));
     for (x, y) in one.displacement().iter().zip(two.displacement()) {
         assert!((x - y).abs() < 1e-13, "{x} {y}");
     }
@@ -200,7 +209,7 @@ fn stages_between_drop_out_of_the_past() {
         for correction in corrections() {
             let found = record::<f64>(
                 &bars,
-                composite_in_two_stages(),
+                CompositeInTwoStages,
                 correction.map(|c| Box::new(c) as Box<dyn Corrector<f64>>),
                 1e-3,
                 0.5,

@@ -2,8 +2,7 @@
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
-use contact_dynamics::{Composite, LinearSystem, Newmark, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::schemes::{bathe, bdf2, houbolt, park};
+use contact_dynamics::{Bathe, Bdf2, Composite, Houbolt, LinearSystem, Newmark, Park, Simulation, TimeIntegrator};
 
 const OMEGA: f64 = 2.0;
 const XI: f64 = 0.05;
@@ -44,9 +43,9 @@ fn damped_forced_oscillator_is_second_order_in_u_v_and_a() {
         || Box::new(Composite),
         || Box::new(Newmark::trapezoidal()),
         || Box::new(Newmark::new(0.3, 0.5).unwrap()),
-        || Box::new(houbolt()),
-        || Box::new(park()),
-        || Box::new(bathe()),
+        || Box::new(Houbolt),
+        || Box::new(Park),
+        || Box::new(Bathe::default()),
     ];
     for scheme in schemes {
         let order = observed(|steps| oscillator_error(scheme(), steps));
@@ -116,7 +115,7 @@ fn several_dofs_are_second_order_from_the_first_step() {
         ]
     };
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] =
-        [|| Box::new(Composite), || Box::new(Newmark::trapezoidal()), || Box::new(bdf2()), || Box::new(houbolt())];
+        [|| Box::new(Composite), || Box::new(Newmark::trapezoidal()), || Box::new(Bdf2), || Box::new(Houbolt)];
     for scheme in schemes {
         let order = observed(|steps| error(scheme(), steps, steps));
         assert!(order.iter().all(|o| (o - 2.0).abs() < 0.05), "{}: {order:?}", scheme().name());

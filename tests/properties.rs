@@ -5,19 +5,18 @@ use contact_dynamics::contact::ContactJacobian;
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Composite, JumpProjection, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Simulation,
-    TimeIntegrator,
+    Bathe, Composite, GeneralizedAlpha, JumpProjection, LinearRows, LinearSystem, Mass, Newmark, Park,
+    PersistencyCorrection, Simulation, TimeIntegrator,
 };
-use contact_dynamics_scenes::schemes::{bathe, chung_hulbert, park};
 use proptest::prelude::*;
 
 fn scheme(index: usize) -> Box<dyn TimeIntegrator> {
     match index {
         0 => Box::new(Composite),
         1 => Box::new(Newmark::trapezoidal()),
-        2 => Box::new(bathe()),
-        3 => Box::new(chung_hulbert(0.8)),
-        _ => Box::new(park()),
+        2 => Box::new(Bathe::default()),
+        3 => Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+        _ => Box::new(Park),
     }
 }
 

@@ -1,9 +1,8 @@
 //! The paper's experiment against the figures of two independent prototypes and against theory.
 
 use contact_dynamics::corrector::Parts;
-use contact_dynamics::{Composite, Corrector, Newmark, PersistencyCorrection, TimeIntegrator};
+use contact_dynamics::{Bathe, Composite, Corrector, Newmark, PersistencyCorrection, TimeIntegrator};
 use contact_dynamics_scenes::measure::{Figures, figures};
-use contact_dynamics_scenes::schemes::bathe;
 use contact_dynamics_scenes::{Bars, record};
 
 const H: f64 = 1e-3;
@@ -20,7 +19,7 @@ fn integrator(scheme: Scheme) -> Box<dyn TimeIntegrator> {
     match scheme {
         Scheme::Newmark => Box::new(Newmark::trapezoidal()),
         Scheme::Composite => Box::new(Composite),
-        Scheme::Bathe => Box::new(bathe()),
+        Scheme::Bathe => Box::new(Bathe::default()),
     }
 }
 

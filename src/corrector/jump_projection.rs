@@ -127,6 +127,11 @@ impl<T: Real> JumpProjection<T> {
         }
     }
 
+    /// Number of degrees of freedom.
+    pub(crate) fn dofs(&self) -> usize {
+        self.dofs
+    }
+
     /// `b ← S⁻¹ b` on the closed rows.
     pub(crate) fn solve(&self, b: &mut [T]) {
         self.factor.solve(b);

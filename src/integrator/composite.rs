@@ -16,6 +16,7 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// * Unconditionally stable for every damping ratio; ρ∞ = 0, reached over about four steps.
 /// * Period elongation 5/24 Ω², numerical damping ≈ ¼ Ω⁵ for small Ω.
 /// * Conserves linear momentum; no energy or angular-momentum theorem.
+/// * Contact is imposed on the displacements at the end of the step.
 /// * The past it carries survives an impact: without the history projection of
 ///   [`PersistencyCorrection`](crate::PersistencyCorrection) contact may be lost for several steps.
 ///

@@ -1,7 +1,7 @@
 //! Newmark's family of one-step schemes.
 
-use super::TimeIntegrator;
-use crate::error::{Error, Result};
+use super::{TimeIntegrator, within};
+use crate::error::Result;
 use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 
 /// Newmark's scheme (J. Eng. Mech. Div. ASCE 85, 1959) with parameters β and γ.
@@ -17,6 +17,7 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// * Unconditionally stable if and only if 2β ≥ γ ≥ ½.
 /// * The trapezoidal rule (¼, ½) conserves the energy of linear free motion; it has no numerical damping.
 /// * Conserves linear momentum in the form v + (1 − γ) h a.
+/// * Contact is imposed on the displacements at the end of the step.
 /// * Carries a: after an impact it needs the acceleration correction as much as the velocity correction.
 ///
 /// ```
@@ -36,15 +37,12 @@ impl Newmark {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless 0 < β ≤ 1 and ½ ≤ γ ≤ 1 (below γ = ½ the scheme has negative damping).
+    /// [`Error::Parameter`](crate::Error::Parameter) unless 0 < β ≤ 1 and ½ ≤ γ ≤ 1 (below γ = ½ the scheme has negative damping).
     pub fn new(beta: f64, gamma: f64) -> Result<Self> {
-        if !(beta > 0.0 && beta <= 1.0) {
-            return Err(Error::Parameter { name: "Newmark's β", value: beta, range: "in (0, 1]" });
-        }
-        if !(0.5..=1.0).contains(&gamma) {
-            return Err(Error::Parameter { name: "Newmark's γ", value: gamma, range: "in [1/2, 1]" });
-        }
-        Ok(Self { beta, gamma })
+        Ok(Self {
+            beta: within("Newmark's β", beta, f64::MIN_POSITIVE..=1.0, "in (0, 1]")?,
+            gamma: within("Newmark's γ", gamma, 0.5..=1.0, "in [1/2, 1]")?,
+        })
     }
 
     /// The trapezoidal rule, β = ¼, γ = ½ (average acceleration).
@@ -76,9 +74,13 @@ impl TimeIntegrator for Newmark {
     }
 
     fn tableau(&self) -> Tableau {
-        let Self { beta, gamma } = *self;
-        let a = (Z - U[0] - V[0]) / beta - ((0.5 - beta) / beta) * A[0];
-        let v = V[0] + (1.0 - gamma) * A[0] + gamma * a;
-        Tableau::single(Stage::new(Rows { u: Z, v, a }))
+        Tableau::single(Stage::new(kinematics(self.beta, self.gamma)))
     }
+}
+
+/// Newmark's rows for the unknown z = u'.
+pub(super) fn kinematics(beta: f64, gamma: f64) -> Rows {
+    let a = (Z - U[0] - V[0]) / beta - ((0.5 - beta) / beta) * A[0];
+    let v = V[0] + (1.0 - gamma) * A[0] + gamma * a;
+    Rows { u: Z, v, a }
 }

@@ -5,6 +5,7 @@ use super::energy::Ledger;
 use super::program::{Compiler, Program};
 use super::start::{self, Start};
 use super::{Constraints, Simulation, Statistics, Workspace};
+use crate::analysis;
 use crate::contact::ContactConstraint;
 use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
@@ -163,6 +164,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let (depth, stages) = (tableau.depth(), tableau.stages.len());
         let (mut constraints, mut g) = Constraints::new(constraints, dofs)?;
         let rows = constraints.capacity();
+        check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         if rows > 0 {
             check_contact(&*integrator, &tableau, &self.correctors)?;
         }
@@ -191,7 +193,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             (state, history, projection)
         } else {
             let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, h, t };
-            let (motion, contacts, projection) = start.state(u, v, &mut constraints, &mut g, rows)?;
+            let (motion, contacts, projection) =
+                start.state(u, v, &mut constraints, &mut g, rows, tableau.stages[stages - 1].contact)?;
             let known = if start::is_free_flight(&motion, h) { depth } else { 1 };
             let mut slots = vec![Motion::zero(dofs); depth + stages];
             if known > 1 {
@@ -313,6 +316,27 @@ fn check_contact<T: Real>(
             ContactLevel::Velocity { .. } => {
                 return refuse(part(), "the scheme imposes contact on velocities, which leaves no jump to correct");
             }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.
+fn check_lagged_damping<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    system: &mut dyn System<T>,
+) -> Result<()> {
+    let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
+    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
+    if lags && grows() {
+        let zero = vec![T::zero(); system.dofs()];
+        if system.damping_force(&zero, &mut zero.clone()) == Damping::Present {
+            return Err(Error::Incompatible {
+                part: integrator.name(),
+                reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
+                         size; choose a member with more numerical damping",
+            });
         }
     }
     Ok(())

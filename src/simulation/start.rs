@@ -10,6 +10,7 @@ use crate::mass::InverseMass;
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
 use crate::system::System;
+use crate::tableau::ContactLevel;
 
 /// What the state at the start is made from.
 pub(super) struct Start<'s, T: Real> {
@@ -33,6 +34,7 @@ impl<T: Real> Start<'_, T> {
         constraints: &mut Constraints<'_, T>,
         g: &mut ContactJacobian<T>,
         rows: usize,
+        contact: ContactLevel,
     ) -> Result<(Motion<T>, ContactState<T>, JumpProjection<T>)> {
         let Self { system, contact_solver, h, t } = self;
         let dofs = u.len();
@@ -66,38 +68,160 @@ impl<T: Real> Start<'_, T> {
 
         let mut contacts = ContactState::with_capacity(rows);
         contacts.reset(&constraints.ids);
-        let resting = resting_contacts(constraints, g, &motion, h, &mut contacts)?;
-        if !resting.is_empty() {
-            let mut rates = vec![GapRates::default(); constraints.len()];
-            constraints.rates(t, &motion.u, &motion.v, &mut rates);
-            let mut s = Vec::new();
-            projection.assemble(g, &resting, &mut s);
-            let offset: Vec<T> =
-                resting.iter().map(|&row| g.product(row, &motion.a) + rates[row].acceleration).collect();
-            let tolerance: Vec<T> = resting
-                .iter()
-                .map(|&row| rounding(g.magnitude(row, &motion.a) + rates[row].acceleration.abs()))
-                .collect();
-            let bounds: Vec<Bound> = resting
+        let touching = touching_contacts(constraints, g, &motion, h, &mut contacts)?;
+        let mut problem = match contact.lead() > 0.0 {
+            true => StartProblem::ahead(contact, system, constraints, g, &motion, h, &touching)?,
+            false => StartProblem::at_rest(constraints, g, &motion, h, &touching),
+        };
+        problem.solve(t, constraints, g, &mut projection, contact_solver)?;
+        for (&row, &lambda) in problem.rows.iter().zip(&problem.lambda) {
+            projection.push(g, row, lambda, &mut motion.a);
+            contacts.lambda[row] = lambda;
+            contacts.lambda_raw[row] = lambda;
+            contacts.closed[row] = true;
+        }
+        Ok((motion, contacts, projection))
+    }
+}
+
+/// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0, with q the acceleration of the gap without contact, or the
+/// one that just meets the condition a scheme imposes ahead of the state.
+struct StartProblem<T> {
+    /// Rows that take part.
+    rows: Vec<usize>,
+    /// Rows that join if the others push them in.
+    waiting: Vec<usize>,
+    /// q and its rounding, one entry a candidate.
+    offset: Vec<T>,
+    tolerance: Vec<T>,
+    lambda: Vec<T>,
+}
+
+impl<T: Real> StartProblem<T> {
+    /// Contacts at rest: closed, with no approach or separation. One that approaches is left to the first step, one that
+    /// separates is open.
+    fn at_rest(
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        motion: &Motion<T>,
+        h: f64,
+        touching: &[bool],
+    ) -> Self {
+        let mut rates = vec![GapRates::default(); constraints.len()];
+        constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+        let rows = (0..constraints.len()).filter(|&row| {
+            let rate = g.product(row, &motion.v) + rates[row].rate;
+            // The sliver of approach that counts as touching does not count as rest.
+            let still =
+                rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
+            constraints.law(row) == ContactLaw::Equality || touching[row] && still
+        });
+        let own = |row: usize| rates[row].acceleration;
+        Self {
+            rows: rows.collect(),
+            waiting: Vec::new(),
+            offset: (0..constraints.len()).map(|row| g.product(row, &motion.a) + own(row)).collect(),
+            tolerance: (0..constraints.len())
+                .map(|row| rounding(g.magnitude(row, &motion.a) + own(row).abs()))
+                .collect(),
+            lambda: Vec::new(),
+        }
+    }
+
+    /// Contacts that would violate the condition which the scheme imposes ahead of the state.
+    fn ahead(
+        contact: ContactLevel,
+        system: &mut dyn System<T>,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        motion: &Motion<T>,
+        h: f64,
+        touching: &[bool],
+    ) -> Result<Self> {
+        let lead = contact.lead() * h;
+        let t = motion.t + lead;
+        let mut target = motion.u.clone();
+        let mut y = vec![T::zero(); constraints.len()];
+        let prescribed = system.prescribed().to_vec();
+        let mut supports = vec![[T::zero(); 3]; prescribed.len()];
+        system.prescribed_motion(t, &mut supports);
+        finite_supports(t, &prescribed, &supports)?;
+        // y = (y without contact) + factor S λ.
+        let (factor, open) = match contact {
+            ContactLevel::Position { .. } => {
+                T::axpy(T::of(lead), &motion.v, &mut target);
+                T::axpy(T::of(0.5 * lead * lead), &motion.a, &mut target);
+                for (&dof, support) in prescribed.iter().zip(&supports) {
+                    target[dof] = support[0];
+                }
+                constraints.finite_gaps(t, &target, &mut y)?;
+                (0.5 * lead * lead, vec![true; constraints.len()])
+            }
+            ContactLevel::Velocity { .. } => {
+                target.copy_from_slice(&motion.v);
+                T::axpy(T::of(lead), &motion.a, &mut target);
+                for (&dof, support) in prescribed.iter().zip(&supports) {
+                    target[dof] = support[1];
+                }
+                let mut rates = vec![GapRates::default(); constraints.len()];
+                constraints.rates(t, &motion.u, &motion.v, &mut rates);
+                for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
+                    *y = g.product(row, &target) + rate.rate;
+                }
+                (lead, touching.to_vec())
+            }
+        };
+        let scale = T::of(factor).recip();
+        let tolerance: Vec<T> =
+            y.iter().enumerate().map(|(row, y)| scale * rounding(g.magnitude(row, &target) + y.abs())).collect();
+        let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
+        let takes_part = |row: &usize| constraints.law(*row) == ContactLaw::Equality || offset[*row] < -tolerance[*row];
+        let (rows, waiting) = (0..constraints.len()).filter(|&row| open[row]).partition(takes_part);
+        Ok(Self { rows, waiting, offset, tolerance, lambda: Vec::new() })
+    }
+
+    fn solve(
+        &mut self,
+        t: f64,
+        constraints: &Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        projection: &mut JumpProjection<T>,
+        solver: &mut dyn ContactSolver<T>,
+    ) -> Result<()> {
+        let Self { rows, waiting, offset, tolerance, lambda } = self;
+        let mut s = Vec::new();
+        while !rows.is_empty() {
+            projection.assemble(g, rows, &mut s);
+            let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
+            let bounds: Vec<Bound> = rows
                 .iter()
                 .map(|&row| match constraints.law(row) {
                     ContactLaw::Equality => Bound::Free,
                     ContactLaw::Rigid => Bound::NonNegative,
                 })
                 .collect();
-            let mut lambda = vec![T::zero(); resting.len()];
-            contact_solver.reserve(resting.len());
-            let problem = ContactProblem { delassus: &s, offset: &offset, bounds: &bounds, tolerance: &tolerance };
-            contact_solver
-                .solve(&problem, &mut lambda)
-                .map_err(|failure| contact_error(t, failure, |i| constraints.ids[resting[i]]))?;
-            for (&row, &lambda) in resting.iter().zip(&lambda) {
-                projection.push(g, row, lambda, &mut motion.a);
-                contacts.lambda[row] = lambda;
-                contacts.lambda_raw[row] = lambda;
+            let (q, rounded) = (pick(offset), pick(tolerance));
+            lambda.clear();
+            lambda.resize(rows.len(), T::zero());
+            solver.reserve(rows.len());
+            let problem = ContactProblem { delassus: &s, offset: &q, bounds: &bounds, tolerance: &rounded };
+            solver
+                .solve(&problem, lambda)
+                .map_err(|failure| contact_error(t, failure, |i| constraints.ids[rows[i]]))?;
+            let mut pushed = vec![T::zero(); projection.dofs()];
+            for (&row, &lambda) in rows.iter().zip(lambda.iter()) {
+                projection.push(g, row, lambda, &mut pushed);
             }
+            let violated = |row: &usize| offset[*row] + g.product(*row, &pushed) < -tolerance[*row];
+            let joining: Vec<usize> = waiting.iter().copied().filter(violated).collect();
+            if joining.is_empty() {
+                break;
+            }
+            waiting.retain(|row| !joining.contains(row));
+            rows.extend(joining);
+            rows.sort_unstable();
         }
-        Ok((motion, contacts, projection))
+        Ok(())
     }
 }
 
@@ -113,19 +237,18 @@ fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) ->
     Ok(())
 }
 
-/// Marks closed contacts; returns those at rest. A contact that approaches is left to the first step, one that
-/// separates is open.
-fn resting_contacts<T: Real>(
+/// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle.
+fn touching_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
     motion: &Motion<T>,
     h: f64,
     contacts: &mut ContactState<T>,
-) -> Result<Vec<usize>> {
+) -> Result<Vec<bool>> {
+    let mut touching = Vec::with_capacity(constraints.len());
     let mut rates = vec![GapRates::default(); constraints.len()];
     constraints.finite_gaps(motion.t, &motion.u, &mut contacts.gap)?;
     constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
-    let mut resting = Vec::new();
     for (row, rates) in rates.iter().enumerate() {
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];
@@ -135,15 +258,9 @@ fn resting_contacts<T: Real>(
             let contact = constraints.ids[row];
             return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });
         }
-        // The sliver of approach that counts as touching does not count as rest.
-        let still =
-            rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
-        if equality || (gap <= tolerance && still) {
-            contacts.closed[row] = true;
-            resting.push(row);
-        }
+        touching.push(gap <= tolerance);
     }
-    Ok(resting)
+    Ok(touching)
 }
 
 /// Whether accelerations change no velocity within a step beyond rounding: then the straight-line past is exact.

@@ -1,69 +1,89 @@
-//! Schemes of the literature as bare tableaux, to test that nothing in the library knows an integrator by name.
+//! Every scheme of the library with what the literature says of it: the one list that tests and examples go through.
 
-use contact_dynamics::TimeIntegrator;
-use contact_dynamics::tableau::{A, MAX_PAST, Row, Rows, Stage, Tableau, U, V, Z};
+use contact_dynamics::{
+    Bathe, Bdf2, CdLagrange, CentralDifference, ChungLee, Composite, GeneralizedAlpha, Gssss, Houbolt, HulbertChung,
+    MoreauJean, Newmark, NohBathe, Oalts, Park, TchamwaWielgosz, TimeIntegrator,
+};
 
-/// A tableau with a name.
-#[derive(Clone, Debug)]
+/// A scheme and its published figures.
+#[derive(Clone, Copy, Debug)]
 pub struct Listed {
-    pub name: &'static str,
-    pub tableau: Tableau,
+    /// Makes it.
+    pub make: fn() -> Box<dyn TimeIntegrator>,
+    /// Order of u, v and a.
+    pub order: u32,
+    /// Spectral radius at infinite frequency; `None` for explicit schemes.
+    pub radius: Option<f64>,
+    /// Period error and numerical damping in %, at h/T = 0.1, with the digits that are published, if they are.
+    pub published: Option<[f64; 2]>,
+    /// Largest stable Ω; `None` if there is no limit.
+    pub critical: Option<f64>,
 }
 
-impl TimeIntegrator for Listed {
-    fn name(&self) -> String {
-        self.name.into()
+impl Listed {
+    /// What the scheme calls itself.
+    pub fn name(&self) -> String {
+        (self.make)().name()
     }
-    fn tableau(&self) -> Tableau {
-        self.tableau.clone()
+
+    /// Whether a multiplier can impose contact.
+    pub fn takes_multipliers(&self) -> bool {
+        (self.make)().tableau().stages.iter().all(|stage| stage.contact_row().z != 0.0)
     }
 }
 
-fn single(name: &'static str, v: Row, a: Row) -> Listed {
-    Listed { name, tableau: Tableau::single(Stage::new(Rows { u: Z, v, a })) }
+fn implicit(
+    make: fn() -> Box<dyn TimeIntegrator>,
+    order: u32,
+    radius: f64,
+    published: impl Into<Option<[f64; 2]>>,
+) -> Listed {
+    Listed { make, order, radius: Some(radius), published: published.into(), critical: None }
 }
 
-/// Bathe's two-stage scheme with γ = 2 − √2.
-pub fn bathe() -> Listed {
-    let gamma = 2.0 - f64::sqrt(2.0);
-    let q1 = 1.0 / (4.0 - 2.0 * gamma);
-    let q2 = 0.5 - gamma * q1;
-    let q0 = 1.0 - q1 - q2;
-    let v = (2.0 / gamma) * (Z - U[0]) - V[0];
-    let a = (4.0 / (gamma * gamma)) * (Z - U[0] - gamma * V[0]) - A[0];
-    let first = Stage::new(Rows { u: Z, v, a }).ending_at(gamma);
-    let v = (Z - U[1] - q0 * V[1] - q1 * V[0]) / q2;
-    let a = (v - V[1] - q0 * A[1] - q1 * A[0]) / q2;
-    Listed { name: "Bathe", tableau: Tableau::staged(vec![first, Stage::new(Rows { u: Z, v, a })]) }
+fn explicit(
+    make: fn() -> Box<dyn TimeIntegrator>,
+    order: u32,
+    critical: f64,
+    published: impl Into<Option<[f64; 2]>>,
+) -> Listed {
+    Listed { make, order, radius: None, published: published.into(), critical: Some(critical) }
 }
 
-/// Generalized-α of Chung and Hulbert by its spectral radius at infinity.
-pub fn chung_hulbert(rho: f64) -> Listed {
-    let (am, af) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
-    let (gamma, beta) = (0.5 - am + af, 0.25 * (1.0 - am + af) * (1.0 - am + af));
-    let a = (Z - U[0] - V[0]) / beta - ((0.5 - beta) / beta) * A[0];
-    let v = V[0] + (1.0 - gamma) * A[0] + gamma * a;
-    let balance = Rows { u: (1.0 - af) * Z + af * U[0], v: (1.0 - af) * v + af * V[0], a: (1.0 - am) * a + am * A[0] };
-    let stage = Stage::new(Rows { u: Z, v, a }).balanced(balance, 1.0 - af);
-    Listed { name: "Chung-Hulbert", tableau: Tableau::single(stage) }
-}
-
-/// Houbolt.
-pub fn houbolt() -> Listed {
-    let v = (11.0 * Z - 18.0 * U[0] + 9.0 * U[1] - 2.0 * U[2]) / 6.0;
-    single("Houbolt", v, 2.0 * Z - 5.0 * U[0] + 4.0 * U[1] - U[2])
-}
-
-/// Park.
-pub fn park() -> Listed {
-    let d = |x: Row, y: [Row; MAX_PAST]| (10.0 * x - 15.0 * y[0] + 6.0 * y[1] - y[2]) / 6.0;
-    let v = d(Z, U);
-    single("Park", v, d(v, V))
-}
-
-/// BDF2 on displacement and velocity.
-pub fn bdf2() -> Listed {
-    let d = |x: Row, y: [Row; MAX_PAST]| 1.5 * x - 2.0 * y[0] + 0.5 * y[1];
-    let v = d(Z, U);
-    single("BDF2", v, d(v, V))
+/// All schemes: one line a scheme (or a member of a family that the literature tabulates).
+#[rustfmt::skip]
+pub fn all() -> Vec<Listed> {
+    vec![
+        implicit(|| Box::new(Composite), 2, 0.0, [8.448, 1.032]),
+        implicit(|| Box::new(Newmark::trapezoidal()), 2, 1.0, [3.207, 0.0]),
+        implicit(|| Box::new(Newmark::new(0.3025, 0.6).unwrap()), 1, 0.818, [3.295, 2.951]),
+        implicit(|| Box::new(Newmark::new(0.5, 1.0).unwrap()), 1, 1.0, [4.21, 14.9]),
+        implicit(|| Box::new(GeneralizedAlpha::hht(0.5).unwrap()), 2, 0.5, [4.67, 0.378]),
+        implicit(|| Box::new(GeneralizedAlpha::wbz(0.5).unwrap()), 2, 0.5, [6.22, 1.27]),
+        implicit(|| Box::new(GeneralizedAlpha::chung_hulbert(0.9).unwrap()), 2, 0.9, [3.25, 0.002]),
+        implicit(|| Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()), 2, 0.8, [3.383, 0.016]),
+        implicit(|| Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap()), 2, 0.5, [4.67, 0.378]),
+        implicit(|| Box::new(GeneralizedAlpha::chung_hulbert(0.0).unwrap()), 2, 0.0, [12.321, 5.499]),
+        implicit(|| Box::new(Gssss::new(0.8, 0.8, 0.8).unwrap()), 2, 0.8, [3.383, 0.016]),
+        implicit(|| Box::new(Gssss::new(1.0, 1.0, 0.0).unwrap()), 2, 1.0, [3.207, 0.0]),
+        implicit(|| Box::new(Houbolt), 2, 0.0, [12.321, 5.499]),
+        implicit(|| Box::new(Park), 2, 0.0, [6.707, 0.445]),
+        implicit(|| Box::new(Bdf2), 2, 0.0, [10.206, 3.443]),
+        implicit(|| Box::new(Oalts::new(0.5).unwrap()), 2, 0.5, None),
+        implicit(|| Box::new(Bathe::default()), 2, 0.0, [1.571, 0.087]),
+        implicit(|| Box::new(Bathe::new(0.5).unwrap()), 2, 0.0, [1.62, 0.082]),
+        implicit(|| Box::new(Bathe::with_radius(0.5).unwrap()), 2, 0.5, [1.149, 0.046]),
+        implicit(|| Box::new(Bathe::with_radius(0.9).unwrap()), 2, 0.9, [0.88, 0.009]),
+        implicit(|| Box::new(Bathe::with_radius(1.0).unwrap()), 2, 1.0, [0.817, 0.0]),
+        implicit(|| Box::new(MoreauJean::new(0.5).unwrap()), 2, 1.0, [3.207, 0.0]),
+        implicit(|| Box::new(MoreauJean::new(1.0).unwrap()), 1, 0.0, [12.003, 29.657]),
+        explicit(|| Box::new(CentralDifference), 2, 2.0, [-1.693, 0.0]),
+        explicit(|| Box::new(CdLagrange), 2, 2.0, [-1.693, 0.0]),
+        explicit(|| Box::new(TchamwaWielgosz::new(1.033).unwrap()), 1, 1.937, [-2.021, 1.022]),
+        explicit(|| Box::new(ChungLee::new(28.0 / 27.0).unwrap()), 2, 1.8666, [-1.092, 0.445]),
+        explicit(|| Box::new(HulbertChung::new(0.8).unwrap()), 2, 1.9759, [-1.654, 0.018]),
+        explicit(|| Box::new(HulbertChung::new(0.5).unwrap()), 2, 1.8666, [-1.092, 0.445]),
+        explicit(|| Box::new(NohBathe::new(0.54).unwrap()), 2, 3.745, [-0.247, 0.052]),
+        explicit(|| Box::new(NohBathe::with_radius(0.0).unwrap()), 2, 3.571, [-0.11, 0.091]),
+    ]
 }
