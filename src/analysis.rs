@@ -1,7 +1,18 @@
-//! What the amplification matrix of a tableau says: spectral radius, period error, numerical damping.
+//! What the rows of a tableau say: order, spectral radius, stability limit, period error, damping, overshoot.
 //!
 //! All figures are computed from the rows of a [`Tableau`] alone, for the scalar equation `a + 2 ξ ω v + ω² u = 0` with
 //! Ω = ω h, so they hold for a scheme of one's own as well.
+
+mod order;
+mod overshoot;
+mod report;
+mod series;
+mod stability;
+
+pub use order::{Order, order};
+pub use overshoot::{Overshoot, overshoot, overshoot_growth};
+pub use report::{Report, report};
+pub use stability::{ZeroStability, critical_omega, radius_at_infinity, zero_stability};
 
 use crate::tableau::Tableau;
 use faer::{Mat, c64};
@@ -16,7 +27,10 @@ use faer::{Mat, c64};
 /// assert!((a[(0, 0)] - 0.5).abs() < 1e-15 && (a[(0, 2)] - 0.125).abs() < 1e-15);
 /// ```
 pub fn amplification(tableau: &Tableau, omega: f64, xi: f64) -> Mat<f64> {
-    let rows = tableau.step_map(2.0 * xi * omega, omega * omega);
+    matrix(&tableau.step_map([omega * omega, 2.0 * xi * omega, 1.0]))
+}
+
+fn matrix(rows: &[Vec<f64>]) -> Mat<f64> {
     Mat::from_fn(rows.len(), rows.len(), |i, j| rows[i][j])
 }
 
@@ -37,8 +51,11 @@ pub fn eigenvalues(tableau: &Tableau, omega: f64, xi: f64) -> Vec<c64> {
 
 /// Spectral radius at Ω and damping ratio ξ; NaN if the tableau is not finite there.
 pub fn spectral_radius(tableau: &Tableau, omega: f64, xi: f64) -> f64 {
-    let moduli = eigenvalues(tableau, omega, xi).into_iter().map(|x| x.re.hypot(x.im));
-    moduli.fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
+    moduli(&eigenvalues(tableau, omega, xi)).fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
+}
+
+fn moduli(roots: &[c64]) -> impl Iterator<Item = f64> + '_ {
+    roots.iter().map(|x| x.re.hypot(x.im))
 }
 
 /// Relative elongation of the (damped) period and damping ratio of the principal root at `h_over_period` = h/T, for ξ

@@ -262,6 +262,19 @@ impl Stage {
     }
 }
 
+/// How the past that a multistep scheme reads is made at the start.
+///
+/// From free flight (no acceleration) the straight line is exact, and both forms use it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartUp {
+    /// The first steps are trapezoidal, until the past is known: no overshoot of stiff modes, one more factorization.
+    #[default]
+    Trapezoidal,
+    /// The past is Taylor's expansion of the start, u₀ − k h v₀ + ½ (k h)² a₀, v₀ − k h a₀, a₀: contact and corrections
+    /// act by the scheme's own rows from the first step; a stiff mode that starts out of equilibrium overshoots.
+    Taylor,
+}
+
 /// A time-integration scheme as data: its stages.
 ///
 /// u of the last stage is the displacement at the end of the step. Stored v and a may live elsewhere, as the
@@ -337,8 +350,8 @@ impl Tableau {
                 for k in 0..MAX_PAST {
                     let Some(place) = entry(k) else { continue };
                     for (field, c) in row.past(k).into_iter().enumerate() {
-                        if c != 0.0 {
-                            read[place][field] = true;
+                        if let Some(state) = read.get_mut(place).filter(|_| c != 0.0) {
+                            state[field] = true;
                         }
                     }
                 }
@@ -365,23 +378,26 @@ impl Tableau {
         Momentum::of(self)
     }
 
-    /// The map of one stage on the scalar test equation `a + damping v + stiffness u = 0` (in units of the step:
-    /// damping 2 ξ Ω, stiffness Ω²): new (U, V, A) from the past, row by row over `width` past states.
-    pub(crate) fn stage_map(stage: &Stage, damping: f64, stiffness: f64, width: usize) -> [Vec<f64>; 3] {
+    /// The map of one stage on the scalar test equation `inertia a + damping v + stiffness u = 0` with the weights
+    /// [stiffness, damping, inertia] in units of the step (Ω², 2 ξ Ω, 1): new (U, V, A) from the past, row by row over
+    /// `width` past states.
+    pub(crate) fn stage_map(stage: &Stage, weights: [f64; 3], width: usize) -> [Vec<f64>; 3] {
+        let [stiffness, damping, inertia] = weights;
         let stage = stage.increment();
         let combine = |row: Row| -> Vec<f64> {
             (0..width).flat_map(|k| if k < MAX_PAST { row.past(k) } else { [0.0; 3] }).collect()
         };
         let [bu, bv, ba] = stage.balance.each();
-        let effective = ba.z + damping * bv.z + stiffness * bu.z;
+        let effective = inertia * ba.z + damping * bv.z + stiffness * bu.z;
         let (cu, cv, ca) = (combine(bu), combine(bv), combine(ba));
-        let d: Vec<f64> = (0..3 * width).map(|i| -(ca[i] + damping * cv[i] + stiffness * cu[i]) / effective).collect();
+        let d: Vec<f64> =
+            (0..3 * width).map(|i| -(inertia * ca[i] + damping * cv[i] + stiffness * cu[i]) / effective).collect();
         stage.recovery.each().map(|row| combine(row).iter().zip(&d).map(|(c, d)| c + row.z * d).collect())
     }
 
     /// The amplification matrix of one step on the scalar test equation, row-major, over the past states of the step:
-    /// (U, V, A) of the newest, of the one before, ….
-    pub(crate) fn step_map(&self, damping: f64, stiffness: f64) -> Vec<Vec<f64>> {
+    /// (U, V, A) of the newest, of the one before, …. The weights are those of [`stage_map`](Self::stage_map).
+    pub(crate) fn step_map(&self, weights: [f64; 3]) -> Vec<Vec<f64>> {
         let (depth, stages) = (self.depth(), self.stages.len());
         let size = 3 * depth;
         // Rows of the extended past as functions of the past at the start of the step, newest first.
@@ -389,7 +405,7 @@ impl Tableau {
             (0..size).map(|i| (0..size).map(|j| f64::from(u8::from(i == j))).collect()).collect();
         for stage in &self.stages {
             let width = past.len() / 3;
-            let map = Self::stage_map(stage, damping, stiffness, width);
+            let map = Self::stage_map(stage, weights, width);
             let new = map.map(|row| {
                 let mut sum = vec![0.0; size];
                 for (c, old) in row.iter().zip(&past) {
@@ -404,6 +420,9 @@ impl Tableau {
         past
     }
 }
+
+/// Weights of motion without stiffness and damping.
+const RIGID: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// The linear functional of the past that is the momentum of a scheme, and what each stage's multiplier adds to it.
 ///
@@ -428,8 +447,8 @@ pub struct Momentum {
 
 impl Momentum {
     fn of(tableau: &Tableau) -> Self {
-        let stages = tableau.stages.len();
-        let map = tableau.step_map(0.0, 0.0);
+        let stages = tableau.stages.len().max(1);
+        let map = tableau.step_map(RIGID);
         let size = map.len();
         // (mapᵀ − 1) ψ = 0.
         let transposed =
@@ -495,7 +514,7 @@ impl Momentum {
 /// The covector before a stage that has the covector `after` when it is done.
 fn pull_back(after: &[[f64; 3]], stage: &Stage) -> Vec<[f64; 3]> {
     let width = after.len() - 1;
-    let map = Tableau::stage_map(stage, 0.0, 0.0, width);
+    let map = Tableau::stage_map(stage, RIGID, width);
     let through = |k: usize, field: usize| (0..3).map(|new| after[0][new] * map[new][3 * k + field]).sum::<f64>();
     (0..width).map(|k| std::array::from_fn(|field| after[k + 1][field] + through(k, field))).collect()
 }

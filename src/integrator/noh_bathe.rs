@@ -58,7 +58,7 @@ impl NohBathe {
 
 impl TimeIntegrator for NohBathe {
     fn name(&self) -> String {
-        format!("Noh–Bathe({})", self.p)
+        format!("Noh–Bathe({:.4})", self.p)
     }
 
     fn tableau(&self) -> Tableau {
