@@ -6,6 +6,8 @@ mod contact_step;
 mod energy;
 mod operator;
 mod program;
+mod resample;
+mod scheme;
 mod start;
 mod step;
 
@@ -18,6 +20,7 @@ use crate::contact_solver::ContactSolver;
 use crate::corrector::{Backup, Buffers, Corrector, JumpProjection};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
+use crate::linear_solver::LinearSolver;
 use crate::observer::{Control, Observer, StepView, Wants};
 use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
@@ -26,6 +29,7 @@ use contact_step::ContactRowsWork;
 use energy::Ledger;
 use operator::Operator;
 use program::Program;
+use scheme::Scheme;
 
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,13 +84,11 @@ pub struct Simulation<'a, T: Real> {
     g: ContactJacobian<T>,
     contact_solver: Box<dyn ContactSolver<T> + 'a>,
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
-    integrator: Box<dyn TimeIntegrator + 'a>,
-    /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
-    covectors: Vec<Vec<[f64; 3]>>,
+    linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    scheme: Scheme<'a>,
     program: Program<T>,
     /// The one-step scheme of the first steps, dropped once the past is known.
     startup: Option<Program<T>>,
-    depth: usize,
     state: State<T>,
     history: History<T>,
     work: Workspace<T>,
@@ -107,6 +109,8 @@ struct Workspace<T: Real> {
     /// Whether M couples prescribed dofs with free ones.
     coupled_mass: bool,
     trial: ContactState<T>,
+    /// v and a at the time of the new state, where the scheme stores those of another time.
+    shown: [Vec<T>; 2],
     /// Closed flags at the start of the step, and before the present stage.
     closed_at_start: Vec<bool>,
     was_closed: Vec<bool>,
@@ -121,7 +125,7 @@ struct Workspace<T: Real> {
 impl<T: Real> std::fmt::Debug for Simulation<'_, T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Simulation")
-            .field("integrator", &self.integrator.name())
+            .field("integrator", &self.scheme.integrator.name())
             .field("dofs", &self.system.dofs())
             .field("constraints", &self.constraints)
             .field("correctors", &self.correctors)
@@ -210,18 +214,8 @@ impl<'a, T: Real> Simulation<'a, T> {
         if direction.len() != dofs {
             return Err(Error::Dimension { what: "the direction", expected: dofs, found: direction.len() });
         }
-        let h = self.history.clock.h;
-        let mut sum = vec![T::zero(); dofs];
-        let newest = &self.state.motion;
-        for (k, psi) in self.covectors[self.history.known - 1].iter().enumerate() {
-            let motion = if k == 0 { newest } else { &self.history.slots[k] };
-            // Displacements enter with weights that sum to zero: differences keep their digits.
-            for ((sum, &u), &u0) in sum.iter_mut().zip(&motion.u).zip(&newest.u) {
-                *sum += T::of(psi[0] / h) * (u - u0);
-            }
-            T::axpy(T::of(psi[1]), &motion.v, &mut sum);
-            T::axpy(T::of(psi[2] * h), &motion.a, &mut sum);
-        }
+        let history = &self.history;
+        let sum = self.scheme.momentum(&self.state.motion, &history.slots[1..history.known], history.clock.h);
         let mut product = vec![T::zero(); dofs];
         self.system.mass().product(T::one(), &sum, &mut product);
         Ok(product.iter().zip(direction).map(|(&p, &d)| p * d).sum())

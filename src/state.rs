@@ -19,6 +19,30 @@ impl<T: Real> Motion<T> {
         Self { t: 0.0, u: zero(), v: zero(), a: zero() }
     }
 
+    /// Copies without allocating.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.t = other.t;
+        self.u.copy_from_slice(&other.u);
+        self.v.copy_from_slice(&other.v);
+        self.a.copy_from_slice(&other.a);
+    }
+
+    /// Field 1, 2: v, a, to be edited.
+    pub(crate) fn rate_mut(&mut self, field: usize) -> &mut Vec<T> {
+        match field {
+            1 => &mut self.v,
+            _ => &mut self.a,
+        }
+    }
+
+    /// Field 1, 2: v, a at the time of the state, `shown` if it is not empty.
+    pub(crate) fn shown<'v>(&'v self, shown: &'v [Vec<T>; 2], field: usize) -> &'v [T] {
+        match shown[field - 1].is_empty() {
+            true => self.field(field),
+            false => &shown[field - 1],
+        }
+    }
+
     /// Field 0, 1, 2: u, v, a.
     pub(crate) fn field(&self, field: usize) -> &[T] {
         match field {
@@ -35,7 +59,10 @@ impl<T: Real> Motion<T> {
 /// for bit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<T> {
+    /// Values as the scheme stores them.
     pub(crate) motion: Motion<T>,
+    /// Velocity and acceleration at the time of the state; empty where the stored ones live there.
+    pub(crate) shown: [Vec<T>; 2],
     pub(crate) contacts: ContactState<T>,
 }
 
@@ -52,11 +79,24 @@ impl<T: Real> State<T> {
 
     /// Velocities at the time of the state, one a dof.
     pub fn velocity(&self) -> &[T] {
-        &self.motion.v
+        self.motion.shown(&self.shown, 1)
     }
 
     /// Accelerations at the time of the state, one a dof.
+    ///
+    /// Some schemes store v or a of another time ([`Order`](crate::analysis::Order) says which). The values here are
+    /// extrapolated from two states, or those of the scheme where a contact closed or opened between the two.
     pub fn acceleration(&self) -> &[T] {
+        self.motion.shown(&self.shown, 2)
+    }
+
+    /// Velocities as the scheme stores them, at the time that its rows give them.
+    pub fn stored_velocity(&self) -> &[T] {
+        &self.motion.v
+    }
+
+    /// Accelerations as the scheme stores them, at the time that its rows give them: what its balance holds for.
+    pub fn stored_acceleration(&self) -> &[T] {
         &self.motion.a
     }
 
@@ -175,9 +215,61 @@ pub struct History<T> {
     pub(crate) slots: Vec<Motion<T>>,
     /// Number of states known, the current one included.
     pub(crate) known: usize,
+    /// Number of newest states since a contact last closed or opened, the first one after that included.
+    pub(crate) smooth: usize,
     pub(crate) clock: Clock,
+    /// Step size that made the current state.
+    pub(crate) made_with: f64,
+    /// The motions as they were computed, from which changes of the step size resample; empty until there is one.
+    pub(crate) trail: Trail<T>,
+    /// v and a of the current state as they were computed, if a change of the step size has moved the stored ones to
+    /// another time.
+    pub(crate) unmoved: [Vec<T>; 2],
     /// Name of the integrator: another one would read other things out of the same states.
     pub(crate) scheme: String,
+}
+
+/// Motions before the current one as they were computed, newest first, whatever their spacing.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Trail<T> {
+    /// Each with the step size that made it; those beyond `known` are spare.
+    states: Vec<(Motion<T>, f64)>,
+    known: usize,
+}
+
+impl<T: Real> Trail<T> {
+    /// Room for `length` states, the newest of which are `known`.
+    pub(crate) fn new(length: usize, dofs: usize, known: &[(&Motion<T>, f64)]) -> Self {
+        let mut trail = Self { states: vec![(Motion::zero(dofs), 0.0); length], known: 0 };
+        for (motion, h) in known.iter().rev() {
+            trail.push(motion, *h);
+        }
+        trail
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.states.is_empty()
+    }
+
+    /// Puts a motion in front, without allocating; the oldest drops out.
+    pub(crate) fn push(&mut self, motion: &Motion<T>, h: f64) {
+        self.states.rotate_right(1);
+        if let Some((front, made_with)) = self.states.first_mut() {
+            front.copy_from(motion);
+            *made_with = h;
+            self.known = (self.known + 1).min(self.states.len());
+        }
+    }
+
+    /// The newest motion, to be edited.
+    pub(crate) fn front(&mut self) -> Option<&mut Motion<T>> {
+        self.states.first_mut().map(|(motion, _)| motion)
+    }
+
+    /// The motions known.
+    pub(crate) fn known(&self) -> impl Iterator<Item = (&Motion<T>, f64)> {
+        self.states[..self.known].iter().map(|(motion, h)| (motion, *h))
+    }
 }
 
 impl<T: Real> History<T> {

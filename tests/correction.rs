@@ -361,7 +361,7 @@ fn reported_force_of_a_generalized_scheme_balances_its_own_rows() {
                 y.iter().zip(z).map(|(y, z)| (1.0 - x) * y + x * z).collect()
             };
             let u = mix(af, new.displacement(), old.displacement());
-            let a = mix(am, new.acceleration(), old.acceleration());
+            let a = mix(am, new.stored_acceleration(), old.stored_acceleration());
             let mut residual = vec![0.0; bars.dofs()];
             system.force(0.0, &u, &a, &mut residual).unwrap();
             residual[left] -= new.contacts().forces()[0];

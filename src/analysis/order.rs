@@ -17,20 +17,12 @@ pub struct Order {
     pub velocity_shift: f64,
     /// The same for the stored acceleration: α_m − α_f for generalized-α.
     pub acceleration_shift: f64,
-    /// κ in `v_stored = u' + κ h² u''' + …` with u the scheme's own displacement; what resampling a history must respect.
-    pub(crate) velocity_defect: f64,
 }
 
 impl Order {
     /// What a tableau without a solution for smooth motion has.
-    const NONE: Self = Self {
-        displacement: 0,
-        velocity: 0,
-        acceleration: 0,
-        velocity_shift: 0.0,
-        acceleration_shift: 0.0,
-        velocity_defect: 0.0,
-    };
+    const NONE: Self =
+        Self { displacement: 0, velocity: 0, acceleration: 0, velocity_shift: 0.0, acceleration_shift: 0.0 };
 }
 
 /// Orders beyond this one are not told apart.
@@ -75,14 +67,12 @@ pub fn order(tableau: &Tableau) -> Order {
     };
     let (in_v, velocity_shift) = read(&velocity, 1);
     let (in_a, acceleration_shift) = read(&acceleration, 2);
-    let relation = relative(&velocity, 1).over(&displacement);
     Order {
         displacement: in_u.unsigned_abs(),
         velocity: in_v.unsigned_abs(),
         acceleration: in_a.unsigned_abs(),
         velocity_shift,
         acceleration_shift,
-        velocity_defect: relation.coefficient(2) - 0.5 * velocity_shift * velocity_shift,
     }
 }
 

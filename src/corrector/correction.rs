@@ -438,13 +438,3 @@ pub(crate) fn contact_error<T: Real>(
         }
     }
 }
-
-impl<T: Real> Motion<T> {
-    /// Copies without allocating.
-    fn copy_from(&mut self, other: &Self) {
-        self.t = other.t;
-        self.u.copy_from_slice(&other.u);
-        self.v.copy_from_slice(&other.v);
-        self.a.copy_from_slice(&other.a);
-    }
-}

@@ -3,21 +3,22 @@
 use super::contact_step::ContactRowsWork;
 use super::energy::Ledger;
 use super::program::{Compiler, Program};
-use super::start::{self, Start};
+use super::scheme::Scheme;
+use super::start::{self, Start, Violation};
 use super::{Constraints, Simulation, Statistics, Workspace};
 use crate::analysis;
 use crate::contact::ContactConstraint;
 use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::error::{Error, Result};
-use crate::integrator::{Newmark, TimeIntegrator};
+use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass::Mass;
 use crate::real::Real;
 use crate::sparse;
-use crate::state::{Clock, ContactState, History, Motion, State};
+use crate::state::{ContactState, History, Motion, State};
 use crate::system::{Damping, System};
-use crate::tableau::{ContactLevel, Tableau};
+use crate::tableau::{ContactLevel, StartUp, Tableau};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
 pub struct SimulationBuilder<'a, T: Real> {
@@ -31,6 +32,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     contact_solver: Box<dyn ContactSolver<T> + 'a>,
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
     linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    start_up: StartUp,
     resumed: Option<(State<T>, History<T>)>,
     balance: EnergyBalance,
 }
@@ -66,6 +68,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             contact_solver: Box::new(ActiveSet::default()),
             correctors: Vec::new(),
             linear_solver: Box::new(Automatic),
+            start_up: StartUp::default(),
             resumed: None,
             balance: EnergyBalance::Off,
         }
@@ -127,6 +130,33 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Chooses how a multistep scheme gets its past; [`StartUp::Trapezoidal`] by default. One-step schemes need none.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::tableau::StartUp;
+    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    ///
+    /// // A stiff spring that is released out of equilibrium.
+    /// let run = |start_up| {
+    ///     let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1e6)])?;
+    ///     let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Composite, 0.1)
+    ///         .displacement(vec![1.0])
+    ///         .start_up(start_up)
+    ///         .build()?;
+    ///     run.step()?;
+    ///     Ok::<_, Box<dyn std::error::Error>>(run.state().velocity()[0].abs() / 1e3)
+    /// };
+    /// assert!(run(StartUp::Taylor)? > 20.0); // Ω/4 times ω u₀: the expansion knows nothing of the oscillation
+    /// assert!(run(StartUp::Trapezoidal)? < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn start_up(mut self, start_up: StartUp) -> Self {
+        self.start_up = start_up;
+        self
+    }
+
     /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with
     /// C a step, with supports one evaluation of f as well.
     #[must_use]
@@ -161,62 +191,41 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        let (depth, stages) = (tableau.depth(), tableau.stages.len());
         let (mut constraints, mut g) = Constraints::new(constraints, dofs)?;
         let rows = constraints.capacity();
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         if rows > 0 {
             check_contact(&*integrator, &tableau, &self.correctors)?;
         }
+        let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {
             let values = values.unwrap_or_else(|| vec![T::zero(); dofs]);
             check_vector(what, &values, dofs).map(|()| values)
         };
         let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
-        let (state, history, projection) = if let Some((state, history)) = self.resumed {
-            history.check(dofs, depth + stages)?;
-            check_vector("the resumed displacement", &state.motion.u, dofs)?;
-            check_vector("the resumed velocity", &state.motion.v, dofs)?;
-            check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-            if history.scheme != integrator.name() {
-                let part = format!("a history of {} in a run by {}", history.scheme, integrator.name());
-                return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
-            }
-            if history.clock.h.to_bits() != h.to_bits() {
-                let value = history.clock.h;
-                return Err(Error::Parameter { name: "the step size of the history", value, range: "h of the run" });
-            }
+        let mut projection = start::projection(&*system, dofs, rows)?;
+        let (state, history) = if let Some((state, history)) = self.resumed {
+            check_resumed(&state, &history, &scheme, h, dofs)?;
             constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
-            let projection = start::projection(&*system, dofs, rows)?;
-            (state, history, projection)
+            (state, history)
         } else {
-            let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, h, t };
-            let (motion, contacts, projection) =
-                start.state(u, v, &mut constraints, &mut g, rows, tableau.stages[stages - 1].contact)?;
-            let known = if start::is_free_flight(&motion, h) { depth } else { 1 };
-            let mut slots = vec![Motion::zero(dofs); depth + stages];
-            if known > 1 {
-                start::straight_past(&motion, h, &mut slots[1..depth]);
-            }
-            let clock = Clock { reference: t, steps: 0, h };
-            let scheme = integrator.name();
-            (State { motion, contacts }, History { slots, known, clock, scheme }, projection)
+            let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme: &scheme, h, t };
+            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Refused)?
         };
         contact_solver.reserve(rows);
 
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, rows };
-        let program = compiler.compile(&tableau)?;
-        let start = Newmark::trapezoidal().tableau();
-        let covectors = tableau.momentum().during_start(&start.stages[0]);
-        let startup = match history.known < depth {
-            true => Some(compiler.start(&start, &tableau)?),
+        let program = compiler.compile(&scheme.tableau)?;
+        let startup = match history.known < scheme.depth {
+            true => Some(compiler.start(&scheme.starter, &scheme.tableau)?),
             false => None,
         };
-        let factorizations =
-            program.operators.len() as u64 + startup.as_ref().map_or(0, |program| program.operators.len() as u64);
-        let work = workspace(&mut *system, &program, &self.correctors, projection, rows, depth + stages);
+        let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
+        let slots = history.slots.len();
+        let mut work = workspace(&mut *system, &program, &self.correctors, projection, rows, slots);
+        work.shown = scheme.shown(&state.motion);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
             EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
@@ -227,18 +236,40 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             g,
             contact_solver,
             correctors: self.correctors,
-            integrator,
-            covectors,
+            linear_solver: self.linear_solver,
+            scheme,
             program,
             startup,
-            depth,
             state,
             history,
             work,
             ledger,
-            statistics: Statistics { factorizations, ..Statistics::default() },
+            statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
+}
+
+/// Refuses a state and history that another run could not have left.
+fn check_resumed<T: Real>(
+    state: &State<T>,
+    history: &History<T>,
+    scheme: &Scheme<'_>,
+    h: f64,
+    dofs: usize,
+) -> Result<()> {
+    history.check(dofs, scheme.depth + scheme.tableau.stages.len())?;
+    check_vector("the resumed displacement", &state.motion.u, dofs)?;
+    check_vector("the resumed velocity", &state.motion.v, dofs)?;
+    check_vector("the resumed acceleration", &state.motion.a, dofs)?;
+    if history.scheme != scheme.integrator.name() {
+        let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
+        return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
+    }
+    if history.clock.h.to_bits() != h.to_bits() {
+        let value = history.clock.h;
+        return Err(Error::Parameter { name: "the step size of the history", value, range: "h of the run" });
+    }
+    Ok(())
 }
 
 /// Memory of the steps: nothing is allocated after this.
@@ -271,6 +302,7 @@ fn workspace<T: Real>(
         coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
         prescribed,
         trial: ContactState::with_capacity(rows),
+        shown: [Vec::new(), Vec::new()],
         closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
         rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),

@@ -3,7 +3,7 @@
 use crate::contact::ContactJacobian;
 use crate::error::Result;
 use crate::real::Real;
-use crate::state::{ContactState, Motion, State};
+use crate::state::{ContactState, State};
 use crate::system::{Damping, System};
 
 /// Energy of a state.
@@ -56,8 +56,12 @@ pub(crate) struct Ledger<T> {
     lambda: Vec<T>,
 }
 
-/// What the ledger needs to know of an accepted step besides its state.
+/// An accepted step, as the ledger sees it.
 pub(crate) struct StepBooks<'a, T> {
+    pub(crate) t: f64,
+    /// u, v and a at the time of the state.
+    pub(crate) motion: [&'a [T]; 3],
+    pub(crate) contacts: &'a ContactState<T>,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) corrections: T,
     pub(crate) h: f64,
@@ -105,46 +109,35 @@ impl<T: Real> Ledger<T> {
     }
 
     /// What may fail, before the step is accepted: the forces of the supports.
-    pub(crate) fn prepare(
-        &mut self,
-        system: &mut dyn System<T>,
-        new: &Motion<T>,
-        contacts: &ContactState<T>,
-        books: &StepBooks<'_, T>,
-    ) -> Result<()> {
+    pub(crate) fn prepare(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) -> Result<()> {
         if !system.prescribed().is_empty() {
-            balance_residual(system, new, contacts, books.g, &mut self.residual)?;
+            balance_residual(system, books.t, books.motion, books.contacts, books.g, &mut self.residual)?;
         }
         Ok(())
     }
 
     /// Books an accepted step.
-    pub(crate) fn end(
-        &mut self,
-        system: &mut dyn System<T>,
-        new: &Motion<T>,
-        contacts: &ContactState<T>,
-        books: &StepBooks<'_, T>,
-    ) {
+    pub(crate) fn end(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) {
         let half = T::of(0.5);
-        let (u, works) = (&new.u, &mut self.works);
+        let [u, v, _] = books.motion;
+        let works = &mut self.works;
         for (reaction, &dof) in self.reactions.iter_mut().zip(system.prescribed()) {
             let mean = half * (*reaction + self.residual[dof]);
             works.supports += mean * (u[dof] - self.old_u[dof]);
             *reaction = self.residual[dof];
         }
         std::mem::swap(&mut self.load, &mut self.old_load);
-        system.external_load(new.t, &mut self.load);
+        system.external_load(books.t, &mut self.load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&new, &old)| half * (new + old));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
-        for (row, &force) in contacts.lambda.iter().enumerate() {
+        for (row, &force) in books.contacts.lambda.iter().enumerate() {
             let advance: T = books.g.row(row).map(|(dof, weight)| weight * (u[dof] - self.old_u[dof])).sum();
             works.contact += half * (force + self.lambda[row]) * advance;
         }
         works.corrections += books.corrections;
         let old_power = self.power;
-        self.power = self.damping_power(system, &new.v);
+        self.power = self.damping_power(system, v);
         self.works.damping += half * (old_power + self.power) * T::of(books.h);
     }
 
@@ -178,26 +171,28 @@ pub(crate) fn reactions<T: Real>(
     g: &ContactJacobian<T>,
 ) -> Result<Vec<T>> {
     let mut residual = vec![T::zero(); system.dofs()];
-    balance_residual(system, &state.motion, &state.contacts, g, &mut residual)?;
+    let motion = [state.displacement(), state.velocity(), state.acceleration()];
+    balance_residual(system, state.time(), motion, &state.contacts, g, &mut residual)?;
     Ok(system.prescribed().iter().map(|&dof| residual[dof]).collect())
 }
 
 /// M a − f − Gᵀ λ on all dofs: on prescribed dofs the force of the support.
 fn balance_residual<T: Real>(
     system: &mut dyn System<T>,
-    motion: &Motion<T>,
+    t: f64,
+    [u, v, a]: [&[T]; 3],
     contacts: &ContactState<T>,
     g: &ContactJacobian<T>,
     residual: &mut [T],
 ) -> Result<()> {
-    system.force(motion.t, &motion.u, &motion.v, residual)?;
+    system.force(t, u, v, residual)?;
     for (row, &force) in contacts.lambda.iter().enumerate() {
         g.scatter(row, force, residual);
     }
     for r in residual.iter_mut() {
         *r = -*r;
     }
-    system.mass().product(T::one(), &motion.a, residual);
+    system.mass().product(T::one(), a, residual);
     Ok(())
 }
 

@@ -185,6 +185,32 @@ pub(crate) struct Program<T> {
     pub(crate) operators: Vec<Operator<T>>,
 }
 
+impl<T: Real> Program<T> {
+    /// Recompiles the same stages for another step size; after an error the program is as it was.
+    pub(crate) fn set_step_size(
+        &mut self,
+        stages: &[Stage],
+        system: &mut dyn System<T>,
+        old: f64,
+        h: f64,
+    ) -> Result<()> {
+        for i in 0..self.operators.len() {
+            if let Err(error) = self.operators[i].factorize(system, h) {
+                // They could be factorized before; should the host's tangent fail now, its first error is the one to tell.
+                self.operators[..=i].iter_mut().try_for_each(|operator| operator.factorize(system, old)).ok();
+                return Err(error);
+            }
+        }
+        for (compiled, stage) in self.stages.iter_mut().zip(stages) {
+            let increment = stage.increment();
+            compiled.recovery = ScaledRows::new(&increment.recovery, h);
+            compiled.balance = (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, h));
+            compiled.contact = ContactTarget::new(stage, h);
+        }
+        Ok(())
+    }
+}
+
 /// What a program is compiled for.
 pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) system: &'c mut dyn System<T>,

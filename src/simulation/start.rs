@@ -1,6 +1,7 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
 
 use super::Constraints;
+use super::scheme::Scheme;
 use super::step::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
@@ -8,16 +9,26 @@ use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
 use crate::real::Real;
-use crate::state::{ContactState, Motion};
+use crate::state::{Clock, ContactState, History, Motion, State, Trail};
 use crate::system::System;
-use crate::tableau::ContactLevel;
+use crate::tableau::{ContactLevel, StartUp};
 
 /// What the state at the start is made from.
 pub(super) struct Start<'s, T: Real> {
     pub(super) system: &'s mut dyn System<T>,
     pub(super) contact_solver: &'s mut dyn ContactSolver<T>,
+    pub(super) scheme: &'s Scheme<'s>,
     pub(super) h: f64,
     pub(super) t: f64,
+}
+
+/// Whether a motion may start inside an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Violation {
+    /// An error that names the depth.
+    Refused,
+    /// Schemes that impose contact on velocities leave penetrations behind, from which a run may be restarted.
+    Accepted,
 }
 
 /// M⁻¹ on the free dofs with room for `rows` contacts.
@@ -26,17 +37,60 @@ pub(super) fn projection<T: Real>(system: &dyn System<T>, dofs: usize, rows: usi
 }
 
 impl<T: Real> Start<'_, T> {
-    /// Motion and contacts at the start: supports in place, M a = f + Gᵀ λ with 0 ≤ λ ⊥ g̈ ≥ 0 on contacts at rest.
-    pub(super) fn state(
-        self,
+    /// State and past from displacements and velocities at the start.
+    pub(super) fn begin(
+        mut self,
         u: Vec<T>,
         v: Vec<T>,
         constraints: &mut Constraints<'_, T>,
         g: &mut ContactJacobian<T>,
-        rows: usize,
-        contact: ContactLevel,
-    ) -> Result<(Motion<T>, ContactState<T>, JumpProjection<T>)> {
-        let Self { system, contact_solver, h, t } = self;
+        projection: &mut JumpProjection<T>,
+        violation: Violation,
+    ) -> Result<(State<T>, History<T>)> {
+        let (scheme, h, t) = (self.scheme, self.h, self.t);
+        let (mut motion, contacts) = self.motion(u, v, constraints, g, projection, violation)?;
+        let depth = scheme.depth;
+        let mut slots = vec![Motion::zero(motion.u.len()); depth + scheme.tableau.stages.len()];
+        let known = if is_free_flight(&motion, h) {
+            straight_past(&motion, h, &mut slots[1..depth]);
+            depth
+        } else if scheme.start_up == StartUp::Taylor {
+            taylor_past(&motion, h, &mut slots[1..depth]);
+            depth
+        } else {
+            1
+        };
+        let shown = scheme.shown(&motion);
+        // With contact the rate of a is not that of f.
+        if !contacts.closed.contains(&true) {
+            store(self.system, projection, &mut motion, scheme.shifts(), h)?;
+        }
+        let clock = Clock { reference: t, steps: 0, h };
+        let history = History {
+            slots,
+            known,
+            smooth: known,
+            clock,
+            made_with: h,
+            trail: Trail::default(),
+            unmoved: [Vec::new(), Vec::new()],
+            scheme: scheme.integrator.name(),
+        };
+        Ok((State { motion, shown, contacts }, history))
+    }
+
+    /// Motion and contacts at the start: supports in place, M a = f + Gᵀ λ with 0 ≤ λ ⊥ g̈ ≥ 0 on contacts at rest.
+    fn motion(
+        &mut self,
+        u: Vec<T>,
+        v: Vec<T>,
+        constraints: &mut Constraints<'_, T>,
+        g: &mut ContactJacobian<T>,
+        projection: &mut JumpProjection<T>,
+        violation: Violation,
+    ) -> Result<(Motion<T>, ContactState<T>)> {
+        let Self { system, contact_solver, scheme, h, t } = self;
+        let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
         let mut supports = vec![[T::zero(); 3]; prescribed.len()];
@@ -50,9 +104,9 @@ impl<T: Real> Start<'_, T> {
         }
         constraints.search(t, &motion.u, &motion.v, g)?;
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
+        projection.reset();
 
         // Accelerations without contact: M a = f − M a_p on free dofs.
-        let mut projection = projection(system, dofs, rows)?;
         let mut force = vec![T::zero(); dofs];
         system.force(t, &motion.u, &motion.v, &mut force)?;
         system.mass().product(-T::one(), &motion.a, &mut force);
@@ -66,21 +120,22 @@ impl<T: Real> Start<'_, T> {
             return Err(Error::StepNotFinite { t, h, what: "the initial acceleration", dof, value });
         }
 
-        let mut contacts = ContactState::with_capacity(rows);
+        let mut contacts = ContactState::with_capacity(constraints.capacity());
         contacts.reset(&constraints.ids);
-        let touching = touching_contacts(constraints, g, &motion, h, &mut contacts)?;
+        let touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+        let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let mut problem = match contact.lead() > 0.0 {
-            true => StartProblem::ahead(contact, system, constraints, g, &motion, h, &touching)?,
+            true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
             false => StartProblem::at_rest(constraints, g, &motion, h, &touching),
         };
-        problem.solve(t, constraints, g, &mut projection, contact_solver)?;
+        problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
         for (&row, &lambda) in problem.rows.iter().zip(&problem.lambda) {
             projection.push(g, row, lambda, &mut motion.a);
             contacts.lambda[row] = lambda;
             contacts.lambda_raw[row] = lambda;
             contacts.closed[row] = true;
         }
-        Ok((motion, contacts, projection))
+        Ok((motion, contacts))
     }
 }
 
@@ -243,6 +298,7 @@ fn touching_contacts<T: Real>(
     g: &ContactJacobian<T>,
     motion: &Motion<T>,
     h: f64,
+    violation: Violation,
     contacts: &mut ContactState<T>,
 ) -> Result<Vec<bool>> {
     let mut touching = Vec::with_capacity(constraints.len());
@@ -254,13 +310,63 @@ fn touching_contacts<T: Real>(
         let gap = contacts.gap[row];
         let tolerance = rounding(g.magnitude(row, &motion.u) + gap.abs()) + T::of(1e-10 * h) * rate.abs();
         let equality = constraints.law(row) == ContactLaw::Equality;
-        if gap < -tolerance || (equality && gap > tolerance) {
+        let violated = gap < -tolerance || (equality && gap > tolerance);
+        if violated && violation == Violation::Refused {
             let contact = constraints.ids[row];
             return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });
         }
         touching.push(gap <= tolerance);
     }
     Ok(touching)
+}
+
+/// Moves v and a to the times at which the scheme stores them, `shifts` in steps from the time of the state.
+///
+/// The rate of a comes from a second evaluation of f, a little later and not earlier: loads often begin with the run.
+pub(super) fn store<T: Real>(
+    system: &mut dyn System<T>,
+    projection: &mut JumpProjection<T>,
+    motion: &mut Motion<T>,
+    [velocity_shift, acceleration_shift]: [f64; 2],
+    h: f64,
+) -> Result<()> {
+    let later = acceleration_shift.abs() * h;
+    let change = (acceleration_shift != 0.0).then(|| -> Result<Vec<T>> {
+        let (mut u, mut v) = (motion.u.clone(), motion.v.clone());
+        T::axpy(T::of(later), &motion.v, &mut u);
+        T::axpy(T::of(0.5 * later * later), &motion.a, &mut u);
+        T::axpy(T::of(later), &motion.a, &mut v);
+        let mut a = vec![T::zero(); u.len()];
+        let prescribed = system.prescribed().to_vec();
+        let mut supports = vec![[T::zero(); 3]; prescribed.len()];
+        system.prescribed_motion(motion.t + later, &mut supports);
+        finite_supports(motion.t + later, &prescribed, &supports)?;
+        for (&dof, support) in prescribed.iter().zip(&supports) {
+            [u[dof], v[dof], a[dof]] = *support;
+        }
+        let mut force = vec![T::zero(); u.len()];
+        system.force(motion.t + later, &u, &v, &mut force)?;
+        system.mass().product(-T::one(), &a, &mut force);
+        projection.apply_inverse(&mut force);
+        for (&dof, support) in prescribed.iter().zip(&supports) {
+            force[dof] = support[2];
+        }
+        Ok(force)
+    });
+    T::axpy(T::of(velocity_shift * h), &motion.a, &mut motion.v);
+    if let Some(later) = change.transpose()? {
+        let sign = T::of(acceleration_shift.signum());
+        for (a, later) in motion.a.iter_mut().zip(later) {
+            *a += sign * (later - *a);
+        }
+    }
+    match motion.a.iter().position(|a| !a.is_finite()) {
+        None => Ok(()),
+        Some(dof) => {
+            let value = motion.a[dof].value();
+            Err(Error::StepNotFinite { t: motion.t, h, what: "the initial acceleration", dof, value })
+        }
+    }
 }
 
 /// Whether accelerations change no velocity within a step beyond rounding: then the straight-line past is exact.
@@ -279,4 +385,22 @@ pub(super) fn straight_past<T: Real>(motion: &Motion<T>, h: f64, past: &mut [Mot
         slot.v.copy_from_slice(&motion.v);
         slot.a.fill(T::zero());
     }
+}
+
+/// Fills past states 1, 2, … with Taylor's expansion of a motion.
+pub(super) fn taylor_past<T: Real>(motion: &Motion<T>, h: f64, past: &mut [Motion<T>]) {
+    for (k, slot) in (1_u32..).zip(past) {
+        taylor(motion, -f64::from(k) * h, slot);
+    }
+}
+
+/// u + τ v + ½ τ² a, v + τ a, a.
+pub(super) fn taylor<T: Real>(motion: &Motion<T>, tau: f64, out: &mut Motion<T>) {
+    out.t = motion.t + tau;
+    out.u.copy_from_slice(&motion.u);
+    T::axpy(T::of(tau), &motion.v, &mut out.u);
+    T::axpy(T::of(0.5 * tau * tau), &motion.a, &mut out.u);
+    out.v.copy_from_slice(&motion.v);
+    T::axpy(T::of(tau), &motion.a, &mut out.v);
+    out.a.copy_from_slice(&motion.a);
 }

@@ -48,27 +48,44 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Makes the motion in slot 0 of the history the state. An error leaves state and history to be undone.
     fn accept(&mut self) -> Result<()> {
-        let Self { system, g, state, history, work, statistics, ledger, .. } = self;
-        let books = StepBooks { g, corrections: work.correction_energy, h: history.clock.h };
-        let new = &history.slots[0];
+        let Self { system, g, state, history, work, statistics, ledger, scheme, .. } = self;
+        let stages = work.backup.rotations;
+        let flags = work.trial.closed.iter().zip(&work.closed_at_start);
+        let changes = flags.filter(|(now, before)| now != before).count();
+        let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
+        scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &mut work.shown);
+        let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
+        let corrections = work.correction_energy;
+        let books = StepBooks { t: new.t, motion, contacts: &work.trial, g, corrections, h: history.clock.h };
         if let Some(ledger) = ledger {
-            ledger.prepare(&mut **system, new, &work.trial, &books)?;
+            ledger.prepare(&mut **system, &books)?;
         }
-        system.commit(new.t, &new.u, &new.v)?;
+        system.commit(new.t, motion[0], motion[1])?;
         if let Some(ledger) = ledger {
-            ledger.end(&mut **system, new, &work.trial, &books);
+            ledger.end(&mut **system, &books);
         }
         // The stages between drop out of the past.
-        let stages = work.backup.rotations;
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
-        let flags = work.trial.closed.iter().zip(&work.closed_at_start);
-        statistics.contact_changes += flags.filter(|(now, before)| now != before).count() as u64;
+        std::mem::swap(&mut state.shown, &mut work.shown);
         std::mem::swap(&mut state.contacts, &mut work.trial);
-        history.known = (history.known + 1).min(self.depth);
+        let depth = scheme.depth;
+        history.known = (history.known + 1).min(depth);
+        history.smooth = if changes > 0 { 1 } else { history.smooth + 1 };
+        if !history.trail.is_empty() {
+            history.trail.push(&history.slots[1], history.made_with);
+            for (field, unmoved) in (1..).zip(&mut history.unmoved) {
+                if let Some(front) = history.trail.front().filter(|_| !unmoved.is_empty()) {
+                    std::mem::swap(front.rate_mut(field), unmoved);
+                    unmoved.clear();
+                }
+            }
+        }
+        history.made_with = history.clock.h;
         history.clock.steps += 1;
+        statistics.contact_changes += changes as u64;
         statistics.steps += 1;
-        if history.known == self.depth {
+        if history.known == depth {
             self.startup = None;
         }
         Ok(())
@@ -79,7 +96,7 @@ impl<T: Real> Simulation<'_, T> {
         let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, .. } = self;
         let (program, start_covector) = match &mut self.startup {
             // The covector of one state more than is known now.
-            Some(startup) => (startup, Some(&self.covectors[history.known])),
+            Some(startup) => (startup, Some(&self.scheme.covectors[history.known])),
             None => (&mut self.program, None),
         };
         let clock = history.clock;

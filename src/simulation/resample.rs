@@ -1,0 +1,272 @@
+//! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
+
+use super::program::Compiler;
+use super::scheme::Scheme;
+use super::start::{self, Start, Violation, taylor};
+use super::{Constraints, Simulation};
+use crate::contact::{ContactJacobian, GapRates};
+use crate::corrector::{Gaps, JumpProjection};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::{Clock, History, Motion, State, Trail};
+
+impl<T: Real> Simulation<'_, T> {
+    /// Step size of the steps to come.
+    pub fn step_size(&self) -> f64 {
+        self.history.clock.h
+    }
+
+    /// Changes the step size from here on. Effective matrices are factorized anew (their analysis is kept), and the past
+    /// of a multistep scheme is resampled at the new spacing: u by the cubic through (u, v) of two states, v by the cubic
+    /// through (v, a), a linearly. States from before a contact closed or opened are not used: the past is then
+    /// extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the closed
+    /// contacts.
+    ///
+    /// Schemes of order 2 keep it under any sequence of changes (`tests/step_size.rs`). Total momentum is conserved; the
+    /// impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of the
+    /// scheme.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Composite, 0.01)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// run.run_until(1.0, &mut ())?;
+    /// run.set_step_size(0.004)?;
+    /// run.run_until(2.0, &mut ())?;
+    /// assert!((run.state().displacement()[0] - run.time().cos()).abs() < 1e-4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless h is positive and finite, [`Error::MatrixNotFinite`] or [`Error::Singular`] if the
+    /// effective matrix cannot be factorized with it, [`Error::DependentContacts`]. The simulation is then as it was.
+    pub fn set_step_size(&mut self, h: f64) -> Result<()> {
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
+        }
+        let old = self.history.clock.h;
+        if h.to_bits() == old.to_bits() {
+            return Ok(());
+        }
+        let past = self.resampled(h)?;
+        let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
+        program.set_step_size(&scheme.tableau.stages, &mut **system, old, h)?;
+        if let Some(startup) = startup
+            && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h)
+        {
+            program.set_step_size(&scheme.tableau.stages, &mut **system, h, old)?;
+            return Err(error);
+        }
+        statistics.factorizations +=
+            (program.operators.len() + startup.as_ref().map_or(0, |startup| startup.operators.len())) as u64;
+        keep_trail(scheme, state, history);
+        move_shifted(scheme, state, history, h);
+        for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
+            *slot = resampled;
+        }
+        history.clock = Clock { reference: history.clock.at(0.0), steps: 0, h };
+        Ok(())
+    }
+
+    /// Past states 1, 2, … known − 1 at the spacing h.
+    fn resampled(&mut self, h: f64) -> Result<Vec<Motion<T>>> {
+        let Self { system, constraints, g, state, history, scheme, .. } = self;
+        let known = history.known;
+        let newest = &state.motion;
+        let nodes = computed(state, history);
+        let mut past = vec![Motion::zero(newest.u.len()); known - 1];
+        for (k, out) in (1..known).zip(&mut past) {
+            let t = newest.t - k as f64 * h;
+            // The interval that contains the time, or the oldest one.
+            let interval = nodes.windows(2).find(|pair| pair[1].t <= t).or(nodes.windows(2).last());
+            match interval {
+                Some(&[newer, older]) => interpolate(newer, older, t, out),
+                _ => taylor(newest, t - newest.t, out),
+            }
+        }
+        conserve_momentum(scheme, state, history, h, &mut past);
+        let closed: Vec<usize> = (0..constraints.len()).filter(|&row| state.contacts.closed[row]).collect();
+        if history.smooth < known && !closed.is_empty() {
+            let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
+            projection
+                .close(g, &closed)
+                .map_err(|row| Error::DependentContacts { t: newest.t, contact: constraints.ids[row] })?;
+            for motion in &mut past {
+                project(motion, constraints, g, &projection, &closed);
+            }
+        }
+        Ok(past)
+    }
+
+    /// Starts again from the displacements and velocities of the present state, after a discontinuity that the host
+    /// knows of (a load or a support that jumps): accelerations are those of equilibrium now, contacts at rest are found
+    /// anew, and the past is forgotten and made again as at the start.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    ///
+    /// // A mass under a force that is switched on at t = 1.
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let system = LinearSystem::lumped(vec![1.0], k)?.load(|t, f| f[0] = if t < 1.0 - 1e-9 { 0.0 } else { 3.0 });
+    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build()?;
+    /// run.run_until(0.9, &mut ())?;
+    /// run.set_step_size(0.1 - 1e-8)?; // end the step before the jump …
+    /// run.step()?;
+    /// run.set_step_size(1e-8)?;
+    /// run.run_until(1.0, &mut ())?;
+    /// run.restart()?; // … and begin again behind it
+    /// assert!((run.state().acceleration()[0] - 3.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of building a simulation from this state. The simulation is then as it was.
+    pub fn restart(&mut self) -> Result<()> {
+        let (h, t) = (self.history.clock.h, self.time());
+        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
+        let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
+        // The search of the start may replace rows of G: responses to the old ones go first.
+        let programs = std::iter::once(&mut self.program).chain(&mut *startup);
+        programs.flat_map(|program| &mut program.operators).for_each(super::Operator::reset);
+        if let Some(projection) = &mut work.projection {
+            projection.reset();
+        }
+        let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
+        let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t };
+        let begun = start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
+        let rows = constraints.capacity();
+        contact_solver.reserve(rows);
+        let depth = scheme.depth;
+        if begun.1.known < depth && startup.is_none() {
+            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, rows };
+            let program = compiler.start(&scheme.starter, &scheme.tableau)?;
+            self.statistics.factorizations += program.operators.len() as u64;
+            *startup = Some(program);
+        } else if begun.1.known == depth {
+            *startup = None;
+        }
+        (*state, *history) = begun;
+        Ok(())
+    }
+}
+
+/// The motions as they were computed since a contact last closed or opened, newest first.
+fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<&'h Motion<T>> {
+    let newest = std::iter::once(&state.motion);
+    let smooth = history.smooth;
+    match history.trail.is_empty() {
+        // As long as the step has not changed, the past that the scheme reads is what was computed.
+        true => newest.chain(&history.slots[1..history.known]).take(smooth).collect(),
+        false => newest.chain(history.trail.known().map(|(motion, _)| motion)).take(smooth).collect(),
+    }
+}
+
+/// Begins to keep the computed motions, enough of them for ratios of step sizes up to 3.
+fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
+    let shifted = scheme.shifts().iter().any(|shift| shift.abs() > 0.0);
+    let length = if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) };
+    if history.trail.is_empty() && length > 0 {
+        // One-step schemes read no past, but the motion before is still there.
+        let known = history.known.max(history.smooth.min(2));
+        let past: Vec<_> = history.slots[1..known].iter().map(|motion| (motion, history.made_with)).collect();
+        history.trail = Trail::new(length, state.motion.u.len(), &past);
+    }
+}
+
+/// Moves stored v and a that live δ steps from their state to the place of the new step, along the line through the
+/// last two computed ones.
+fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
+    let History { trail, unmoved, made_with, smooth, .. } = history;
+    let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
+    let interval = state.motion.t - previous.t;
+    for (field, (shift, unmoved)) in (1..).zip(scheme.shifts().into_iter().zip(unmoved)) {
+        if shift == 0.0 {
+            continue;
+        }
+        let stored = state.motion.rate_mut(field);
+        if unmoved.is_empty() {
+            unmoved.clone_from(stored);
+        }
+        let distance = interval + shift * (*made_with - previous_h);
+        let fraction = T::of(shift * (h - *made_with) / distance);
+        stored.copy_from_slice(unmoved);
+        T::axpy_difference(fraction, unmoved, previous.field(field), stored);
+    }
+}
+
+/// The motion at t on the polynomials through two others, beyond the older one too: u by Hermite's cubic through (u, v),
+/// v by the one through (v, a), a linearly.
+fn interpolate<T: Real>(newer: &Motion<T>, older: &Motion<T>, t: f64, out: &mut Motion<T>) {
+    let length = newer.t - older.t;
+    let s = (newer.t - t) / length;
+    let difference = T::of(s * s * (3.0 - 2.0 * s));
+    let slopes = [-length * s * (1.0 - s) * (1.0 - s), length * s * s * (1.0 - s)].map(T::of);
+    let cubic = |x: &[T], x0: &[T], rate: &[T], rate0: &[T], out: &mut [T]| {
+        out.copy_from_slice(x);
+        T::axpy_difference(difference, x0, x, out);
+        T::axpy(slopes[0], rate, out);
+        T::axpy(slopes[1], rate0, out);
+    };
+    out.t = t;
+    cubic(&newer.u, &older.u, &newer.v, &older.v, &mut out.u);
+    cubic(&newer.v, &older.v, &newer.a, &older.a, &mut out.v);
+    out.a.copy_from_slice(&newer.a);
+    T::axpy_difference(T::of(s), &older.a, &newer.a, &mut out.a);
+}
+
+/// Shifts the resampled past so that the scheme's momentum is that before the change.
+///
+/// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h makes it p (h' − h) a more.
+/// Interpolation errs in ψ by O(h²) at every change; left alone, changes at every step would leave order 1.
+fn conserve_momentum<T: Real>(
+    scheme: &Scheme<'_>,
+    state: &State<T>,
+    history: &History<T>,
+    h: f64,
+    past: &mut [Motion<T>],
+) {
+    let Some(psi) = scheme.covectors.get(past.len()) else { return };
+    let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
+    let p = psi[0][2] + older().map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum::<f64>();
+    // The momentum that a unit shift of the past velocities makes, and a shift −k h of the past displacements.
+    let (by_u, by_v): (f64, f64) = (older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum());
+    let newest = &state.motion;
+    let mut miss = scheme.momentum(newest, &history.slots[1..history.known], history.clock.h);
+    T::axpy(T::of(p * (h - history.clock.h)), &newest.a, &mut miss);
+    T::axpy(-T::one(), &scheme.momentum(newest, past, h), &mut miss);
+    for (k, motion) in (1_u32..).zip(past) {
+        if by_u.abs() >= by_v.abs() {
+            T::axpy(T::of(-f64::from(k) * h / by_u), &miss, &mut motion.u);
+        } else {
+            T::axpy(T::of(by_v.recip()), &miss, &mut motion.v);
+        }
+    }
+}
+
+/// Projects gap, gap rate and gap acceleration of a past state to zero on the closed rows.
+fn project<T: Real>(
+    motion: &mut Motion<T>,
+    constraints: &mut Constraints<'_, T>,
+    g: &ContactJacobian<T>,
+    projection: &JumpProjection<T>,
+    closed: &[usize],
+) {
+    let mut gaps = vec![T::zero(); constraints.len()];
+    let mut rates = vec![GapRates::default(); constraints.len()];
+    let mut multipliers = vec![T::zero(); closed.len()];
+    constraints.gap(motion.t, &motion.u, &mut gaps);
+    let targets: Vec<T> = closed.iter().map(|&row| g.product(row, &motion.u) - gaps[row]).collect();
+    projection.remove_jump(g, &targets, &mut motion.u, &mut multipliers);
+    constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+    let targets: Vec<T> = closed.iter().map(|&row| -rates[row].rate).collect();
+    projection.remove_jump(g, &targets, &mut motion.v, &mut multipliers);
+    let targets: Vec<T> = closed.iter().map(|&row| -rates[row].acceleration).collect();
+    projection.remove_jump(g, &targets, &mut motion.a, &mut multipliers);
+}

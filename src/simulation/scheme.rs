@@ -1,0 +1,71 @@
+//! The scheme of a run, and what follows from its rows besides the compiled program.
+
+use crate::analysis::{self, Order};
+use crate::integrator::{Newmark, TimeIntegrator};
+use crate::real::Real;
+use crate::state::Motion;
+use crate::tableau::{StartUp, Tableau};
+
+/// An integrator, its tableau, and the numbers derived from it once.
+#[derive(Debug)]
+pub(super) struct Scheme<'a> {
+    pub(super) integrator: Box<dyn TimeIntegrator + 'a>,
+    pub(super) tableau: Tableau,
+    /// Number of states a step reads, the current one included.
+    pub(super) depth: usize,
+    pub(super) order: Order,
+    pub(super) start_up: StartUp,
+    /// The one-step scheme of the first steps.
+    pub(super) starter: Tableau,
+    /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
+    pub(super) covectors: Vec<Vec<[f64; 3]>>,
+}
+
+impl<'a> Scheme<'a> {
+    /// Derives everything from a tableau that was checked.
+    pub(super) fn new(integrator: Box<dyn TimeIntegrator + 'a>, tableau: Tableau, start_up: StartUp) -> Self {
+        let starter = Newmark::trapezoidal().tableau();
+        let covectors = tableau.momentum().during_start(&starter.stages[0]);
+        let order = analysis::order(&tableau);
+        let depth = tableau.depth();
+        Self { integrator, tableau, depth, order, start_up, starter, covectors }
+    }
+
+    /// Times of the stored v and a, in steps from that of the state.
+    pub(super) fn shifts(&self) -> [f64; 2] {
+        [self.order.velocity_shift, self.order.acceleration_shift]
+    }
+
+    /// ψ of the known states over h, one entry a dof: times M it is the momentum that the scheme conserves. `past` holds the
+    /// states before the newest, in the spacing h.
+    pub(super) fn momentum<T: Real>(&self, newest: &Motion<T>, past: &[Motion<T>], h: f64) -> Vec<T> {
+        let mut sum = vec![T::zero(); newest.u.len()];
+        let known = past.len().min(self.depth - 1);
+        for (psi, motion) in self.covectors[known].iter().zip(std::iter::once(newest).chain(past)) {
+            // Displacements enter with weights that sum to zero: differences keep their digits.
+            T::axpy_difference(T::of(psi[0] / h), &motion.u, &newest.u, &mut sum);
+            T::axpy(T::of(psi[1]), &motion.v, &mut sum);
+            T::axpy(T::of(psi[2] * h), &motion.a, &mut sum);
+        }
+        sum
+    }
+
+    /// Memory for v and a at the time of a state: empty where the stored ones live there.
+    pub(super) fn shown<T: Real>(&self, motion: &Motion<T>) -> [Vec<T>; 2] {
+        let of = |field: usize| if self.shifts()[field - 1] == 0.0 { Vec::new() } else { motion.field(field).to_vec() };
+        [of(1), of(2)]
+    }
+
+    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown as
+    /// they are.
+    pub(super) fn show<T: Real>(&self, new: &Motion<T>, past: Option<&Motion<T>>, shown: &mut [Vec<T>; 2]) {
+        for (field, (shift, shown)) in (1..).zip(self.shifts().into_iter().zip(shown)) {
+            if shift != 0.0 {
+                shown.copy_from_slice(new.field(field));
+                if let Some(past) = past {
+                    T::axpy_difference(T::of(-shift), new.field(field), past.field(field), shown);
+                }
+            }
+        }
+    }
+}
