@@ -1,10 +1,11 @@
 //! Observed order of u, v and a on smooth motion: damped forced oscillator, and several dofs at once.
 
+use contact_dynamics::analysis::order;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::tableau::StartUp;
 use contact_dynamics::{LinearSystem, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::schemes::all;
+use contact_dynamics_scenes::schemes::{Listed, all};
 
 const OMEGA: f64 = 2.0;
 const XI: f64 = 0.05;
@@ -44,22 +45,28 @@ fn observed(steps: u32, error: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| (coarse[i] / fine[i]).log2())
 }
 
+fn is_shifted(scheme: Listed) -> bool {
+    order(&(scheme.make)().tableau()).acceleration_shift.abs() > 0.0
+}
+
 #[test]
 fn damped_forced_oscillator_converges_with_the_order_of_the_scheme_in_u_v_and_a() {
     for scheme in all() {
-        // First-order schemes have large constants, and approach their order late.
-        let steps = if scheme.order == 1 { 25_600 } else { 1600 };
-        let order = observed(steps, |steps| oscillator_error((scheme.make)(), StartUp::Trapezoidal, steps));
+        // First-order schemes have large constants and approach their order late, and so do those which start with an
+        // acceleration of another time.
+        let late = scheme.order == 1 || is_shifted(scheme);
+        let steps = if late { 25_600 } else { 1600 };
+        let found = observed(steps, |steps| oscillator_error((scheme.make)(), StartUp::Trapezoidal, steps));
         let near = |order: &f64| (order - f64::from(scheme.order)).abs() < 0.05;
-        assert!(order.iter().all(near), "{}: {order:?}", scheme.name());
+        assert!(found.iter().all(near), "{}: {found:?}", scheme.name());
     }
 }
 
 #[test]
 fn a_taylor_past_keeps_the_order_of_multistep_schemes() {
     for scheme in all().into_iter().filter(|scheme| (scheme.make)().tableau().depth() > 1) {
-        let order = observed(1600, |steps| oscillator_error((scheme.make)(), StartUp::Taylor, steps));
-        assert!(order.iter().all(|order| (order - 2.0).abs() < 0.05), "{}: {order:?}", scheme.name());
+        let found = observed(1600, |steps| oscillator_error((scheme.make)(), StartUp::Taylor, steps));
+        assert!(found.iter().all(|order| (order - 2.0).abs() < 0.05), "{}: {found:?}", scheme.name());
     }
 }
 
@@ -119,11 +126,13 @@ fn several_dofs_are_second_order_from_the_first_step() {
         ]
     };
     for scheme in all().into_iter().filter(|scheme| scheme.order == 2) {
-        let order = observed(1600, |steps| error((scheme.make)(), steps, steps));
-        assert!(order.iter().all(|o| (o - 2.0).abs() < 0.05), "{}: {order:?}", scheme.name());
-        // Houbolt and Park change from two trapezoidal steps to their own rows here. (Errors may change sign early: an
-        // order above 2 is no fault.)
+        let found = observed(1600, |steps| error((scheme.make)(), steps, steps));
+        assert!(found.iter().all(|o| (o - 2.0).abs() < 0.05), "{}: {found:?}", scheme.name());
+        // Houbolt and Park change from two trapezoidal steps to their own rows here. Schemes that store a at another time
+        // start with that of the first state, which their first few accelerations show. (Errors may change sign early:
+        // an order above 2 is no fault.)
         let early = observed(1600, |steps| error((scheme.make)(), steps, 3));
-        assert!(early.iter().all(|&o| o > 1.7), "{}, third step: {early:?}", scheme.name());
+        let least = if is_shifted(scheme) { 0.9 } else { 1.7 };
+        assert!(early.iter().all(|&o| o > least), "{}, third step: {early:?}", scheme.name());
     }
 }

@@ -5,8 +5,8 @@ use contact_dynamics::contact::ContactJacobian;
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Bathe, Composite, GeneralizedAlpha, JumpProjection, LinearRows, LinearSystem, Mass, Newmark, Park,
-    PersistencyCorrection, Simulation, TimeIntegrator,
+    Bathe, Bdf2, Composite, GeneralizedAlpha, Gssss, Houbolt, JumpProjection, LinearRows, LinearSystem, Mass, Newmark,
+    Oalts, Park, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use proptest::prelude::*;
 
@@ -16,7 +16,13 @@ fn scheme(index: usize) -> Box<dyn TimeIntegrator> {
         1 => Box::new(Newmark::trapezoidal()),
         2 => Box::new(Bathe::default()),
         3 => Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
-        _ => Box::new(Park),
+        4 => Box::new(Park),
+        5 => Box::new(Houbolt),
+        6 => Box::new(Bdf2),
+        7 => Box::new(Oalts::new(0.5).unwrap()),
+        8 => Box::new(Bathe::with_radius(0.7).unwrap()),
+        9 => Box::new(GeneralizedAlpha::hht(0.7).unwrap()),
+        _ => Box::new(Gssss::new(0.4, 0.9, 0.2).unwrap()),
     }
 }
 
@@ -45,7 +51,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         let gaps = prop::collection::vec(0.0..0.2, n);
         let velocity = prop::collection::vec(-2.0..2.0, n);
         let damping = prop_oneof![Just((0.0, 0.0)), (0.0..0.1, 0.0..0.01)];
-        (masses, springs, coupling, weights, gaps, velocity, damping, 0.002..0.05, 0_usize..5).prop_map(
+        (masses, springs, coupling, weights, gaps, velocity, damping, 0.002..0.05, 0_usize..11).prop_map(
             |(masses, springs, coupling, weights, gaps, velocity, damping, h, scheme)| {
                 let rows = weights
                     .into_iter()

@@ -63,11 +63,12 @@ fn random(i: u32) -> f64 {
     3.0_f64.powf(draw - 0.5)
 }
 
+type Pattern = fn(u32) -> f64;
+
 /// With a constant step, with one that alternates, and with one that is drawn anew for every step. Stability limits of
 /// explicit schemes are far away.
 #[test]
 fn every_scheme_keeps_its_order_when_the_step_changes_every_time() {
-    type Pattern = fn(u32) -> f64;
     let patterns: [(&str, Pattern, f64); 5] = [
         ("constant", |_| 1.0, 0.05),
         ("1, 2", |i| if i % 2 == 0 { 1.0 } else { 2.0 }, 0.05),
@@ -102,7 +103,6 @@ fn stiff_modes_do_not_grow_when_the_step_changes_every_time() {
         || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
         || Box::new(MoreauJean::new(0.5).unwrap()),
     ];
-    type Pattern = fn(u32) -> f64;
     let patterns: [Pattern; 3] =
         [random, |i| if i % 2 == 0 { 1.0 } else { 3.0 }, |i| if i / 10 % 2 == 0 { 1.0 } else { 3.0 }];
     for make in schemes {
@@ -226,7 +226,7 @@ fn a_run_with_step_changes_is_resumed_bit_for_bit() {
 fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
     let mut run = oscillator(Box::new(Composite), 0.01);
     run.run_until(0.1, &mut ()).unwrap();
-    let before = (run.state().clone(), run.statistics().clone());
+    let before = (run.state().clone(), *run.statistics());
     for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(run.set_step_size(h), Err(Error::Parameter { .. })));
     }

@@ -57,13 +57,22 @@ impl<'a> Scheme<'a> {
     }
 
     /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown as
-    /// they are.
-    pub(super) fn show<T: Real>(&self, new: &Motion<T>, past: Option<&Motion<T>>, shown: &mut [Vec<T>; 2]) {
+    /// they are. Prescribed motions are given at the time of the state.
+    pub(super) fn show<T: Real>(
+        &self,
+        new: &Motion<T>,
+        past: Option<&Motion<T>>,
+        prescribed: &[usize],
+        shown: &mut [Vec<T>; 2],
+    ) {
         for (field, (shift, shown)) in (1..).zip(self.shifts().into_iter().zip(shown)) {
             if shift != 0.0 {
                 shown.copy_from_slice(new.field(field));
                 if let Some(past) = past {
                     T::axpy_difference(T::of(-shift), new.field(field), past.field(field), shown);
+                }
+                for &dof in prescribed {
+                    shown[dof] = new.field(field)[dof];
                 }
             }
         }

@@ -51,8 +51,8 @@ impl<T: Real> Start<'_, T> {
         let (mut motion, contacts) = self.motion(u, v, constraints, g, projection, violation)?;
         let depth = scheme.depth;
         let mut slots = vec![Motion::zero(motion.u.len()); depth + scheme.tableau.stages.len()];
-        let known = if is_free_flight(&motion, h) {
-            straight_past(&motion, h, &mut slots[1..depth]);
+        straight_past(&motion, h, &mut slots[1..depth]);
+        let known = if is_free_flight(self.system, projection, &motion, &slots[1..depth], h)? {
             depth
         } else if scheme.start_up == StartUp::Taylor {
             taylor_past(&motion, h, &mut slots[1..depth]);
@@ -61,9 +61,13 @@ impl<T: Real> Start<'_, T> {
             1
         };
         let shown = scheme.shown(&motion);
-        // With contact the rate of a is not that of f.
-        if !contacts.closed.contains(&true) {
-            store(self.system, projection, &mut motion, scheme.shifts(), h)?;
+        // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate would
+        // be that of the stiffest mode.
+        let a_to_v = T::of(scheme.shifts()[0] * h);
+        let Motion { v, a, .. } = &mut motion;
+        T::axpy(a_to_v, a, v);
+        for &dof in self.system.prescribed().iter().filter(|_| a_to_v != T::zero()) {
+            v[dof] = shown[0][dof];
         }
         let clock = Clock { reference: t, steps: 0, h };
         let history = History {
@@ -320,59 +324,30 @@ fn touching_contacts<T: Real>(
     Ok(touching)
 }
 
-/// Moves v and a to the times at which the scheme stores them, `shifts` in steps from the time of the state.
-///
-/// The rate of a comes from a second evaluation of f, a little later and not earlier: loads often begin with the run.
-pub(super) fn store<T: Real>(
+/// Whether the straight line into the past is a motion of the system: no acceleration at the start changes a velocity
+/// beyond rounding within a step, nor would any at the past states.
+fn is_free_flight<T: Real>(
     system: &mut dyn System<T>,
     projection: &mut JumpProjection<T>,
-    motion: &mut Motion<T>,
-    [velocity_shift, acceleration_shift]: [f64; 2],
+    motion: &Motion<T>,
+    past: &[Motion<T>],
     h: f64,
-) -> Result<()> {
-    let later = acceleration_shift.abs() * h;
-    let change = (acceleration_shift != 0.0).then(|| -> Result<Vec<T>> {
-        let (mut u, mut v) = (motion.u.clone(), motion.v.clone());
-        T::axpy(T::of(later), &motion.v, &mut u);
-        T::axpy(T::of(0.5 * later * later), &motion.a, &mut u);
-        T::axpy(T::of(later), &motion.a, &mut v);
-        let mut a = vec![T::zero(); u.len()];
-        let prescribed = system.prescribed().to_vec();
-        let mut supports = vec![[T::zero(); 3]; prescribed.len()];
-        system.prescribed_motion(motion.t + later, &mut supports);
-        finite_supports(motion.t + later, &prescribed, &supports)?;
-        for (&dof, support) in prescribed.iter().zip(&supports) {
-            [u[dof], v[dof], a[dof]] = *support;
-        }
-        let mut force = vec![T::zero(); u.len()];
-        system.force(motion.t + later, &u, &v, &mut force)?;
-        system.mass().product(-T::one(), &a, &mut force);
-        projection.apply_inverse(&mut force);
-        for (&dof, support) in prescribed.iter().zip(&supports) {
-            force[dof] = support[2];
-        }
-        Ok(force)
-    });
-    T::axpy(T::of(velocity_shift * h), &motion.a, &mut motion.v);
-    if let Some(later) = change.transpose()? {
-        let sign = T::of(acceleration_shift.signum());
-        for (a, later) in motion.a.iter_mut().zip(later) {
-            *a += sign * (later - *a);
-        }
-    }
-    match motion.a.iter().position(|a| !a.is_finite()) {
-        None => Ok(()),
-        Some(dof) => {
-            let value = motion.a[dof].value();
-            Err(Error::StepNotFinite { t: motion.t, h, what: "the initial acceleration", dof, value })
-        }
-    }
-}
-
-/// Whether accelerations change no velocity within a step beyond rounding: then the straight-line past is exact.
-pub(super) fn is_free_flight<T: Real>(motion: &Motion<T>, h: f64) -> bool {
+) -> Result<bool> {
     let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
-    T::of(h) * largest(&motion.a) <= T::of(64.0) * T::epsilon() * largest(&motion.v)
+    let bound = T::of(64.0) * T::epsilon() * largest(&motion.v);
+    let small = |a: &[T]| T::all_finite(a) && T::of(h) * largest(a) <= bound;
+    if !small(&motion.a) {
+        return Ok(false);
+    }
+    let mut a = vec![T::zero(); motion.u.len()];
+    for motion in past {
+        system.force(motion.t, &motion.u, &motion.v, &mut a)?;
+        projection.apply_inverse(&mut a);
+        if !small(&a) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Fills past states 1, 2, … with u − k h v, v, 0.

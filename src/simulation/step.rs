@@ -53,7 +53,7 @@ impl<T: Real> Simulation<'_, T> {
         let flags = work.trial.closed.iter().zip(&work.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
-        scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &mut work.shown);
+        scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.prescribed, &mut work.shown);
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         let corrections = work.correction_energy;
         let books = StepBooks { t: new.t, motion, contacts: &work.trial, g, corrections, h: history.clock.h };

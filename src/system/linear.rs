@@ -74,7 +74,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// # Errors
     ///
     /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`]
-    /// for a diagonal mass that is not positive.
+    /// for a diagonal mass that is negative (zero is allowed on dofs that are fixed or driven).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
         sparse::check_symmetric("mass", mass.as_ref())?;
         let n = mass.nrows();
@@ -210,8 +210,9 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     }
 }
 
+/// (Zero is refused when a simulation is built, unless the dof is prescribed.)
 fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
-    match mass.iter().position(|&m| !(m > T::zero() && m.is_finite())) {
+    match mass.iter().position(|&m| !(m >= T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
         None => Ok(()),
     }

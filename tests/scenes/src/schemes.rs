@@ -1,5 +1,6 @@
 //! Every scheme of the library with what the literature says of it: the one list that tests and examples go through.
 
+use contact_dynamics::tableau::ContactLevel;
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, CentralDifference, ChungLee, Composite, GeneralizedAlpha, Gssss, Houbolt, HulbertChung,
     MoreauJean, Newmark, NohBathe, Oalts, Park, TchamwaWielgosz, TimeIntegrator,
@@ -24,6 +25,11 @@ impl Listed {
     /// What the scheme calls itself.
     pub fn name(&self) -> String {
         (self.make)().name()
+    }
+
+    /// Whether contact is imposed on the displacements of the state, where corrections apply.
+    pub fn takes_corrections(&self) -> bool {
+        (self.make)().tableau().stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
     }
 
     /// Whether a multiplier can impose contact.
