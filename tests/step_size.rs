@@ -52,8 +52,9 @@ fn errors(scheme: Box<dyn TimeIntegrator>, h: f64, steps: u32, ratio: impl Fn(u3
     sums.map(|sum| (sum / f64::from(steps - steps / 2)).sqrt())
 }
 
-fn observed(make: fn() -> Box<dyn TimeIntegrator>, ratio: impl Fn(u32) -> f64 + Copy) -> [f64; 3] {
-    let (coarse, fine) = (errors(make(), 8.0 / 1600.0, 1600, ratio), errors(make(), 8.0 / 3200.0, 3200, ratio));
+fn observed(make: fn() -> Box<dyn TimeIntegrator>, steps: u32, ratio: impl Fn(u32) -> f64 + Copy) -> [f64; 3] {
+    let at = |steps: u32| errors(make(), 8.0 / f64::from(steps), steps, ratio);
+    let (coarse, fine) = (at(steps), at(2 * steps));
     [0, 1, 2].map(|i| (coarse[i] / fine[i]).log2())
 }
 
@@ -78,7 +79,9 @@ fn every_scheme_keeps_its_order_when_the_step_changes_every_time() {
     ];
     for scheme in all() {
         for (pattern, ratio, tolerance) in patterns {
-            let found = observed(scheme.make, ratio);
+            // (Explicit schemes that start with an acceleration of another time are asymptotic late.)
+            let steps = if scheme.critical.is_some() { 6400 } else { 1600 };
+            let found = observed(scheme.make, steps, ratio);
             let expected = f64::from(scheme.order);
             // (The error constant of a first-order scheme is large: it is not quite asymptotic here.)
             let tolerance: f64 = if scheme.order == 1 { 0.11 } else { tolerance };

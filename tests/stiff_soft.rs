@@ -18,7 +18,7 @@ fn the_stiff_mode_is_left_behind_or_not_as_published() {
     assert!(near(v, 1.22) && a > 500.0, "{v} {a}");
     let [v, a] = late(Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()));
     assert!(near(v, 0.75) && a > 20.0, "{v} {a}");
-    let [v, a] = late(Box::new(Bathe::default()));
+    let [v, a] = late(Box::<Bathe>::default());
     assert!(near(v, 0.0081) && near(a, 0.146), "{v} {a}");
     let [v, a] = late(Box::new(Composite));
     assert!(near(v, 0.039) && near(a, 0.065), "{v} {a}");
