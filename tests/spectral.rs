@@ -49,7 +49,7 @@ fn stability_limits_are_those_of_the_literature() {
         let found = critical_omega(&tableau, 0.0);
         match (scheme.critical, found) {
             (None, None) => {}
-            (Some(expected), Some(found)) => assert!((found - expected).abs() < 6e-4, "{name}: {found}"),
+            (Some(expected), Some(found)) => assert!((found - expected).abs() < 2e-4, "{name}: {found}"),
             _ => panic!("{name}: {found:?} instead of {:?}", scheme.critical),
         }
         match (scheme.radius, radius_at_infinity(&tableau)) {
@@ -150,9 +150,18 @@ fn radii_at_infinity_are_those_asked_for() {
 
 #[test]
 fn explicit_families_have_the_published_limits() {
-    for (rho, critical) in [(0.0, 1.5493), (0.5, 1.8666), (0.8, 1.9759), (1.0, 2.0)] {
+    // A root −1: Ω² = 2 (1 − 2α_m)/(2β − γ), and 4/(4β − 3) for Chung and Lee.
+    for rho in [0.0_f64, 0.5, 0.8, 0.95] {
+        let (am, beta) =
+            ((2.0 * rho - 1.0) / (1.0 + rho), (5.0 - 3.0 * rho) / ((1.0 + rho) * (1.0 + rho) * (2.0 - rho)));
+        let critical = (2.0 * (1.0 - 2.0 * am) / (2.0 * beta - 1.5 + am)).sqrt();
         let found = critical_omega(&HulbertChung::new(rho).unwrap().tableau(), 0.0).unwrap();
-        assert!((found - critical).abs() < 2e-4, "ρ_b = {rho}: {found}");
+        assert!((found - critical).abs() < 1e-8, "ρ_b = {rho}: {found} instead of {critical}");
+    }
+    for beta in [1.01, 28.0 / 27.0] {
+        let critical = f64::sqrt(4.0 / (4.0 * beta - 3.0));
+        let found = critical_omega(&ChungLee::new(beta).unwrap().tableau(), 0.0).unwrap();
+        assert!((found - critical).abs() < 1e-8, "β = {beta}: {found} instead of {critical}");
     }
     for phi in [1.0, 1.033, 1.2, 1.7] {
         let tableau = TchamwaWielgosz::new(phi).unwrap().tableau();

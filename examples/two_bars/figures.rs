@@ -1,7 +1,7 @@
 //! The figures: time histories of the contact nodes against the exact solution.
 
 use crate::experiment::{Correction, END, Experiment, Run, Sample, before_and_after};
-use crate::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, banner, page};
+use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, banner, page};
 use std::error::Error;
 
 /// Stroke widths in quarters of a pixel.
@@ -114,7 +114,7 @@ fn millinewtons(sample: &Sample) -> f64 {
 }
 
 fn time_axis() -> Axis {
-    Axis { label: "time (s)", range: 0.0..END, ticks: vec![0.0, 0.1, 0.2, 0.3, 0.4] }
+    Axis::linear("time (s)", 0.0..END, &[0.0, 0.1, 0.2, 0.3, 0.4])
 }
 
 /// A panel of contact forces with ticks at halves or multiples of the exact force; says how high the curves reach if
@@ -124,11 +124,8 @@ fn force_panel(experiment: &Experiment, title: String, curves: Vec<Curve>) -> Pa
     let peak = curves.iter().flat_map(Curve::values).fold(0.0, f64::max) / plateau;
     let [low, high] = FORCE_AXIS_ENDS;
     let (end, ticks) = if peak < low { (low, [0.0, 0.5, 1.0, 1.5]) } else { (high, [0.0, 1.0, 2.0, 3.0]) };
-    let y = Axis {
-        label: "contact force (mN)",
-        range: -0.04 * end * plateau..end * plateau,
-        ticks: ticks.map(|multiple| multiple * plateau).to_vec(),
-    };
+    let range = -0.04 * end * plateau..end * plateau;
+    let y = Axis::linear("contact force (mN)", range, &ticks.map(|multiple| multiple * plateau));
     let corner = (experiment.contact().0, 0.98 * y.range.end);
     let note = (peak > high).then(|| (corner, format!("peak {peak:.1} F₀ →")));
     Panel { title, x: time_axis(), y, curves, note }

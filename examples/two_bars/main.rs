@@ -15,7 +15,6 @@ mod experiment;
 mod figures;
 mod history;
 mod options;
-mod plot;
 mod table;
 
 use experiment::{Experiment, Run, before_and_after};

@@ -15,7 +15,7 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 ///
 /// * Order 2. The stored a lags by one step; the acceleration of a [`State`](crate::State) is extrapolated to its time.
 /// * β = 1 has no damping, β = 28/27 the most (ρ_b = ½; the spectrum of Hulbert–Chung with ρ_b = ½). Stable for
-///   Ω < 1.8666 at β = 28/27; damping forces that lag lower this bound.
+///   Ω < 2/√(4β − 3), 1.8665 at β = 28/27; damping forces that lag lower this bound.
 /// * Conserves linear momentum in the form v − ½ h a.
 /// * Contact is imposed on the displacements at the end of the step by the multiplier at its start.
 ///

@@ -2,7 +2,10 @@
 
 pub mod bars;
 pub mod measure;
+pub mod output;
+pub mod plot;
 pub mod schemes;
+pub mod tables;
 
 pub use bars::{Bars, MassKind};
 pub use measure::{Figures, Record, record};

@@ -86,9 +86,9 @@ pub fn all() -> Vec<Listed> {
         explicit(|| Box::new(CentralDifference), 2, 2.0, [-1.693, 0.0]),
         explicit(|| Box::new(CdLagrange), 2, 2.0, [-1.693, 0.0]),
         explicit(|| Box::new(TchamwaWielgosz::new(1.033).unwrap()), 1, 1.937, [-2.021, 1.022]),
-        explicit(|| Box::new(ChungLee::new(28.0 / 27.0).unwrap()), 2, 1.8666, [-1.092, 0.445]),
-        explicit(|| Box::new(HulbertChung::new(0.8).unwrap()), 2, 1.9759, [-1.654, 0.018]),
-        explicit(|| Box::new(HulbertChung::new(0.5).unwrap()), 2, 1.8666, [-1.092, 0.445]),
+        explicit(|| Box::new(ChungLee::new(28.0 / 27.0).unwrap()), 2, 1.8665, [-1.092, 0.445]),
+        explicit(|| Box::new(HulbertChung::new(0.8).unwrap()), 2, 1.9758, [-1.654, 0.018]),
+        explicit(|| Box::new(HulbertChung::new(0.5).unwrap()), 2, 1.8665, [-1.092, 0.445]),
         explicit(|| Box::new(NohBathe::new(0.54).unwrap()), 2, 3.745, [-0.247, 0.052]),
         explicit(|| Box::new(NohBathe::with_radius(0.0).unwrap()), 2, 3.571, [-0.11, 0.091]),
     ]

@@ -4,15 +4,19 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-pub(crate) use plotters::style::RGBColor;
+pub use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::error::Error;
 use std::ops::Range;
 
-pub(crate) const DARK: RGBColor = RGBColor(0x22, 0x22, 0x22);
-pub(crate) const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
-pub(crate) const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
-pub(crate) const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+pub const DARK: RGBColor = RGBColor(0x22, 0x22, 0x22);
+pub const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
+pub const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
+pub const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+pub const ORANGE: RGBColor = RGBColor(0xe6, 0x9f, 0x00);
+pub const SKY: RGBColor = RGBColor(0x56, 0xb4, 0xe9);
+pub const PURPLE: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
+pub const GRAY: RGBColor = RGBColor(0x80, 0x80, 0x80);
 const FRAME: RGBColor = RGBColor(0x90, 0x90, 0x90);
 const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 
@@ -37,25 +41,45 @@ const TITLE: f64 = 1.24 * 60.0;
 type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Point = (f64, f64);
 
+/// How the numbers of an axis are written.
+#[derive(Clone, Copy)]
+pub enum Scale {
+    Linear,
+    /// Values are decimal logarithms, labels are the numbers themselves.
+    Logarithmic,
+}
+
 /// Label, range and ticks of an axis.
 #[derive(Clone)]
-pub(crate) struct Axis {
-    pub(crate) label: &'static str,
-    pub(crate) range: Range<f64>,
-    pub(crate) ticks: Vec<f64>,
+pub struct Axis {
+    pub label: &'static str,
+    pub range: Range<f64>,
+    pub ticks: Vec<f64>,
+    pub scale: Scale,
 }
 
 impl Axis {
+    /// Between two numbers, with these ticks.
+    pub fn linear(label: &'static str, range: Range<f64>, ticks: &[f64]) -> Self {
+        Self { label, range, ticks: ticks.to_vec(), scale: Scale::Linear }
+    }
+
+    /// Between two powers of ten, with a tick at each `every` of them. Points must be given by their logarithms.
+    pub fn decades(label: &'static str, from: i32, to: i32, every: usize) -> Self {
+        let ticks = (from..=to).step_by(every).map(f64::from).collect();
+        Self { label, range: f64::from(from)..f64::from(to), ticks, scale: Scale::Logarithmic }
+    }
+
     /// Zero in the middle, wide enough for the curves.
-    pub(crate) fn symmetric(label: &'static str, curves: &[Curve]) -> Self {
+    pub fn symmetric(label: &'static str, curves: &[Curve]) -> Self {
         let limit = round_up(curves.iter().flat_map(Curve::values).map(f64::abs).fold(0.0, f64::max));
-        Self { label, range: -limit..limit, ticks: [-1.0, -0.5, 0.0, 0.5, 1.0].map(|x| x * limit).to_vec() }
+        Self::linear(label, -limit..limit, &[-1.0, -0.5, 0.0, 0.5, 1.0].map(|x| x * limit))
     }
 
     /// From zero to above the curves.
-    pub(crate) fn upward(label: &'static str, curves: &[Curve]) -> Self {
+    pub fn upward(label: &'static str, curves: &[Curve]) -> Self {
         let limit = round_up(curves.iter().flat_map(Curve::values).fold(0.0, f64::max));
-        Self { label, range: -0.04 * limit..limit, ticks: [0.0, 0.25, 0.5, 0.75, 1.0].map(|x| x * limit).to_vec() }
+        Self::linear(label, -0.04 * limit..limit, &[0.0, 0.25, 0.5, 0.75, 1.0].map(|x| x * limit))
     }
 }
 
@@ -84,32 +108,32 @@ impl Ranged for Axis {
 }
 
 /// A polyline; without a label it is left out of the legend.
-pub(crate) struct Curve {
-    pub(crate) label: Option<String>,
-    pub(crate) color: RGBColor,
+pub struct Curve {
+    pub label: Option<String>,
+    pub color: RGBColor,
     /// Stroke width in quarters of a pixel.
-    pub(crate) width: u32,
-    pub(crate) points: Vec<Point>,
+    pub width: u32,
+    pub points: Vec<Point>,
 }
 
 impl Curve {
-    pub(crate) fn values(&self) -> impl Iterator<Item = f64> {
+    pub fn values(&self) -> impl Iterator<Item = f64> {
         self.points.iter().map(|point| point.1)
     }
 }
 
 /// Curves in a frame, the first one lowest.
-pub(crate) struct Panel {
-    pub(crate) title: String,
-    pub(crate) x: Axis,
-    pub(crate) y: Axis,
-    pub(crate) curves: Vec<Curve>,
+pub struct Panel {
+    pub title: String,
+    pub x: Axis,
+    pub y: Axis,
+    pub curves: Vec<Curve>,
     /// A remark inside the frame, to the left of and below a point.
-    pub(crate) note: Option<(Point, String)>,
+    pub note: Option<(Point, String)>,
 }
 
 /// A page of 2 × 2 panels under a title and a subtitle, as SVG.
-pub(crate) fn page(title: &str, subtitle: &str, panels: &[Panel; 4]) -> Result<String, Box<dyn Error>> {
+pub fn page(title: &str, subtitle: &str, panels: &[Panel; 4]) -> Result<String, Box<dyn Error>> {
     svg((1000, 860), |canvas| {
         let (head, body) = canvas.split_vertically(PAGE_TITLE + PAGE_SUBTITLE);
         let bold = FontDesc::new(FontFamily::SansSerif, TITLE, FontStyle::Bold);
@@ -124,7 +148,7 @@ pub(crate) fn page(title: &str, subtitle: &str, panels: &[Panel; 4]) -> Result<S
 }
 
 /// One wide panel, as SVG.
-pub(crate) fn banner(panel: &Panel) -> Result<String, Box<dyn Error>> {
+pub fn banner(panel: &Panel) -> Result<String, Box<dyn Error>> {
     svg((900, 420), |canvas| draw(panel, canvas))
 }
 
@@ -149,8 +173,10 @@ fn svg(
 fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
     let (head, rest) = area.margin(MARGIN, MARGIN, MARGIN, MARGIN).split_vertically(PANEL_TITLE);
     head.draw_text(&panel.title, &text(HPos::Left, VPos::Center), (Y_LABELS, PANEL_TITLE / 3))?;
-    let (legend, body) = rest.split_vertically(LEGEND);
-    draw_legend(&panel.curves, &legend)?;
+    let width = i32::try_from(rest.dim_in_pixel().0)? - Y_LABELS;
+    let lines = legend(&panel.curves, width);
+    let (above, body) = rest.split_vertically(LEGEND * i32::try_from(lines.len().max(1))?);
+    draw_legend(&lines, &above)?;
 
     let mut chart = ChartBuilder::on(&body)
         .y_label_area_size(Y_LABELS)
@@ -164,8 +190,8 @@ fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
         .axis_style(FRAME.stroke_width(UNITS))
         .set_all_tick_mark_size(TICK)
         .label_style(text(HPos::Left, VPos::Center))
-        .x_label_formatter(&|&value| tick_label(value))
-        .y_label_formatter(&|&value| tick_label(value))
+        .x_label_formatter(&|&value| tick_label(value, panel.x.scale))
+        .y_label_formatter(&|&value| tick_label(value, panel.y.scale))
         .x_desc(panel.x.label)
         .y_desc(panel.y.label)
         .draw()?;
@@ -180,16 +206,34 @@ fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A sample of each labeled curve, in a row.
-fn draw_legend(curves: &[Curve], area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
-    let (mut x, y) = (Y_LABELS, LEGEND / 3);
+/// The labeled curves, broken into lines of a width.
+fn legend(curves: &[Curve], width: i32) -> Vec<Vec<(i32, &Curve, &str)>> {
+    let mut lines: Vec<Vec<(i32, &Curve, &str)>> = Vec::new();
+    let mut x = width;
     for curve in curves {
         let Some(label) = &curve.label else { continue };
-        let line = vec![(x, y), (x + LEGEND_LINE, y)];
-        area.draw(&PathElement::new(line, curve.color.stroke_width(curve.width)))?;
-        x += LEGEND_LINE + CHARACTER;
-        area.draw_text(label, &text(HPos::Left, VPos::Center), (x, y))?;
-        x += label.chars().map(|_| CHARACTER).sum::<i32>() + 2 * CHARACTER;
+        let length = LEGEND_LINE + label.chars().map(|_| CHARACTER).sum::<i32>() + 3 * CHARACTER;
+        if x + length > width {
+            x = 0;
+            lines.push(Vec::new());
+        }
+        if let Some(line) = lines.last_mut() {
+            line.push((x, curve, label));
+        }
+        x += length;
+    }
+    lines
+}
+
+/// A sample of each labeled curve.
+fn draw_legend(lines: &[Vec<(i32, &Curve, &str)>], area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
+    for (y, line) in (0..).map(|line| LEGEND / 3 + LEGEND * line).zip(lines) {
+        for &(x, curve, label) in line {
+            let x = Y_LABELS + x;
+            let sample = vec![(x, y), (x + LEGEND_LINE, y)];
+            area.draw(&PathElement::new(sample, curve.color.stroke_width(curve.width)))?;
+            area.draw_text(label, &text(HPos::Left, VPos::Center), (x + LEGEND_LINE + CHARACTER, y))?;
+        }
     }
     Ok(())
 }
@@ -203,9 +247,13 @@ fn anchored(font: FontDesc<'static>, horizontal: HPos, vertical: VPos) -> TextSt
 }
 
 /// As few digits as possible, with a minus sign rather than a hyphen.
-fn tick_label(value: f64) -> String {
-    let rounded = (value * 1e6).round() / 1e6;
-    rounded.to_string().replace('-', "−")
+fn tick_label(value: f64, scale: Scale) -> String {
+    let text = match scale {
+        Scale::Linear => ((value * 1e6).round() / 1e6).to_string(),
+        Scale::Logarithmic if (-2.5..4.5).contains(&value) => 10.0_f64.powf(value).to_string(),
+        Scale::Logarithmic => format!("1e{value}"),
+    };
+    text.replace('-', "−")
 }
 
 /// The pieces of a polyline inside a rectangle.
