@@ -1,6 +1,8 @@
 //! Contact imposed ahead of the state or on velocities: central differences at Courant number 1, CD-Lagrange,
 //! Moreau–Jean, Noh–Bathe; and position-level contact of Chung–Lee and Hulbert–Chung.
 
+use contact_dynamics::contact::GapOffset;
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::Side;
 use contact_dynamics::{
     CdLagrange, CentralDifference, ChungLee, Corrector, Error, HulbertChung, LinearRows, LinearSystem, MoreauJean,
@@ -155,7 +157,6 @@ fn an_approach_at_the_start_is_met_by_the_first_forces() {
 
 /// A mass 2 under the force −20, `gap` above a stop.
 fn mass_above_stop(scheme: Box<dyn TimeIntegrator>, gap: f64, velocity: f64) -> Simulation<'static, f64> {
-    use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
     let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
     let system = LinearSystem::lumped(vec![2.0], free).unwrap().load(|_, force| force[0] = -20.0);
     Simulation::builder(system, scheme, 1e-2)
@@ -163,6 +164,94 @@ fn mass_above_stop(scheme: Box<dyn TimeIntegrator>, gap: f64, velocity: f64) -> 
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], gap))
         .build()
         .unwrap()
+}
+
+/// A wall that pushes a mass: as a driven dof, and as an offset of the gap. The mass takes the speed of the wall, and the
+/// force that its acceleration needs.
+#[test]
+fn a_moving_wall_takes_a_mass_along() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+        [|| Box::new(CentralDifference), || Box::new(CdLagrange), || Box::new(MoreauJean::new(0.5).unwrap())];
+    // Reaches the mass with speed 0.5, then accelerates with 2.
+    let wall = |t: f64| {
+        let late = (t - 0.5).max(0.0);
+        [0.5 * t - 0.1 + late * late, 0.5 + 2.0 * late, if t < 0.5 { 0.0 } else { 2.0 }]
+    };
+    for make in schemes {
+        let free = |n: usize| SparseColMat::try_new_from_triplets(n, n, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().drive(1, wall).unwrap();
+        let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
+        let by_support = Simulation::builder(driven, make(), 1e-3).constraint(rows).build().unwrap();
+        let offset = GapOffset::moving(move |t| wall(t).map(|x: f64| -x));
+        let rows = LinearRows::new().unilateral(&[(0, 1.0)], offset);
+        let alone = LinearSystem::lumped(vec![3.0], free(1)).unwrap();
+        let by_offset = Simulation::builder(alone, make(), 1e-3).constraint(rows).build().unwrap();
+        for mut run in [by_support, by_offset] {
+            run.run_until(0.4, &mut ()).unwrap();
+            let name = make().name();
+            assert!((run.state().velocity()[0] - 0.5).abs() < 1e-9, "{name}: {:?}", run.state().velocity());
+            assert!(run.gaps()[0].abs() < 1.1 * 0.5 * 1e-3, "{name}: {:?}", run.gaps());
+            run.run_until(0.9, &mut ()).unwrap();
+            let [_, v, a] = wall(run.time());
+            assert!((run.state().velocity()[0] - v).abs() < 2.0 * 2.0 * 1e-3, "{name}: {:?}", run.state().velocity());
+            assert!(
+                (run.state().contacts().forces()[0] - 3.0 * a).abs() < 1e-6,
+                "{name}: {:?}",
+                run.state().contacts()
+            );
+        }
+    }
+}
+
+/// Noh and Bathe's two stages differ in length, so a gap that is closed at the end of either leaves some velocity: up to
+/// 6 % of the approach of a rigid mass, by the phase of the impact.
+#[test]
+fn a_rigid_mass_leaves_noh_and_bathes_contact_slowly() {
+    let mut fastest = 0.0_f64;
+    for phase in (0..50).map(|i| 0.02 * f64::from(i)) {
+        let mut run = mass_above_stop(Box::new(NohBathe::new(0.54).unwrap()), 0.1 + 3.0e-2 * phase, -3.0);
+        run.run_until(0.05, &mut ()).unwrap();
+        fastest = fastest.max(run.state().velocity()[0]);
+    }
+    assert!((0.15..0.19).contains(&fastest), "{fastest}");
+}
+
+/// Steps that change through approach, impact and release.
+#[test]
+fn explicit_contact_bears_changing_steps() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 5] = [
+        || Box::new(CentralDifference),
+        || Box::new(CdLagrange),
+        || Box::new(NohBathe::new(0.54).unwrap()),
+        || Box::new(HulbertChung::new(0.8).unwrap()),
+        || Box::new(MoreauJean::new(0.5).unwrap()),
+    ];
+    for make in schemes {
+        let bars = Bars::paper(20);
+        let mut run = Simulation::builder(bars.system::<f64>(), make(), 1e-3)
+            .velocity(bars.velocities())
+            .constraint(bars.contact())
+            .build()
+            .unwrap();
+        let start = run.energy().total();
+        let (mut impulse, mut deepest) = (0.0, 0.0_f64);
+        for i in 0_u32.. {
+            run.set_step_size([1e-3, 0.4e-3, 1.1e-3, 0.7e-3][(i % 4) as usize]).unwrap();
+            run.step().unwrap();
+            impulse += run.state().contacts().impulses()[0];
+            deepest = deepest.min(run.gaps()[0]);
+            if run.time() > 0.4 {
+                break;
+            }
+        }
+        let name = make().name();
+        let energy = run.energy().total() / start;
+        assert!((0.93..1.0).contains(&energy), "{name}: {energy}");
+        // 2 m v, less what the plastic impact leaves in the bars.
+        assert!((impulse / 2.5e-3 - 1.0).abs() < 0.03, "{name}: {impulse}");
+        assert!(deepest > -0.1 * 1.2e-3, "{name}: {deepest}");
+        assert!(run.gaps()[0] > 0.0);
+    }
 }
 
 #[test]

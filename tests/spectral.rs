@@ -220,6 +220,7 @@ fn reports_of_malformed_tableaux_are_not_panics() {
     let malformed = Tableau::single(stage);
     assert!(report(&malformed).is_err() && report(&Tableau::staged(vec![])).is_err());
     assert!(spectral_radius(&malformed, 1.0, 0.0).is_nan());
+    assert_eq!(critical_omega(&malformed, 0.0), Some(0.0));
     let found = order(&malformed);
     assert_eq!([found.displacement, found.velocity, found.acceleration], [0; 3]);
     let text = report(&Bathe::default().tableau()).unwrap().to_string();

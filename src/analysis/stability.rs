@@ -62,19 +62,20 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
 /// ```
 pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
     // Roots that are nearly double at 1 are known to eps/Ω, matrices of size Ω to eps Ω.
-    let grows = |omega: f64| spectral_radius(tableau, omega, xi) > 1.0 + 1e-11 + 1e-13 * omega;
+    // (What is not a number is not stable.)
+    let is_stable = |omega: f64| spectral_radius(tableau, omega, xi) <= 1.0 + 1e-11 + 1e-13 * omega;
     let at = |i: i32| 10_f64.powf(f64::from(i) / 80.0);
-    let first = (-160..=320).find(|&i| grows(at(i)))?;
+    let first = (-160..=320).find(|&i| !is_stable(at(i)))?;
     if first == -160 {
         return Some(0.0);
     }
     let (mut below, mut above) = (at(first - 1), at(first));
     for _ in 0..50 {
         let middle = 0.5 * (below + above);
-        if grows(middle) {
-            above = middle;
-        } else {
+        if is_stable(middle) {
             below = middle;
+        } else {
+            above = middle;
         }
     }
     Some(below)
