@@ -38,3 +38,4 @@ pub use real::Real;
 pub use simulation::{Energy, Outcome, Simulation, SimulationBuilder, Statistics, Works};
 pub use state::{ContactState, History, State};
 pub use system::{Damping, LinearSystem, System, TangentWeights};
+pub use tableau::StartUp;

@@ -4,6 +4,7 @@
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::Side;
+use contact_dynamics::tableau::{ContactLevel, Stage, Tableau};
 use contact_dynamics::{
     CdLagrange, CentralDifference, ChungLee, Corrector, Error, HulbertChung, LinearRows, LinearSystem, MoreauJean,
     NohBathe, PersistencyCorrection, Simulation, TchamwaWielgosz, TimeIntegrator,
@@ -122,6 +123,36 @@ fn correction_of_explicit_position_level_contact_removes_the_impulse() {
         assert!(raw.force_max > 2.0 && corrected.force_max < 1.1, "{raw:?} {corrected:?}");
         assert!(corrected.variation < 2.6 && corrected.closure < 1e-12, "{corrected:?}");
     }
+}
+
+/// Noh and Bathe's rows with contact on the velocities of either stage.
+#[derive(Debug)]
+struct AtVelocityLevel;
+
+impl TimeIntegrator for AtVelocityLevel {
+    fn name(&self) -> String {
+        "Noh–Bathe at velocity level".into()
+    }
+
+    fn tableau(&self) -> Tableau {
+        let level = |stage: Stage| {
+            let contact = ContactLevel::Velocity { lead: 0.0, forecast: stage.recovery.u, forecast_at: stage.end };
+            stage.with_contact(contact)
+        };
+        let shipped = NohBathe::new(0.54).unwrap().tableau();
+        Tableau::staged(shipped.stages.into_iter().map(level).collect())
+    }
+}
+
+/// Why the scheme is shipped with forward increments: the multipliers of two stages at velocity level fight.
+#[test]
+fn forward_increments_of_two_stages_are_smoother_than_velocity_conditions() {
+    let bars = Bars::paper(20);
+    let ahead = run(&bars, NohBathe::new(0.54).unwrap(), 1e-3);
+    let at_velocity_level = run(&bars, AtVelocityLevel, 1e-3);
+    assert!((ahead.force_rms - 0.127).abs() < 0.005, "{ahead:?}");
+    assert!((at_velocity_level.force_rms - 1.49).abs() < 0.05, "{at_velocity_level:?}");
+    assert!(at_velocity_level.variation > 10.0 * ahead.variation);
 }
 
 /// A mass pressed on a stop from the first instant: the force is there at t = 0 and stays.

@@ -87,10 +87,21 @@ impl<T: Real> Ledger<T> {
             lambda: vec![T::zero(); rows],
         };
         ledger.start = energy(system, state, None).total();
-        ledger.power = ledger.damping_power(system, state.velocity());
-        system.external_load(state.time(), &mut ledger.load);
-        ledger.reactions = reactions(system, state, g)?;
+        ledger.restart(system, state, g)?;
         Ok(ledger)
+    }
+
+    /// Reads the powers of a state from which a run begins, or begins again behind a discontinuity.
+    pub(crate) fn restart(
+        &mut self,
+        system: &mut dyn System<T>,
+        state: &State<T>,
+        g: &ContactJacobian<T>,
+    ) -> Result<()> {
+        self.reactions = reactions(system, state, g)?;
+        self.power = self.damping_power(system, state.velocity());
+        system.external_load(state.time(), &mut self.load);
+        Ok(())
     }
 
     fn damping_power(&mut self, system: &mut dyn System<T>, v: &[T]) -> T {
