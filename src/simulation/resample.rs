@@ -22,9 +22,9 @@ impl<T: Real> Simulation<'_, T> {
     /// extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the closed
     /// contacts.
     ///
-    /// Schemes of order 2 keep it under any sequence of changes (`tests/step_size.rs`). Total momentum is conserved; the
-    /// impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of the
-    /// scheme.
+    /// Every scheme keeps its order when the step changes by factors up to 3, every time if need be (`docs/schemes.md`);
+    /// beyond that the past is extrapolated farther than it is known. Total momentum is conserved; the impulse of one
+    /// contact agrees with the change of a body's momentum across a change of h only to the order of the scheme.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
