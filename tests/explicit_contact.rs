@@ -247,6 +247,37 @@ fn a_rigid_mass_leaves_noh_and_bathes_contact_slowly() {
     assert!((0.15..0.19).contains(&fastest), "{fastest}");
 }
 
+/// A mass pressed on a table that shakes: forward increments know where the table will be, whether it is a driven dof or
+/// an offset of the gap.
+#[test]
+fn forward_increments_follow_a_shaking_table_exactly() {
+    let table = |t: f64| {
+        let (sin, cos) = (40.0 * t).sin_cos();
+        [0.01 * sin, 0.4 * cos, -16.0 * sin]
+    };
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
+        [|| Box::new(CentralDifference), || Box::new(NohBathe::new(0.54).unwrap())];
+    for make in schemes {
+        let free = |n: usize| SparseColMat::try_new_from_triplets(n, n, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let load = |_: f64, force: &mut [f64]| force[0] = -100.0;
+        let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().load(load).drive(1, table).unwrap();
+        let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
+        let by_support = Simulation::builder(driven, make(), 1e-3).constraint(rows).velocity(vec![0.4, 0.4]);
+        let offset = GapOffset::moving(move |t| table(t).map(|x: f64| -x));
+        let alone = LinearSystem::lumped(vec![3.0], free(1)).unwrap().load(load);
+        let rows = LinearRows::new().unilateral(&[(0, 1.0)], offset);
+        let by_offset = Simulation::builder(alone, make(), 1e-3).constraint(rows).velocity(vec![0.4]);
+        for builder in [by_support, by_offset] {
+            let mut run = builder.build().unwrap();
+            for _ in 0..500 {
+                run.step().unwrap();
+                assert!(run.gaps()[0].abs() < 1e-15, "{}: {:e}", make().name(), run.gaps()[0]);
+                assert!(run.state().contacts().forces()[0] > 50.0);
+            }
+        }
+    }
+}
+
 /// Steps that change through approach, impact and release.
 #[test]
 fn explicit_contact_bears_changing_steps() {

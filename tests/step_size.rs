@@ -201,6 +201,43 @@ fn step_changes_during_contact_leave_the_force_smooth() {
     }
 }
 
+/// A step that changes right after an impact must not read the approach: the past is made of the state in contact, and
+/// has neither gap nor gap rate.
+#[test]
+fn a_past_from_before_the_impact_is_not_interpolated() {
+    let history = PersistencyCorrection::with_history_projection();
+    // (Without history projection the contact may be lost a step later.)
+    let cases = [(None, 0), (Some(PersistencyCorrection::new()), 0), (Some(history), 0), (Some(history), 1)];
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] = [|| Box::new(Composite), || Box::new(Park), || Box::new(Bdf2)];
+    for make in schemes {
+        for (correction, later) in cases {
+            let bars = Bars::paper(20).delayed(0.6, 1e-3);
+            let mut run = Simulation::builder(bars.system::<f64>(), make(), 1e-3)
+                .velocity(bars.velocities())
+                .constraint(bars.contact())
+                .correctors(correction.map(|c| Box::new(c) as Box<dyn Corrector<f64>>))
+                .build()
+                .unwrap();
+            while !run.state().contacts().closed()[0] {
+                run.step().unwrap();
+            }
+            for _ in 0..later {
+                run.step().unwrap();
+            }
+            assert!(run.state().contacts().closed()[0]);
+            run.set_step_size(0.4e-3).unwrap();
+            let [left, right] = bars.contact_dofs();
+            let case = format!("{}, {correction:?}, {later} steps later", make().name());
+            for k in 1..=run.history().len() {
+                let (u, v, a) = run.history().past(k).unwrap();
+                let jump = |x: &[f64]| x[right] - x[left];
+                assert!((jump(u) + bars.gap).abs() < 1e-15, "{case}: {:e}", jump(u) + bars.gap);
+                assert!(jump(v).abs() < 1e-14 && jump(a).abs() < 1e-11, "{case}: {:e} {:e}", jump(v), jump(a));
+            }
+        }
+    }
+}
+
 /// Free flight is the same with any steps, and so is the momentum of a free body that vibrates.
 #[test]
 fn changes_of_the_step_conserve_momentum() {

@@ -65,7 +65,7 @@ impl<T: Real> Simulation<'_, T> {
         statistics.factorizations +=
             (program.operators.len() + startup.as_ref().map_or(0, |startup| startup.operators.len())) as u64;
         keep_trail(scheme, state, history);
-        move_shifted(scheme, state, history, system.prescribed(), h);
+        move_shifted(scheme, state, history, h);
         for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
             *slot = resampled;
         }
@@ -185,13 +185,7 @@ fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut Hist
 
 /// Moves stored v and a that live δ steps from their state to the place of the new step, along the line through the
 /// last two computed ones.
-fn move_shifted<T: Real>(
-    scheme: &Scheme<'_>,
-    state: &mut State<T>,
-    history: &mut History<T>,
-    prescribed: &[usize],
-    h: f64,
-) {
+fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
     let interval = state.motion.t - previous.t;
@@ -207,9 +201,6 @@ fn move_shifted<T: Real>(
         let fraction = T::of(shift * (h - *made_with) / distance);
         stored.copy_from_slice(unmoved);
         T::axpy_difference(fraction, unmoved, previous.field(field), stored);
-        for &dof in prescribed {
-            stored[dof] = unmoved[dof];
-        }
     }
 }
 

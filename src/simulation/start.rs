@@ -63,12 +63,8 @@ impl<T: Real> Start<'_, T> {
         let shown = scheme.shown(&motion);
         // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate would
         // be that of the stiffest mode.
-        let a_to_v = T::of(scheme.shifts()[0] * h);
         let Motion { v, a, .. } = &mut motion;
-        T::axpy(a_to_v, a, v);
-        for &dof in self.system.prescribed().iter().filter(|_| a_to_v != T::zero()) {
-            v[dof] = shown[0][dof];
-        }
+        T::axpy(T::of(scheme.shifts()[0] * h), a, v);
         let clock = Clock { reference: t, steps: 0, h };
         let history = History {
             slots,
