@@ -564,5 +564,12 @@ mod tests {
         assert!(Tableau::single(bad).check("bad").is_err());
         assert!(Tableau::staged(vec![]).check("bad").is_err());
         assert!(Tableau::single(good.ending_at(0.5)).check("bad").is_err());
+        let with = |contact| Tableau::single(good.with_contact(contact)).check("contact");
+        assert!(with(ContactLevel::Position { lead: 1.0 }).is_ok());
+        assert!(with(ContactLevel::Position { lead: -0.5 }).is_err());
+        assert!(with(ContactLevel::Position { lead: f64::NAN }).is_err());
+        let forecast = |forecast, forecast_at| with(ContactLevel::Velocity { lead: 0.0, forecast, forecast_at });
+        assert!(forecast(U[0] + 0.5 * V[0], 0.5).is_ok());
+        assert!(forecast(Z, 1.0).is_err() && forecast(U[0], f64::INFINITY).is_err());
     }
 }

@@ -135,6 +135,47 @@ fn stiff_modes_do_not_grow_when_the_step_changes_every_time() {
     }
 }
 
+/// Growth a change of an undamped mode, when the step alternates between 1 and `ratio` every `period` steps.
+fn growth(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: f64, period: u32) -> f64 {
+    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, omega * omega)]).unwrap();
+    let system = LinearSystem::lumped(vec![1.0], k).unwrap();
+    let mut run = Simulation::builder(system, make(), 1.0).displacement(vec![1.0]).build().unwrap();
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    for i in 0..300 * period {
+        run.set_step_size(if (i / period).is_multiple_of(2) { 1.0 } else { ratio }).unwrap();
+        run.step().unwrap();
+        let size = run.state().displacement()[0].abs();
+        match i / period {
+            60..100 => early = early.max(size),
+            260.. => late = late.max(size),
+            _ => {}
+        }
+    }
+    (late / early).powf(1.0 / 200.0)
+}
+
+/// Regular changes may resonate with a mode that is damped little: hardly with the composite scheme, a little with Park's.
+#[test]
+fn repeated_changes_feed_no_mode() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] =
+        [|| Box::new(Bdf2), || Box::new(Houbolt), || Box::new(Composite), || Box::new(Park)];
+    for (make, bound) in schemes.into_iter().zip([1.0005, 1.0005, 1.005, 1.035]) {
+        for ratio in [1.2, 1.5, 2.0, 3.0] {
+            for period in 1..=4 {
+                for omega in (0..24).map(|i| 10.0_f64.powf(-1.0 + 3.5 * f64::from(i) / 24.0)) {
+                    let growth = growth(make, omega, ratio, period);
+                    // (What has vanished has no growth.)
+                    assert!(
+                        growth < bound || growth.is_nan(),
+                        "{}, Ω = {omega}, 1 : {ratio} every {period} steps: {growth}",
+                        make().name()
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// What `docs/schemes.md` warns of: schemes that extrapolate old accelerations far.
 #[test]
 fn stiff_modes_grow_with_the_two_schemes_that_are_named() {
