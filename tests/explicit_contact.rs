@@ -278,6 +278,71 @@ fn forward_increments_follow_a_shaking_table_exactly() {
     }
 }
 
+/// At velocity level a pressed mass has the table's velocity, at the time where the scheme asks for it. (It is not pressed
+/// in every step: gaps are not controlled, and one that has opened a little must close again.)
+#[test]
+fn velocity_conditions_follow_a_shaking_table_exactly() {
+    let h = 1e-3;
+    let table = |t: f64| {
+        let (sin, cos) = (40.0 * t).sin_cos();
+        [0.01 * sin, 0.4 * cos, -16.0 * sin]
+    };
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
+        [|| Box::new(MoreauJean::new(0.5).unwrap()), || Box::new(CdLagrange)];
+    for (make, lead) in schemes.into_iter().zip([0.0, 0.5]) {
+        let free = SparseColMat::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let system = LinearSystem::lumped(vec![3.0, 3.0], free)
+            .unwrap()
+            .load(|_, force| force[0] = -100.0)
+            .drive(1, table)
+            .unwrap();
+        let mut run = Simulation::builder(system, make(), h)
+            .velocity(vec![0.4, 0.4])
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0))
+            .build()
+            .unwrap();
+        let mut pressed = 0;
+        for _ in 0..500 {
+            run.step().unwrap();
+            let state = run.state();
+            if state.contacts().forces()[0] == 0.0 {
+                continue;
+            }
+            pressed += 1;
+            let found = state.velocity()[0] + lead * h * state.stored_acceleration()[0];
+            let expected = table(state.time() + lead * h)[1];
+            assert!((found - expected).abs() < 1e-12, "{}: {:e}", make().name(), found - expected);
+        }
+        assert!(pressed > 250, "{}: {pressed}", make().name());
+    }
+}
+
+/// The first multiplier of central differences pushes a second contact in, which was not violated by itself.
+#[test]
+fn contacts_that_others_push_in_take_part_in_the_start() {
+    let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let system = LinearSystem::lumped(vec![1.0, 1.0], free).unwrap().load(|_, force| force[0] = -20.0);
+    let run = Simulation::builder(system, CentralDifference, 1e-3)
+        .constraint(LinearRows::new().unilateral(&[(0, 1.0), (1, 1.0)], 0.0).unilateral(&[(1, -1.0)], 0.0))
+        .build()
+        .unwrap();
+    let forces = run.state().contacts().forces();
+    assert!(forces.iter().all(|force| (force - 20.0).abs() < 1e-12), "{forces:?}");
+    assert!(run.state().acceleration().iter().all(|a| a.abs() < 1e-12));
+}
+
+/// Damping proportional to mass leaves an explicit scheme with a lumped mass its diagonal; none needs no entry at all.
+#[test]
+fn explicit_schemes_factorize_nothing_they_need_not() {
+    let bars = Bars::paper(20);
+    let size = |mass_damping: f64, stiffness_damping: f64| {
+        let system = bars.system::<f64>().rayleigh(mass_damping, stiffness_damping).unwrap();
+        Simulation::builder(system, CentralDifference, 1e-3).build().unwrap().factor_size()
+    };
+    assert_eq!([size(0.0, 0.0), size(0.3, 0.0)], [bars.dofs(); 2]);
+    assert!(size(0.0, 1e-5) > bars.dofs());
+}
+
 /// Steps that change through approach, impact and release.
 #[test]
 fn explicit_contact_bears_changing_steps() {

@@ -339,6 +339,29 @@ fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
     assert_eq!(run.state(), other.state());
 }
 
+/// A spring so negative that a long step has no positive definite matrix: refused, and the short step goes on as before.
+#[test]
+fn a_step_whose_matrix_cannot_be_factorized_leaves_the_factors_of_the_old_one() {
+    let build = || {
+        let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, -4.0)]).unwrap();
+        let system = LinearSystem::lumped(vec![1.0], k).unwrap();
+        Simulation::builder(system, Park, 0.01).displacement(vec![1.0]).build().unwrap()
+    };
+    for steps in [1, 5] {
+        let (mut run, mut other) = (build(), build());
+        for _ in 0..steps {
+            run.step().unwrap();
+            other.step().unwrap();
+        }
+        assert!(matches!(run.set_step_size(10.0), Err(Error::Singular { .. })));
+        for _ in 0..5 {
+            run.step().unwrap();
+            other.step().unwrap();
+        }
+        assert_eq!(run.state(), other.state());
+    }
+}
+
 /// Restarted in the middle of the contact, where nothing has jumped, the bars go on as before.
 #[test]
 fn restart_in_contact_disturbs_nothing() {
