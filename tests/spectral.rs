@@ -9,8 +9,8 @@ use contact_dynamics::analysis::{
 };
 use contact_dynamics::tableau::{Rows, Stage, StartUp, Tableau, U, V, Z};
 use contact_dynamics::{
-    Bathe, Bdf2, ChungLee, Composite, GeneralizedAlpha, Gssss, Houbolt, HulbertChung, MoreauJean, Newmark, Oalts, Park,
-    TchamwaWielgosz, TimeIntegrator,
+    Bathe, Bdf2, ChungLee, Composite, GeneralizedAlpha, Gssss, Houbolt, HulbertChung, MoreauJean, Newmark, NohBathe,
+    Oalts, Park, TchamwaWielgosz, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::all;
 
@@ -31,6 +31,15 @@ fn period_error_and_damping_are_those_of_the_literature() {
         let digits = if damping == 0.0 { 5e-4 } else { half_digit(damping) };
         assert!((100.0 * found.1 - damping).abs() < digits, "{}: {found:?}", scheme.name());
     }
+}
+
+/// Two solves a step: at equal cost the step is twice as long.
+#[test]
+fn bathes_scheme_at_equal_cost_is_more_accurate_than_the_composite_one() {
+    let (period, damping) = period_and_damping(&Bathe::default().tableau(), 0.2, 0.0).unwrap();
+    assert!((100.0 * period - 6.02).abs() < 0.005 && (100.0 * damping - 0.605).abs() < 5e-4, "{period} {damping}");
+    let composite = period_and_damping(&Composite.tableau(), 0.1, 0.0).unwrap();
+    assert!(period < composite.0 && damping < composite.1);
 }
 
 #[test]
@@ -174,6 +183,25 @@ fn explicit_families_have_the_published_limits() {
             assert!((meeting - radius).abs() < 1e-6, "φ = {phi}: {meeting}");
         }
     }
+    // All roots of Hulbert and Chung's scheme meet at −ρ_b; Chung and Lee's 28/27 has the same roots as ρ_b = ½.
+    for rho in [0.3_f64, 0.5, 0.8] {
+        let meeting = (1.0 + rho) * (2.0 - rho).sqrt();
+        let roots = |scheme: &dyn TimeIntegrator| eigenvalues(&scheme.tableau(), meeting, 0.0);
+        let mut found = roots(&HulbertChung::new(rho).unwrap());
+        if (rho - 0.5).abs() < 1e-12 {
+            found.extend(roots(&ChungLee::new(28.0 / 27.0).unwrap()));
+        }
+        // (A triple root is known to the cube root of the rounding.)
+        assert!(found.iter().all(|root| (root.re + rho).hypot(root.im) < 1e-4), "ρ_b = {rho}: {found:?}");
+    }
+    // Noh and Bathe's lowest radius: 0.45 at p = 0.54, ρ_b where it is asked for.
+    let lowest = |scheme: NohBathe| {
+        let radius = |i: u32| spectral_radius(&scheme.tableau(), 3.0 + f64::from(i) / 20_000.0, 0.0);
+        (0..15_000).map(radius).fold(f64::INFINITY, f64::min)
+    };
+    assert!((lowest(NohBathe::new(0.54).unwrap()) - 0.451).abs() < 1e-3);
+    assert!((lowest(NohBathe::with_radius(0.6).unwrap()) - 0.6).abs() < 1e-3);
+    assert!(lowest(NohBathe::with_radius(0.0).unwrap()) < 0.02);
     // Dampers that lag leave nothing to the member without numerical damping.
     let undamped = HulbertChung::new(1.0).unwrap().tableau();
     assert!(critical_omega(&undamped, 0.01).unwrap() < 0.02);
