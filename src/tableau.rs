@@ -156,6 +156,7 @@ impl Rows {
 /// acceleration of that state: u + lead h v + ½ lead² h² a, and v + lead h a. Explicit schemes need it: the unknown
 /// multiplier of theirs moves the body only later.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ContactLevel {
     /// 0 ≤ g ⊥ λ ≥ 0 on displacements.
     Position {
@@ -266,6 +267,7 @@ impl Stage {
 ///
 /// From free flight (no acceleration) the straight line is exact, and both forms use it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StartUp {
     /// The first steps are trapezoidal, until the past is known: no overshoot of stiff modes, one more factorization.
     #[default]

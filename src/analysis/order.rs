@@ -5,6 +5,7 @@ use crate::tableau::{Row, Tableau};
 
 /// Order of a scheme in displacement, velocity and acceleration, and where its stored values live.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Order {
     /// Order of the displacements.
     pub displacement: u32,

@@ -6,6 +6,7 @@ use crate::tableau::{StartUp, Tableau};
 
 /// Overshoot of the first steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Overshoot {
     /// Largest |u|/|u₀| of the first ten steps.
     pub displacement: f64,

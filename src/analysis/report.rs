@@ -10,6 +10,7 @@ use std::fmt;
 
 /// The properties of a scheme; made by [`report`], printed by its `Display`.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Orders, and where stored values live.
     pub order: Order,
