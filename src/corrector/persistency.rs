@@ -42,6 +42,11 @@ pub enum HistoryProjection {
 /// 1/(2n) of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly
 /// closed contact are projected too; multistep schemes need it, one-step schemes that read no past ignore it.
 ///
+/// It applies to schemes that impose contact on the displacements of the state; with the others ([`ContactLevel`]) building
+/// a simulation is refused.
+///
+/// [`ContactLevel`]: crate::tableau::ContactLevel
+///
 /// Known failure: it cannot restore the energy of the contact nodes' mass, and at release the velocity keeps the
 /// overshoot that any scheme shows there.
 ///
