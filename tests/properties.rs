@@ -5,8 +5,9 @@ use contact_dynamics::contact::ContactJacobian;
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Bathe, Bdf2, Composite, GeneralizedAlpha, Gssss, Houbolt, JumpProjection, LinearRows, LinearSystem, Mass, Newmark,
-    Oalts, Park, PersistencyCorrection, Simulation, TimeIntegrator,
+    Bathe, Bdf2, CdLagrange, CentralDifference, Composite, GeneralizedAlpha, Gssss, Houbolt, JumpProjection,
+    LinearRows, LinearSystem, Mass, MoreauJean, Newmark, NohBathe, Oalts, Park, PersistencyCorrection, Simulation,
+    TimeIntegrator,
 };
 use proptest::prelude::*;
 
@@ -169,6 +170,69 @@ proptest! {
             prop_assert!(works.corrections <= corrections + 1e-14, "the projection gained energy");
             corrections = works.corrections;
         }
+    }
+
+    #[test]
+    fn changing_steps_leave_every_step_complementary(scene in scenes(), ratios in prop::collection::vec(0.4..1.7, 40)) {
+        let mut run = scene.start();
+        for ratio in ratios {
+            run.set_step_size(scene.h * ratio).unwrap();
+            run.step().unwrap();
+            let state = run.state();
+            let length = largest(state.displacement()) + scene.h * largest(state.velocity()) + 0.2;
+            for (row, &gap) in run.gaps().iter().enumerate() {
+                let raw = state.contacts().raw_forces()[row];
+                prop_assert!(gap > -1e-12 * length && raw >= 0.0, "gap {gap}, raw {raw}");
+                prop_assert!(raw == 0.0 || gap < 1e-12 * length, "pressed with gap {gap}");
+            }
+        }
+    }
+
+    #[test]
+    fn contact_ahead_of_the_state_and_on_velocities_is_complementary(scene in scenes(), which in 0_usize..4) {
+        let make: fn() -> Box<dyn TimeIntegrator> = match which {
+            0 => || Box::new(CentralDifference),
+            1 => || Box::new(NohBathe::new(0.54).unwrap()),
+            2 => || Box::new(CdLagrange),
+            _ => || Box::new(MoreauJean::new(0.5).unwrap()),
+        };
+        // Without forces to the ground contact alone changes momentum; the step is far inside the stability limit.
+        let springs = scene.springs.iter().copied().filter(|(i, j, _)| i != j).collect();
+        let h = scene.h / 20.0;
+        let scene = Scene { springs, damping: (0.0, 0.1 * scene.damping.1), h, ..scene };
+        let mut run = Simulation::builder(scene.system(), make(), h)
+            .velocity(scene.velocity.clone())
+            .constraint(scene.contact())
+            .build()
+            .unwrap();
+        let g = scene.jacobian();
+        let direction = vec![1.0; scene.masses.len()];
+        let before = run.momentum(&direction).unwrap();
+        let (mut impulse, mut size) = (0.0, before.abs());
+        for _ in 0..400 {
+            run.step().unwrap();
+            let state = run.state();
+            let (u, v, a) = (state.displacement(), state.velocity(), state.stored_acceleration());
+            let length = largest(u) + h * largest(v) + 0.2;
+            for (row, &gap) in run.gaps().iter().enumerate() {
+                let raw = state.contacts().raw_forces()[row];
+                prop_assert!(raw >= 0.0);
+                // Forward increments keep gaps from closing, the others stop the approach.
+                prop_assert!(which > 1 || gap > -1e-12 * length, "gap {gap}");
+                let lead = if which == 2 { 0.5 * h } else { 0.0 };
+                let rate = g.product(row, v) + lead * g.product(row, a);
+                let speed = largest(v) + h * largest(a) + largest(u) / h;
+                prop_assert!(which < 2 || raw == 0.0 || rate.abs() < 1e-11 * speed, "pressed with rate {rate}");
+            }
+            for ((row, _), &j) in scene.rows.iter().zip(run.state().contacts().impulses()) {
+                let push: f64 = row.iter().map(|(_, weight)| weight * j).sum();
+                impulse += push;
+                size += push.abs();
+            }
+        }
+        let after = run.momentum(&direction).unwrap();
+        let scale = size + largest(&scene.velocity);
+        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
     }
 
     #[test]
