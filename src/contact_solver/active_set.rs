@@ -16,6 +16,9 @@ pub struct ActiveSet<T = f64> {
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
+    /// What of y is rounding: in a row's own sum, and with that of the multipliers it is coupled to.
+    own: Vec<T>,
+    noise: Vec<T>,
 }
 
 /// Block exchanges granted without progress before single ones begin.
@@ -27,11 +30,13 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         self.active = Vec::with_capacity(size);
         self.rows = Vec::with_capacity(size);
         self.solution = Vec::with_capacity(size);
+        self.own = Vec::with_capacity(size);
+        self.noise = Vec::with_capacity(size);
     }
 
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
         let size = problem.size();
-        let Self { factor, active, rows, solution } = self;
+        let Self { factor, active, rows, solution, own, noise } = self;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
         let (mut fewest, mut tries) = (usize::MAX, BLOCK_TRIES);
@@ -50,12 +55,19 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             for (&i, &lambda) in rows.iter().zip(solution.iter()) {
                 multipliers[i] = lambda;
             }
+            // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of
+            // a body at rest beside a body under load must not be judged by its own small numbers.
+            own.clear();
+            own.extend((0..size).map(|i| problem.rounding(i, multipliers)));
+            noise.clear();
+            noise.extend((0..size).map(|i| {
+                let carried = |j: usize| problem.delassus(i, j).abs() / problem.delassus(j, j) * own[j];
+                (0..size).map(|j| if i == j { own[i] } else { carried(j) }).sum::<T>()
+            }));
             let violates = |i: usize, multipliers: &[T], active: &[bool]| match problem.bounds[i] {
                 Bound::Free => false,
-                Bound::NonNegative if active[i] => {
-                    problem.delassus(i, i) * multipliers[i] < -problem.rounding(i, multipliers)
-                }
-                Bound::NonNegative => problem.gap(i, multipliers) < -problem.rounding(i, multipliers),
+                Bound::NonNegative if active[i] => problem.delassus(i, i) * multipliers[i] < -noise[i],
+                Bound::NonNegative => problem.gap(i, multipliers) < -noise[i],
             };
             let violations = (0..size).filter(|&i| violates(i, multipliers, active));
             let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
@@ -130,6 +142,30 @@ mod tests {
         ];
         let lambda = solve(&w.concat(), &[4.0, -2.0, -4.0, -2.0, 1.0], &[Bound::NonNegative; 5], &[0.0; 5]).unwrap();
         assert!(lambda.iter().all(|&l| l >= 0.0) && lambda.iter().any(|&l| l > 0.0), "{lambda:?}");
+    }
+
+    #[test]
+    fn rounding_of_a_loaded_row_does_not_exchange_rows_at_rest() {
+        // Found by random scenes: the second multiplier is zero to rounding, the first row has no scale of its own.
+        let w = [
+            1.579_567_724_847_582_6e-6,
+            -1.147_454_536_639_987_9e-6,
+            0.0,
+            -1.147_454_536_639_987_9e-6,
+            7.148_794_154_662_025e-6,
+            -9.394_326_208_640_901e-8,
+            0.0,
+            -9.394_326_208_640_901e-8,
+            1.753_190_892_225_264_2e-6,
+        ];
+        let offset = [-6.765_851_609_745_381e-35, 8.129_493_350_609_44e-7, -1.517_144_857_880_793_5e-5];
+        let tolerance = [5.3e-37, 2.3e-20, 4.3e-19];
+        let problem =
+            ContactProblem { delassus: &w, offset: &offset, bounds: &[Bound::NonNegative; 3], tolerance: &tolerance };
+        let mut lambda = [0.0_f64; 3];
+        let iterations = ActiveSet::default().solve(&problem, &mut lambda).unwrap();
+        assert!(iterations <= 4, "{iterations}");
+        assert!((lambda[2] - 8.653_620_462_031_572).abs() < 1e-12 && lambda[1].abs() < 1e-12, "{lambda:?}");
     }
 
     #[test]
