@@ -4,6 +4,7 @@ mod active_set;
 
 pub use active_set::ActiveSet;
 
+use crate::contact::ContactLaw;
 use crate::real::Real;
 
 /// What the multiplier of a row may be.
@@ -13,6 +14,15 @@ pub enum Bound {
     NonNegative,
     /// y = 0, λ of either sign.
     Free,
+}
+
+impl From<ContactLaw> for Bound {
+    fn from(law: ContactLaw) -> Self {
+        match law {
+            ContactLaw::Equality => Self::Free,
+            ContactLaw::Rigid => Self::NonNegative,
+        }
+    }
 }
 
 /// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.

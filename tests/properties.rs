@@ -124,6 +124,13 @@ impl Scene {
         g
     }
 
+    /// What the contacts of the last step add to the total momentum.
+    fn pushes(&self, run: &Simulation<'_, f64>) -> Vec<f64> {
+        let impulses = run.state().contacts().impulses();
+        let rows = self.rows.iter().zip(impulses);
+        rows.map(|((row, _), &impulse)| row.iter().map(|(_, weight)| weight * impulse).sum()).collect()
+    }
+
     fn start(&self) -> Simulation<'static, f64> {
         Simulation::builder(self.system(), scheme(self.scheme), self.h)
             .velocity(self.velocity.clone())
@@ -224,8 +231,7 @@ proptest! {
                 let speed = largest(v) + h * largest(a) + largest(u) / h;
                 prop_assert!(which < 2 || raw == 0.0 || rate.abs() < 1e-11 * speed, "pressed with rate {rate}");
             }
-            for ((row, _), &j) in scene.rows.iter().zip(run.state().contacts().impulses()) {
-                let push: f64 = row.iter().map(|(_, weight)| weight * j).sum();
+            for push in scene.pushes(&run) {
                 impulse += push;
                 size += push.abs();
             }
@@ -267,8 +273,7 @@ proptest! {
         let (mut impulse, mut size) = (0.0, before.abs());
         for _ in 0..80 {
             run.step().unwrap();
-            for ((row, _), &j) in scene.rows.iter().zip(run.state().contacts().impulses()) {
-                let push: f64 = row.iter().map(|(_, weight)| weight * j).sum();
+            for push in scene.pushes(&run) {
                 impulse += push;
                 size += push.abs();
             }

@@ -1,9 +1,9 @@
 //! The stiff–soft springs of Bathe and Noh (Comput. Struct. 98–99, 2012): a driven dof, a stiff spring to the first mass,
 //! a soft one to the second, with a step that resolves the soft mode only.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::StartUp;
-use contact_dynamics::{Bathe, Composite, GeneralizedAlpha, LinearSystem, Newmark, Simulation, TimeIntegrator};
+use contact_dynamics::{Bathe, Composite, GeneralizedAlpha, Newmark, Simulation, TimeIntegrator};
+use contact_dynamics_scenes::springs;
 
 /// (scheme, start, largest error of v2 and a2 from step 6 on)
 #[test]
@@ -50,24 +50,8 @@ fn the_first_steps_depend_on_the_start() {
 
 /// Errors of v2, a2 and u3 after each step to t = 10.
 fn errors(scheme: Box<dyn TimeIntegrator>, start: StartUp) -> Vec<[f64; 3]> {
-    let (stiff, soft, frequency) = (1e7, 1.0, 1.2_f64);
-    let entries = [
-        (0, 0, stiff),
-        (0, 1, -stiff),
-        (1, 0, -stiff),
-        (1, 1, stiff + soft),
-        (1, 2, -soft),
-        (2, 1, -soft),
-        (2, 2, soft),
-    ];
-    let triplets: Vec<_> = entries.into_iter().map(|(i, j, k)| Triplet::new(i, j, k)).collect();
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &triplets).unwrap();
-    let drive = move |t: f64| {
-        let (sin, cos) = (frequency * t).sin_cos();
-        [sin, frequency * cos, -frequency * frequency * sin]
-    };
-    let system = LinearSystem::lumped(vec![0.0, 1.0, 1.0], k).unwrap().drive(0, drive).unwrap();
-    let mut run = Simulation::builder(system, scheme, 0.2618).start_up(start).build().unwrap();
+    let frequency = springs::FREQUENCY;
+    let mut run = Simulation::builder(springs::stiff_soft(), scheme, 0.2618).start_up(start).build().unwrap();
     let mut errors = Vec::new();
     for _ in 0..38 {
         run.step().unwrap();

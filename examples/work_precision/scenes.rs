@@ -3,6 +3,7 @@
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::single_oscillator;
 use contact_dynamics::{Control, LinearSystem, Simulation, StepView, TimeIntegrator};
+use contact_dynamics_scenes::springs;
 use std::f64::consts::PI;
 use std::time::Instant;
 
@@ -125,26 +126,8 @@ pub(crate) fn damped_bar() -> Scene {
 /// A driven dof, a stiff spring (10⁷) to a unit mass, a soft one (1) to another (Bathe, Noh, Comput. Struct. 98–99, 2012):
 /// the error is that of the second mass.
 pub(crate) fn stiff_soft() -> Scene {
-    let (stiff, soft, frequency) = (1e7, 1.0, 1.2_f64);
-    let system = move || {
-        let entries = [
-            (0, 0, stiff),
-            (0, 1, -stiff),
-            (1, 0, -stiff),
-            (1, 1, stiff + soft),
-            (1, 2, -soft),
-            (2, 1, -soft),
-            (2, 2, soft),
-        ];
-        let triplets = entries.map(|(i, j, k)| Triplet::new(i, j, k));
-        let k = SparseColMat::try_new_from_triplets(3, 3, &triplets).unwrap();
-        let drive = move |t: f64| {
-            let (sin, cos) = (frequency * t).sin_cos();
-            [sin, frequency * cos, -frequency * frequency * sin]
-        };
-        LinearSystem::lumped(vec![0.0, 1.0, 1.0], k).unwrap().drive(0, drive).unwrap()
-    };
     let error = move |t: f64, u: &[f64], v: &[f64]| {
+        let frequency = springs::FREQUENCY;
         let denominator = 1.0 - frequency * frequency;
         let exact_u = ((frequency * t).sin() - frequency * t.sin()) / denominator;
         let exact_v = frequency * ((frequency * t).cos() - t.cos()) / denominator;
@@ -154,7 +137,7 @@ pub(crate) fn stiff_soft() -> Scene {
         key: "springs",
         title: "Stiff and soft spring",
         until: 10.0,
-        system: Box::new(system),
+        system: Box::new(springs::stiff_soft),
         start: [vec![0.0; 3], vec![0.0, 0.0, 0.0]],
         from: 5.0,
         error: Box::new(error),

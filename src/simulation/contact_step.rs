@@ -175,10 +175,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 offset.push(y[j]);
                 problem_tolerance.push(tolerance[j]);
                 multipliers.push(trial.lambda_raw[j]);
-                bounds.push(match constraints.law(j) {
-                    ContactLaw::Equality => Bound::Free,
-                    ContactLaw::Rigid => Bound::NonNegative,
-                });
+                bounds.push(constraints.law(j).into());
             }
             let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance };
             let solved = solver.solve(&data, multipliers);

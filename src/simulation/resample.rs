@@ -173,7 +173,7 @@ fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<&'
 
 /// Begins to keep the computed motions, enough of them for ratios of step sizes up to 3.
 fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
-    let shifted = scheme.shifts().iter().any(|shift| shift.abs() > 0.0);
+    let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
     let length = if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) };
     if history.trail.is_empty() && length > 0 {
         // One-step schemes read no past, but the motion before is still there.
@@ -189,7 +189,7 @@ fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mu
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
     let interval = state.motion.t - previous.t;
-    for (field, (shift, unmoved)) in (1..).zip(scheme.shifts().into_iter().zip(unmoved)) {
+    for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
         if shift == 0.0 {
             continue;
         }

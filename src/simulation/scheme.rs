@@ -1,6 +1,6 @@
 //! The scheme of a run, and what follows from its rows besides the compiled program.
 
-use crate::analysis::{self, Order};
+use crate::analysis;
 use crate::integrator::{Newmark, TimeIntegrator};
 use crate::real::Real;
 use crate::state::Motion;
@@ -13,7 +13,8 @@ pub(super) struct Scheme<'a> {
     pub(super) tableau: Tableau,
     /// Number of states a step reads, the current one included.
     pub(super) depth: usize,
-    pub(super) order: Order,
+    /// Times of the stored v and a, in steps from that of the state.
+    pub(super) shifts: [f64; 2],
     pub(super) start_up: StartUp,
     /// The one-step scheme of the first steps.
     pub(super) starter: Tableau,
@@ -27,13 +28,9 @@ impl<'a> Scheme<'a> {
         let starter = Newmark::trapezoidal().tableau();
         let covectors = tableau.momentum().during_start(&starter.stages[0]);
         let order = analysis::order(&tableau);
+        let shifts = [order.velocity_shift, order.acceleration_shift];
         let depth = tableau.depth();
-        Self { integrator, tableau, depth, order, start_up, starter, covectors }
-    }
-
-    /// Times of the stored v and a, in steps from that of the state.
-    pub(super) fn shifts(&self) -> [f64; 2] {
-        [self.order.velocity_shift, self.order.acceleration_shift]
+        Self { integrator, tableau, depth, shifts, start_up, starter, covectors }
     }
 
     /// ψ of the known states over h, one entry a dof: times M it is the momentum that the scheme conserves. `past` holds the
@@ -52,7 +49,7 @@ impl<'a> Scheme<'a> {
 
     /// Memory for v and a at the time of a state: empty where the stored ones live there.
     pub(super) fn shown<T: Real>(&self, motion: &Motion<T>) -> [Vec<T>; 2] {
-        let of = |field: usize| if self.shifts()[field - 1] == 0.0 { Vec::new() } else { motion.field(field).to_vec() };
+        let of = |field: usize| if self.shifts[field - 1] == 0.0 { Vec::new() } else { motion.field(field).to_vec() };
         [of(1), of(2)]
     }
 
@@ -65,7 +62,7 @@ impl<'a> Scheme<'a> {
         prescribed: &[usize],
         shown: &mut [Vec<T>; 2],
     ) {
-        for (field, (shift, shown)) in (1..).zip(self.shifts().into_iter().zip(shown)) {
+        for (field, (shift, shown)) in (1..).zip(self.shifts.into_iter().zip(shown)) {
             if shift != 0.0 {
                 shown.copy_from_slice(new.field(field));
                 if let Some(past) = past {

@@ -64,7 +64,7 @@ impl<T: Real> Start<'_, T> {
         // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate would
         // be that of the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
-        T::axpy(T::of(scheme.shifts()[0] * h), a, v);
+        T::axpy(T::of(scheme.shifts[0] * h), a, v);
         let clock = Clock { reference: t, steps: 0, h };
         let history = History {
             slots,
@@ -248,13 +248,7 @@ impl<T: Real> StartProblem<T> {
         while !rows.is_empty() {
             projection.assemble(g, rows, &mut s);
             let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
-            let bounds: Vec<Bound> = rows
-                .iter()
-                .map(|&row| match constraints.law(row) {
-                    ContactLaw::Equality => Bound::Free,
-                    ContactLaw::Rigid => Bound::NonNegative,
-                })
-                .collect();
+            let bounds: Vec<Bound> = rows.iter().map(|&row| constraints.law(row).into()).collect();
             let (q, rounded) = (pick(offset), pick(tolerance));
             lambda.clear();
             lambda.resize(rows.len(), T::zero());
