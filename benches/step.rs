@@ -96,7 +96,7 @@ fn bare(bars: &Bars, h: f64) -> Vec<Row<'static>> {
         }
     }
     let effective = SparseColMat::<usize, f64>::try_new_from_triplets(dofs, dofs, &triplets).expect("valid triplets");
-    let mut factor: Box<dyn Factorization<f64>> = Automatic.analyze(effective.symbolic()).expect("a small matrix");
+    let mut factor: Box<dyn Factorization<f64>> = Automatic.analyze(effective.symbolic(), &[]).expect("a small matrix");
     factor.factorize(effective.as_ref()).expect("positive definite");
     let mut x = vec![1.0; dofs];
     let solve = move |calls| {

@@ -1,7 +1,9 @@
 //! Contact constraints: where the gap is, which way it pushes, under which law.
 
+mod law;
 mod linear_rows;
 
+pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
 
 use crate::error::Result;
@@ -22,16 +24,6 @@ impl std::fmt::Display for ContactId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}.{}.{}", self.constraint, self.feature, self.candidate)
     }
-}
-
-/// The law of one contact row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ContactLaw {
-    /// Unilateral and rigid, at position level: g ≥ 0, λ ≥ 0, λ g = 0. Compression is positive.
-    Rigid,
-    /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multiplier).
-    Equality,
 }
 
 /// The parts of the gap rates that do not come from v and a: ġ = G v + `rate`, g̈ = G a + `acceleration`.
@@ -60,6 +52,15 @@ pub trait ContactConstraint<T: Real>: Send {
     ///
     /// Whatever is wrong with it, for instance [`Error::MissingDof`](crate::Error::MissingDof).
     fn check(&self, dofs: usize) -> Result<()>;
+
+    /// Appends every dof that a row may ever act on or a gap depend on (repetitions allowed), whatever later searches find:
+    /// the solver eliminates these last, so that contact works on them alone. Default: the dofs of the rows there are
+    /// now.
+    fn dofs(&self, out: &mut Vec<usize>) {
+        let mut g = ContactJacobian::default();
+        self.jacobian(&mut g);
+        out.extend(g.dofs);
+    }
 
     /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change.
     ///
@@ -104,6 +105,9 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     }
     fn check(&self, dofs: usize) -> Result<()> {
         (**self).check(dofs)
+    }
+    fn dofs(&self, out: &mut Vec<usize>) {
+        (**self).dofs(out);
     }
     fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
         (**self).search(t, u, v)
@@ -150,11 +154,16 @@ pub struct ContactJacobian<T> {
     pointers: Vec<usize>,
     dofs: Vec<usize>,
     weights: Vec<T>,
+    /// For each entry the place of its dof on the interface, once it is known; `NO_RESPONSE` on prescribed dofs.
+    places: Vec<usize>,
 }
+
+/// The place of dofs that are no part of the interface.
+pub(crate) const NO_RESPONSE: usize = usize::MAX;
 
 impl<T> Default for ContactJacobian<T> {
     fn default() -> Self {
-        Self { pointers: vec![0], dofs: Vec::new(), weights: Vec::new() }
+        Self { pointers: vec![0], dofs: Vec::new(), weights: Vec::new(), places: Vec::new() }
     }
 }
 
@@ -162,13 +171,21 @@ impl<T: Real> ContactJacobian<T> {
     pub(crate) fn with_capacity(rows: usize, entries: usize) -> Self {
         let mut pointers = Vec::with_capacity(rows + 1);
         pointers.push(0);
-        Self { pointers, dofs: Vec::with_capacity(entries), weights: Vec::with_capacity(entries) }
+        let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
+        Self { pointers, dofs, weights: Vec::with_capacity(entries), places }
     }
 
     pub(crate) fn clear(&mut self) {
         self.pointers.truncate(1);
         self.dofs.clear();
         self.weights.clear();
+        self.places.clear();
+    }
+
+    /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
+    pub(crate) fn locate(&mut self, places: &[usize]) {
+        self.places.clear();
+        self.places.extend(self.dofs.iter().map(|&dof| places[dof]));
     }
 
     /// Appends a row of (dof, weight) pairs.
@@ -199,6 +216,25 @@ impl<T: Real> ContactJacobian<T> {
     /// `Σ_j |G_row,j| |x_j|`: the scale of the rounding in [`product`](Self::product).
     pub(crate) fn magnitude(&self, row: usize, x: &[T]) -> T {
         self.row(row).map(|(dof, weight)| (weight * x[dof]).abs()).sum()
+    }
+
+    /// The (place on the interface, weight) pairs of a row, without prescribed dofs.
+    fn located(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        let range = self.pointers[row]..self.pointers[row + 1];
+        let entries = self.places[range.clone()].iter().copied().zip(self.weights[range].iter().copied());
+        entries.filter(|&(place, _)| place != NO_RESPONSE)
+    }
+
+    /// `G_row · x` for x on the interface.
+    pub(crate) fn interface_product(&self, row: usize, x: &[T]) -> T {
+        self.located(row).map(|(place, weight)| weight * x[place]).sum()
+    }
+
+    /// `x += c G_rowᵀ` for x on the interface.
+    pub(crate) fn interface_scatter(&self, row: usize, c: T, x: &mut [T]) {
+        for (place, weight) in self.located(row) {
+            x[place] += c * weight;
+        }
     }
 
     /// `x += c G_rowᵀ`.

@@ -20,7 +20,7 @@ impl From<ContactLaw> for Bound {
     fn from(law: ContactLaw) -> Self {
         match law {
             ContactLaw::Equality => Self::Free,
-            ContactLaw::Rigid => Self::NonNegative,
+            _ => Self::NonNegative,
         }
     }
 }

@@ -153,6 +153,14 @@ pub enum Error {
         /// The contact.
         contact: ContactId,
     },
+    /// A contact row acts on a dof that its constraint has not announced.
+    #[error("contact {contact} acts on dof {dof}, which `dofs` of its constraint does not list")]
+    UnannouncedDof {
+        /// The contact.
+        contact: ContactId,
+        /// The dof.
+        dof: usize,
+    },
     /// Two contact rows demand the same thing.
     #[error("contact {contact} repeats contact {other} (same row of G, same gap); remove one of them")]
     DuplicateContact {

@@ -2,6 +2,7 @@
 
 mod cholesky;
 mod diagonal;
+mod ordering;
 
 pub use cholesky::Cholesky;
 pub use diagonal::Diagonal;
@@ -20,7 +21,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 ///     2, 2, &[Triplet::new(0, 0, 4.0), Triplet::new(0, 1, 1.0), Triplet::new(1, 0, 1.0), Triplet::new(1, 1, 3.0)],
 /// )?;
 /// let solver: Box<dyn LinearSolver<f64>> = Box::new(Cholesky::default());
-/// let mut factor = solver.analyze(a.symbolic())?;
+/// let mut factor = solver.analyze(a.symbolic(), &[])?;
 /// factor.factorize(a.as_ref())?;
 /// let mut x = [1.0, 2.0];
 /// factor.solve(&mut x);
@@ -30,16 +31,24 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     /// Analyzes a pattern (both triangles) and allocates everything a factorization needs.
     ///
+    /// `last` (ascending) are the dofs that contact may act on. A solver that eliminates them last, in this order or any
+    /// other, can offer [`Factorization::condensation`]; others ignore them.
+    ///
     /// # Errors
     ///
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Incompatible`](crate::Error::Incompatible) for a
     /// pattern the solver cannot handle.
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>>;
+    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize])
+    -> Result<Box<dyn Factorization<T>>>;
 }
 
 impl<T: Real, L: LinearSolver<T> + ?Sized> LinearSolver<T> for Box<L> {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
-        (**self).analyze(pattern)
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        (**self).analyze(pattern, last)
     }
 }
 
@@ -60,6 +69,57 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
+
+    /// The factorization as a static condensation on the dofs that were to be eliminated last, if it can do that.
+    ///
+    /// With it a step in contact costs one sweep forward and one backward, as without contact, plus work on the
+    /// interface alone. Without it contact is solved with full solves: one for each contact that presses, and one more
+    /// a step.
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        None
+    }
+}
+
+/// Static condensation: `A x = b` with the interior eliminated, `S x_c = r_c` on the interface c, the dofs given as
+/// `last` to [`LinearSolver::analyze`].
+///
+/// Vectors on the interface have one entry for each of these dofs, in that order. S = A_cc − A_ci A_ii⁻¹ A_ic is the
+/// Schur complement; S⁻¹ is the block of A⁻¹ on the interface.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{Cholesky, LinearSolver};
+///
+/// // A chain of three springs and masses; contact may push dof 2.
+/// let entries = [(0, 0, 3.0), (1, 1, 3.0), (2, 2, 2.0), (0, 1, -1.0), (1, 0, -1.0), (1, 2, -1.0), (2, 1, -1.0)];
+/// let entries = entries.map(|(i, j, a)| Triplet::new(i, j, a));
+/// let a = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &entries)?;
+/// let mut factor = Cholesky::default().analyze(a.symbolic(), &[2])?;
+/// factor.factorize(a.as_ref())?;
+/// let condensed = factor.condensation().ok_or("Cholesky condenses")?;
+///
+/// let mut x = [1.0, 0.0, -4.0];
+/// let mut interface = [0.0];
+/// condensed.condense(&x, &mut interface); // x_c without contact force
+/// let mut response = [1.0];
+/// condensed.solve(&mut response); // x_c for a unit force on the interface
+/// let force = -interface[0] / response[0]; // the force that brings dof 2 to zero
+/// interface[0] += force * response[0];
+/// condensed.expand(&interface, &mut x);
+/// assert!(x[2] == 0.0 && (x[0] - 3.0 / 8.0).abs() < 1e-15 && (x[1] - 1.0 / 8.0).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Condensation<T: Real> {
+    /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the solution
+    /// on the interface. Does not allocate.
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]);
+
+    /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
+    /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.
+    fn expand(&mut self, interface: &[T], solution: &mut [T]);
+
+    /// `f ← S⁻¹ f` for one or more columns of forces on the interface. Does not allocate for a single column.
+    fn solve(&mut self, forces: &mut [T]);
 }
 
 /// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, else [`Cholesky`].
@@ -67,7 +127,14 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 pub struct Automatic;
 
 impl<T: Real> LinearSolver<T> for Automatic {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
-        if diagonal::is_diagonal(pattern) { Diagonal.analyze(pattern) } else { Cholesky::default().analyze(pattern) }
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        match diagonal::is_diagonal(pattern) {
+            true => Diagonal.analyze(pattern, last),
+            false => Cholesky::default().analyze(pattern, last),
+        }
     }
 }

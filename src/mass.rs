@@ -81,7 +81,7 @@ impl<T: Real> InverseMass<T> {
                 let reduced = sparse::Combination::new(mass.ncols(), prescribed, &[mass.symbolic()])?;
                 let mut values = vec![T::zero(); reduced.len()];
                 reduced.fill(&[(T::one(), mass.val())], None, &mut values);
-                let mut factor = Automatic.analyze(reduced.pattern())?;
+                let mut factor = Automatic.analyze(reduced.pattern(), &[])?;
                 factor.factorize(reduced.view(&values)).map_err(|error| match error {
                     Error::Singular { dof, .. } => Error::Singular { matrix: "mass matrix", dof },
                     other => other,

@@ -30,8 +30,13 @@ pub trait Real:
 pub(crate) mod kernels {
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
     use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw};
-    use faer::Spec;
     use faer::linalg::cholesky::{ldlt::factor::LdltRegularization, llt::factor::LltRegularization};
+    use faer::linalg::matmul::matmul;
+    use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+    use faer::prelude::{Reborrow, ReborrowMut};
+    use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+    use faer::{Accum, MatRef, Spec};
+    use std::ops::Range;
 
     /// How a factor of a symmetric matrix is stored.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,8 +53,25 @@ pub(crate) mod kernels {
         pub pointers: &'a [usize],
         pub rows: &'a [usize],
         pub values: &'a [T],
-        /// The dof eliminated k-th, if not the k-th itself.
-        pub order: Option<&'a [usize]>,
+        /// Entries left out at the front of the vectors swept.
+        pub skipped: usize,
+    }
+
+    /// A supernodal L Lᵀ.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Supernodal<'a, T> {
+        pub symbolic: &'a SymbolicSupernodalCholesky<usize>,
+        pub values: &'a [T],
+    }
+
+    /// Right-hand sides of a supernodal sweep, in the order of elimination.
+    #[derive(Debug)]
+    pub struct Columns<'a, T> {
+        /// The columns one after the other, each without its first `skipped` entries.
+        pub values: &'a mut [T],
+        pub skipped: usize,
+        /// Room for the rows below any supernode, once a column.
+        pub scratch: &'a mut [T],
     }
 
     #[doc(hidden)]
@@ -83,8 +105,14 @@ pub(crate) mod kernels {
             columns: usize,
             memory: &mut MemBuffer,
         );
-        /// Solves in place for one right-hand side with a simplicial factor; `x` is scratch.
-        fn simplicial_solve(factor: &Simplicial<'_, Self>, rhs: &mut [Self], x: &mut [Self]);
+        /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
+        fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
+        /// The backward sweep over `columns`; entries behind them hold the solution.
+        fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
+        /// The forward sweep over `columns` of a supernodal factor.
+        fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
+        /// The backward sweep over `columns`; entries behind them hold the solution.
+        fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
         /// Scratch for factorizing and for solving `columns` right-hand sides.
         fn cholesky_scratch(
             kind: Factorization,
@@ -182,44 +210,136 @@ pub(crate) mod kernels {
         Ok(())
     }
 
-    /// Permute, sweep forward, divide, sweep backward, permute back.
-    ///
-    /// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through
-    /// memory takes longer than the arithmetic.
+    // In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory
+    // takes longer than the arithmetic.
+
     #[inline]
-    fn simplicial_solve<T: Real>(factor: &Simplicial<'_, T>, rhs: &mut [T], x: &mut [T]) {
-        let Simplicial { pointers, rows, values, order } = *factor;
-        match order {
-            Some(order) => x.iter_mut().zip(order).for_each(|(x, &dof)| *x = rhs[dof]),
-            None => x.copy_from_slice(rhs),
-        }
-        let mut next = x.first().copied().unwrap_or(T::zero());
-        for (j, range) in pointers.windows(2).enumerate() {
+    fn simplicial_forward<T: Real>(factor: &Simplicial<'_, T>, columns: Range<usize>, x: &mut [T]) {
+        let Simplicial { pointers, rows, values, skipped } = *factor;
+        let mut next = x.get(columns.start - skipped).copied().unwrap_or(T::zero());
+        for (j, range) in columns.clone().zip(pointers[columns.start..=columns.end].windows(2)) {
             let xj = next;
-            next = x.get(j + 1).copied().unwrap_or(T::zero());
+            next = x.get(j + 1 - skipped).copied().unwrap_or(T::zero());
             let below = range[0] + 1..range[1];
             for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
                 if i == j + 1 {
                     next -= l * xj;
                 } else {
-                    x[i] -= l * xj;
+                    x[i - skipped] -= l * xj;
                 }
             }
-            x[j] = xj * values[range[0]];
+            x[j - skipped] = xj * values[range[0]];
         }
-        let mut last = T::zero();
-        for (j, range) in pointers.windows(2).enumerate().rev() {
+        if let Some(behind) = x.get_mut(columns.end - skipped) {
+            *behind = next;
+        }
+    }
+
+    #[inline]
+    fn simplicial_backward<T: Real>(factor: &Simplicial<'_, T>, columns: Range<usize>, x: &mut [T]) {
+        let Simplicial { pointers, rows, values, skipped } = *factor;
+        let mut last = x.get(columns.end - skipped).copied().unwrap_or(T::zero());
+        for (j, range) in columns.clone().zip(pointers[columns.start..=columns.end].windows(2)).rev() {
             let below = range[0] + 1..range[1];
-            let mut sum = x[j];
+            let mut sum = x[j - skipped];
             for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
-                sum -= l * if i == j + 1 { last } else { x[i] };
+                sum -= l * if i == j + 1 { last } else { x[i - skipped] };
             }
-            x[j] = sum;
+            x[j - skipped] = sum;
             last = sum;
         }
-        match order {
-            Some(order) => x.iter().zip(order).for_each(|(&x, &dof)| rhs[dof] = x),
-            None => rhs.copy_from_slice(x),
+    }
+
+    /// The part of a supernode that a sweep over some columns visits.
+    struct Panel<'a, T> {
+        /// First column, and number of columns.
+        start: usize,
+        size: usize,
+        /// The lower triangle on these columns, and the rows below it.
+        top: MatRef<'a, T>,
+        below: MatRef<'a, T>,
+        /// How many of the rows below follow the columns directly; the others are `pattern`.
+        following: usize,
+        pattern: &'a [usize],
+    }
+
+    impl<'a, T> Panel<'a, T> {
+        fn new(factor: &Supernodal<'a, T>, supernode: usize, columns: &Range<usize>) -> Self {
+            let node = SupernodalLltRef::new(factor.symbolic, factor.values).supernode(supernode);
+            let (begin, block) = (node.start(), node.val());
+            let (start, end) = (columns.start.max(begin), columns.end.min(begin + block.ncols()));
+            let (first, last) = (start - begin, end - begin);
+            Self {
+                start,
+                size: end - start,
+                top: block.submatrix(first, first, end - start, end - start),
+                below: block.submatrix(last, first, block.nrows() - last, end - start),
+                following: block.ncols() - last,
+                pattern: node.pattern(),
+            }
+        }
+
+        /// The rows below the panel, in the order of the rows of `below`.
+        fn rows(&self) -> impl Iterator<Item = usize> {
+            let behind = self.start + self.size;
+            (behind..behind + self.following).chain(self.pattern.iter().copied())
+        }
+    }
+
+    /// The supernodes that hold any of the columns.
+    fn supernodes<T>(factor: &Supernodal<'_, T>, columns: &Range<usize>) -> Range<usize> {
+        let begin = &factor.symbolic.supernode_begin()[..factor.symbolic.n_supernodes()];
+        match columns.is_empty() {
+            true => 0..0,
+            false => begin.partition_point(|&b| b <= columns.start) - 1..begin.partition_point(|&b| b < columns.end),
+        }
+    }
+
+    #[inline]
+    fn supernodal_forward<T: RealField + Real>(
+        factor: &Supernodal<'_, T>,
+        columns: Range<usize>,
+        Columns { values, skipped, scratch }: Columns<'_, T>,
+    ) {
+        let height = factor.symbolic.nrows() - skipped;
+        let width = values.len().checked_div(height).unwrap_or(0);
+        for supernode in supernodes(factor, &columns) {
+            let panel = Panel::new(factor, supernode, &columns);
+            let mut x = MatMut::from_column_major_slice_mut(values, height, width);
+            let mut top = x.rb_mut().subrows_mut(panel.start - skipped, panel.size);
+            solve_lower_triangular_in_place(panel.top, top.rb_mut(), Par::Seq);
+            let count = panel.below.nrows();
+            let mut product = MatMut::from_column_major_slice_mut(&mut scratch[..count * width], count, width);
+            matmul(product.rb_mut(), Accum::Replace, panel.below, top.rb(), T::one(), Par::Seq);
+            for (x, product) in values.chunks_exact_mut(height).zip(scratch.chunks_exact(count.max(1))) {
+                for (row, &product) in panel.rows().zip(product) {
+                    x[row - skipped] -= product;
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn supernodal_backward<T: RealField + Real>(
+        factor: &Supernodal<'_, T>,
+        columns: Range<usize>,
+        Columns { values, skipped, scratch }: Columns<'_, T>,
+    ) {
+        let height = factor.symbolic.nrows() - skipped;
+        let width = values.len().checked_div(height).unwrap_or(0);
+        for supernode in supernodes(factor, &columns).rev() {
+            let panel = Panel::new(factor, supernode, &columns);
+            let count = panel.below.nrows();
+            for (x, gathered) in values.chunks_exact(height).zip(scratch.chunks_exact_mut(count.max(1))) {
+                for (row, gathered) in panel.rows().zip(gathered) {
+                    *gathered = x[row - skipped];
+                }
+            }
+            let gathered = MatRef::from_column_major_slice(&scratch[..count * width], count, width);
+            let mut x = MatMut::from_column_major_slice_mut(values, height, width);
+            let mut top = x.rb_mut().subrows_mut(panel.start - skipped, panel.size);
+            matmul(top.rb_mut(), Accum::Add, panel.below.transpose(), gathered, -T::one(), Par::Seq);
+            solve_upper_triangular_in_place(panel.top.transpose(), top, Par::Seq);
         }
     }
 
@@ -272,8 +392,17 @@ pub(crate) mod kernels {
                     let stack = MemStack::new(memory);
                     LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
                 }
-                fn simplicial_solve(factor: &Simplicial<'_, Self>, rhs: &mut [Self], x: &mut [Self]) {
-                    simplicial_solve(factor, rhs, x);
+                fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
+                    simplicial_forward(factor, columns, x);
+                }
+                fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
+                    simplicial_backward(factor, columns, x);
+                }
+                fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
+                    supernodal_forward(factor, columns, x);
+                }
+                fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
+                    supernodal_backward(factor, columns, x);
                 }
                 fn cholesky_scratch(
                     kind: Factorization,

@@ -12,7 +12,7 @@ mod start;
 mod step;
 
 pub use builder::SimulationBuilder;
-pub(crate) use constraints::Constraints;
+pub(crate) use constraints::{Admitted, Constraints};
 pub use energy::{Energy, Works};
 
 use crate::contact::ContactJacobian;
@@ -25,7 +25,7 @@ use crate::observer::{Control, Observer, StepView, Wants};
 use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
 use crate::system::System;
-use contact_step::ContactRowsWork;
+use contact_step::{ContactRowsWork, InterfaceWork};
 use energy::Ledger;
 use operator::Operator;
 use program::Program;
@@ -114,6 +114,7 @@ struct Workspace<T: Real> {
     /// Closed flags at the start of the step, and before the present stage.
     closed_at_start: Vec<bool>,
     was_closed: Vec<bool>,
+    interface: InterfaceWork<T>,
     rows: ContactRowsWork<T>,
     buffers: Buffers<T>,
     projection: Option<JumpProjection<T>>,

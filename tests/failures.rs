@@ -156,7 +156,7 @@ fn singular_effective_matrix_names_the_dof() {
             entries.push((i, i, if i == 7 { -5.0 } else { 9.0 }));
         }
         let a = matrix(n, &entries);
-        let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic()).unwrap();
+        let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic(), &[]).unwrap();
         let found = factor.factorize(a.as_ref());
         assert!(matches!(found, Err(Error::Singular { dof: 7, .. })), "{n}: {found:?}");
     }
@@ -388,7 +388,7 @@ fn a_constraint_that_breaks_its_promises_is_refused() {
     let build = |candidates, rows, dof| builder().constraint(Liar { candidates, rows, dof }).build();
     refused!(build(3, 3, 0), Error::Dimension { expected: 2, found: 3, .. }, "candidates");
     refused!(build(1, 2, 0), Error::Dimension { expected: 1, found: 2, .. }, "Jacobian");
-    refused!(build(1, 1, 7), Error::MissingDof { dof: 7, .. }, "contact row");
+    refused!(build(1, 1, 7), Error::MissingDof { dof: 7, .. }, "contact constraint");
     assert!(build(1, 1, 1).is_ok());
 }
 

@@ -88,6 +88,9 @@ impl<T: Real> ContactConstraint<T> for Floor {
         assert_eq!(dofs, 1);
         Ok(())
     }
+    fn dofs(&self, out: &mut Vec<usize>) {
+        out.extend([0]);
+    }
     fn search(&mut self, _: f64, u: &[T], _: &[T]) -> Result<Candidates> {
         let near = u[0].value() < -0.5 * self.depth;
         let changed = near != self.near;
@@ -131,8 +134,12 @@ struct CountingFactor<T: Real> {
 }
 
 impl<T: Real> LinearSolver<T> for Counting {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
-        let inner = Cholesky::default().analyze(pattern)?;
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        let inner = Cholesky::default().analyze(pattern, last)?;
         Ok(Box::new(CountingFactor { inner, calls: self.calls.clone() }))
     }
 }
@@ -340,6 +347,9 @@ impl ContactConstraint<f64> for Floors {
     fn check(&self, _: usize) -> Result<()> {
         Ok(())
     }
+    fn dofs(&self, out: &mut Vec<usize>) {
+        out.extend([0, 1]);
+    }
     fn search(&mut self, _: f64, u: &[f64], _: &[f64]) -> Result<Candidates> {
         let near = [0, 1].map(|mass| u[mass] < 0.3 - self.depths[mass]);
         let found = if near == self.near { Candidates::Unchanged } else { Candidates::Changed };
@@ -475,6 +485,9 @@ impl ContactConstraint<f64> for Relay {
     }
     fn check(&self, _: usize) -> Result<()> {
         Ok(())
+    }
+    fn dofs(&self, out: &mut Vec<usize>) {
+        out.extend([0, 1]);
     }
     fn search(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<Candidates> {
         let mass = usize::from(t > 0.15);

@@ -51,7 +51,7 @@ fn dense(n: usize) -> Vec<(usize, usize)> {
 
 fn check<T: Real>(n: usize, pairs: &[(usize, usize)], tolerance: f64) {
     let pattern_of = matrix::<T>(n, pairs, 0.1);
-    let mut factor = LinearSolver::<T>::analyze(&Automatic, pattern_of.symbolic()).unwrap();
+    let mut factor = LinearSolver::<T>::analyze(&Automatic, pattern_of.symbolic(), &[]).unwrap();
     assert!(factor.stored_values() >= n);
     // The same analysis serves other values.
     for shift in [0.1, 3.0] {
@@ -98,7 +98,7 @@ fn cholesky_refuses_what_is_not_symmetric_positive_definite() {
     for pairs in [chain(30), grid(30), dense(30)] {
         let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
         let good = matrix::<f64>(n, &pairs, 1.0);
-        let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), good.symbolic()).unwrap();
+        let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), good.symbolic(), &[]).unwrap();
         let (pattern, values) = good.into_parts();
         let broken = |change: &dyn Fn(usize, usize, f64) -> f64| {
             let mut values = values.clone();
@@ -127,13 +127,13 @@ fn cholesky_refuses_what_is_not_symmetric_positive_definite() {
 #[test]
 fn diagonal_solver_takes_diagonal_matrices_only() {
     let a = matrix::<f64>(3, &[], 4.0);
-    let mut factor = LinearSolver::<f64>::analyze(&Diagonal, a.symbolic()).unwrap();
+    let mut factor = LinearSolver::<f64>::analyze(&Diagonal, a.symbolic(), &[]).unwrap();
     factor.factorize(a.as_ref()).unwrap();
     let mut x = [4.0, 8.0, -2.0, 1.0, 2.0, 3.0];
     factor.solve(&mut x);
     assert!(x.iter().zip([1.0, 2.0, -0.5, 0.25, 0.5, 0.75]).all(|(x, y)| (x - y).abs() < 1e-15));
     let chain = matrix::<f64>(3, &chain(3), 1.0);
-    assert!(matches!(LinearSolver::<f64>::analyze(&Diagonal, chain.symbolic()), Err(Error::Incompatible { .. })));
+    assert!(matches!(LinearSolver::<f64>::analyze(&Diagonal, chain.symbolic(), &[]), Err(Error::Incompatible { .. })));
     let zero = matrix::<f64>(3, &[], 0.0);
     assert!(matches!(factor.factorize(zero.as_ref()), Err(Error::Singular { dof: 0, .. })));
 }
@@ -145,9 +145,101 @@ fn free_bodies_are_recognized_by_a_pivot_of_rounding() {
         for pairs in [chain(n), shuffled_chain(n), arrow(n.max(3)), dense(n)] {
             let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
             let a = matrix::<f64>(n, &pairs, 0.0);
-            let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic()).unwrap();
+            let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic(), &[]).unwrap();
             let found = factor.factorize(a.as_ref());
             assert!(matches!(found, Err(Error::Singular { .. })), "{n} dofs, {} pairs", pairs.len());
         }
     }
+}
+
+/// Eliminates `last` last: the same solution in two halves, and S⁻¹ as the block of A⁻¹ on these dofs.
+fn check_condensation<T: Real>(n: usize, pairs: &[(usize, usize)], last: &[usize], tolerance: f64) {
+    let a = matrix::<T>(n, pairs, 0.1);
+    let mut plain = LinearSolver::<T>::analyze(&Automatic, a.symbolic(), &[]).unwrap();
+    let mut factor = LinearSolver::<T>::analyze(&Automatic, a.symbolic(), last).unwrap();
+    plain.factorize(a.as_ref()).unwrap();
+    factor.factorize(a.as_ref()).unwrap();
+    let distance = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| (x - y).abs().value()).fold(0.0, f64::max);
+
+    let rhs: Vec<T> = (0..n).map(|i| T::of((i as f64 * 0.7).sin())).collect();
+    let mut expected = rhs.clone();
+    plain.solve(&mut expected);
+    let mut x = rhs.clone();
+    factor.solve(&mut x);
+    assert!(distance(&x, &expected) < tolerance, "{n} dofs, last {last:?}");
+
+    let condensed = factor.condensation().unwrap();
+    let mut interface = vec![T::zero(); last.len()];
+    // Twice: nothing of the first must be left in the second.
+    for _ in 0..2 {
+        condensed.condense(&rhs, &mut interface);
+        let on_interface: Vec<T> = last.iter().map(|&dof| expected[dof]).collect();
+        assert!(distance(&interface, &on_interface) < tolerance, "{n} dofs, last {last:?}");
+        condensed.expand(&interface, &mut x);
+        assert!(distance(&x, &expected) < tolerance, "{n} dofs, last {last:?}");
+    }
+    // Unit forces, all at once and one by one.
+    let m = last.len();
+    let mut block = vec![T::zero(); m * m];
+    (0..m).for_each(|i| block[i + i * m] = T::one());
+    condensed.solve(&mut block);
+    for (column, &dof) in last.iter().enumerate() {
+        let mut response = vec![T::zero(); n];
+        response[dof] = T::one();
+        plain.solve(&mut response);
+        let expected: Vec<T> = last.iter().map(|&dof| response[dof]).collect();
+        let mut alone = vec![T::zero(); m];
+        alone[column] = T::one();
+        condensed.solve(&mut alone);
+        assert!(distance(&block[column * m..(column + 1) * m], &expected) < tolerance);
+        assert!(distance(&alone, &expected) < tolerance);
+    }
+    // A force on the interface, applied between the halves.
+    if let Some(&dof) = last.first() {
+        let mut pushed = rhs.clone();
+        pushed[dof] += T::of(2.5);
+        plain.solve(&mut pushed);
+        condensed.condense(&rhs, &mut interface);
+        interface.iter_mut().zip(&block).for_each(|(x, &response)| *x += T::of(2.5) * response);
+        condensed.expand(&interface, &mut x);
+        assert!(distance(&x, &pushed) < tolerance);
+        for (&dof, &value) in last.iter().zip(&interface) {
+            assert_eq!(x[dof], value);
+        }
+    }
+}
+
+#[test]
+fn condensation_is_the_same_solution_in_two_halves() {
+    let cases: [(usize, Vec<(usize, usize)>); 7] = [
+        (1, vec![]),
+        (6, vec![]),
+        (40, chain(40)),
+        (40, shuffled_chain(40)),
+        (25, arrow(25)),
+        (900, grid(30)),
+        (30, dense(30)),
+    ];
+    for (n, pairs) in cases {
+        let ends = if n > 1 { vec![0, n - 1] } else { vec![0] };
+        // One side of the grid, two zones far apart, dofs strewn about, all of them, none.
+        let side: Vec<usize> = (0..n.min(30)).collect();
+        let zones: Vec<usize> = (0..n.min(12)).chain(n.saturating_sub(10).max(n.min(12))..n).collect();
+        let strewn: Vec<usize> = (0..n).step_by(7).collect();
+        let all: Vec<usize> = (0..n.min(60)).collect();
+        for last in [vec![], ends, side, zones, strewn, all] {
+            check_condensation::<f64>(n, &pairs, &last, 1e-11);
+            check_condensation::<f32>(n, &pairs, &last, 2e-3);
+        }
+    }
+}
+
+#[test]
+fn contact_at_the_ends_of_chains_costs_no_fill() {
+    // Two chains one behind the other with contact between them: as many values as without contact.
+    let n = 200;
+    let pairs: Vec<_> = chain(n).into_iter().filter(|&(i, _)| i != n / 2 - 1).collect();
+    let a = matrix::<f64>(n, &pairs, 0.1);
+    let size = |last: &[usize]| LinearSolver::<f64>::analyze(&Automatic, a.symbolic(), last).unwrap().stored_values();
+    assert_eq!(size(&[n / 2 - 1, n / 2]), size(&[]));
 }

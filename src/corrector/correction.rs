@@ -222,7 +222,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// Whether a row is pressed: its jumps vanish both ways.
     fn is_pressed(&self, row: usize) -> bool {
-        self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row) == ContactLaw::Equality
+        self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row).is_equality()
     }
 
     /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching

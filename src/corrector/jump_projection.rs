@@ -165,7 +165,8 @@ impl<T: Real> JumpProjection<T> {
         }
     }
 
-    fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
+    /// Makes the rows known to [`push`](Self::push).
+    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         if let InverseMass::Consistent { .. } = self.inverse {
             for &row in rows {
                 if !self.computed[row] {

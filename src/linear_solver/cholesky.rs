@@ -1,18 +1,18 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
-use super::{Factorization, LinearSolver};
+use super::ordering;
+use super::{Condensation, Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::real::kernels::{Factorization as Kind, Simplicial};
+use crate::real::kernels::{Columns, Factorization as Kind, Simplicial, Supernodal};
 use crate::sparse;
-use faer::Side;
 use faer::dyn_stack::MemBuffer;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
-};
+use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use std::ops::Range;
 
-/// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree.
+/// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree with the
+/// dofs of contact last.
 ///
 /// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
 /// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst
@@ -30,8 +30,14 @@ struct Factor<T: Real> {
     columns: usize,
     /// Pivots in the numbering of the matrix.
     pivots: Vec<T>,
-    /// One right-hand side in the order of elimination; simplicial factors only.
+    /// One right-hand side in the order of elimination.
     sweep: Vec<T>,
+    /// For each dof of the interface, its place among those eliminated last.
+    interface: Vec<usize>,
+    /// Columns on the interface in the order of elimination.
+    trailing: Vec<T>,
+    /// Room for the rows below any supernode, for as many columns as were ever swept at once.
+    below: Vec<T>,
 }
 
 /// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of zero.
@@ -46,28 +52,90 @@ impl<T: Real> std::fmt::Debug for Factor<T> {
 }
 
 impl<T: Real> LinearSolver<T> for Cholesky {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
-        let out_of_memory = |_| Error::OutOfMemory { what: "a sparse Cholesky factor" };
-        let symbolic = factorize_symbolic_cholesky(
-            pattern,
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(out_of_memory)?;
-        let kind = match symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(_) => Kind::Ldlt,
-            SymbolicCholeskyRaw::Supernodal(_) => Kind::Llt,
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        let symbolic = ordering::symbolic_cholesky(pattern, last)?;
+        let (kind, below) = match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
+            SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
         };
         let scratch = T::cholesky_scratch(kind, &symbolic, 1);
         let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
-        let values = vec![T::zero(); symbolic.len_val()];
-        let pivots = vec![T::zero(); symbolic.nrows()];
-        let sweep = match kind {
-            Kind::Ldlt => vec![T::zero(); symbolic.nrows()],
-            Kind::Llt => Vec::new(),
-        };
-        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, pivots, sweep }))
+        let n = symbolic.nrows();
+        let first = n - last.len();
+        let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
+        let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
+        let zero = |size: usize| vec![T::zero(); size];
+        let (values, pivots, sweep, trailing) = (zero(symbolic.len_val()), zero(n), zero(n), zero(last.len()));
+        let below = zero(below);
+        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, pivots, sweep, interface, trailing, below }))
+    }
+}
+
+/// The largest number of rows that a sweep over part of a supernode's columns has below it.
+fn tallest(raw: &faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky<usize>) -> usize {
+    let height = |s: usize| {
+        let columns = raw.supernode_end()[s] - raw.supernode_begin()[s];
+        columns + raw.supernode(s).pattern().len()
+    };
+    (0..raw.n_supernodes()).map(height).max().unwrap_or(0)
+}
+
+impl<T: Real> Factor<T> {
+    fn size(&self) -> usize {
+        self.symbolic.nrows()
+    }
+
+    /// Columns of the interior, and of the interface, in the order of elimination.
+    fn interior(&self) -> Range<usize> {
+        0..self.size() - self.interface.len()
+    }
+
+    fn trailing(&self) -> Range<usize> {
+        self.size() - self.interface.len()..self.size()
+    }
+}
+
+/// A sweep over some columns of the factor, forward (with the division by D of a simplicial one) or backward.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sweep {
+    Forward,
+    Backward,
+}
+
+/// Sweeps over `columns` for right-hand sides in the order of elimination; of each `skipped` entries are left out.
+fn sweep<T: Real>(
+    direction: Sweep,
+    (symbolic, factor): (&SymbolicCholesky<usize>, &[T]),
+    columns: Range<usize>,
+    values: &mut [T],
+    skipped: usize,
+    scratch: &mut [T],
+) {
+    if columns.is_empty() {
+        return;
+    }
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Supernodal(symbolic) => {
+            let factor = Supernodal { symbolic, values: factor };
+            let x = Columns { values, skipped, scratch };
+            match direction {
+                Sweep::Forward => T::supernodal_forward(&factor, columns, x),
+                Sweep::Backward => T::supernodal_backward(&factor, columns, x),
+            }
+        }
+        SymbolicCholeskyRaw::Simplicial(raw) => {
+            let factor = Simplicial { pointers: raw.col_ptr(), rows: raw.row_idx(), values: factor, skipped };
+            for x in values.chunks_exact_mut(symbolic.nrows() - skipped) {
+                match direction {
+                    Sweep::Forward => T::simplicial_forward(&factor, columns.clone(), x),
+                    Sweep::Backward => T::simplicial_backward(&factor, columns.clone(), x),
+                }
+            }
+        }
     }
 }
 
@@ -87,27 +155,103 @@ impl<T: Real> Factorization<T> for Factor<T> {
     }
 
     fn solve(&mut self, rhs: &mut [T]) {
-        let columns = rhs.len().checked_div(self.symbolic.nrows()).unwrap_or(0);
-        if let SymbolicCholeskyRaw::Simplicial(raw) = self.symbolic.raw() {
-            let factor = Simplicial {
-                pointers: raw.col_ptr(),
-                rows: raw.row_idx(),
-                values: &self.values,
-                order: self.symbolic.perm().map(|perm| perm.arrays().0),
-            };
-            for column in rhs.chunks_exact_mut(self.symbolic.nrows()) {
-                T::simplicial_solve(&factor, column, &mut self.sweep);
+        let size = self.size();
+        let columns = rhs.len().checked_div(size).unwrap_or(0);
+        if self.kind == Kind::Llt {
+            if columns > self.columns {
+                self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
+                self.columns = columns;
             }
+            T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
             return;
         }
-        if columns > self.columns {
-            self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
-            self.columns = columns;
+        let Self { symbolic, values, sweep: x, below, .. } = self;
+        for column in rhs.chunks_exact_mut(size) {
+            permute(symbolic, column, x);
+            sweep(Sweep::Forward, (symbolic, values), 0..size, x, 0, below);
+            sweep(Sweep::Backward, (symbolic, values), 0..size, x, 0, below);
+            permute_back(symbolic, x, column);
         }
-        T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
     }
 
     fn stored_values(&self) -> usize {
         self.values.len()
+    }
+
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        Some(self)
+    }
+}
+
+/// Brings a vector into the order of elimination.
+fn permute<T: Real>(symbolic: &SymbolicCholesky<usize>, from: &[T], to: &mut [T]) {
+    match symbolic.perm() {
+        Some(perm) => to.iter_mut().zip(perm.arrays().0).for_each(|(x, &dof)| *x = from[dof]),
+        None => to.copy_from_slice(from),
+    }
+}
+
+/// Brings a vector from the order of elimination into that of the matrix.
+fn permute_back<T: Real>(symbolic: &SymbolicCholesky<usize>, from: &[T], to: &mut [T]) {
+    match symbolic.perm() {
+        Some(perm) => from.iter().zip(perm.arrays().0).for_each(|(&x, &dof)| to[dof] = x),
+        None => to.copy_from_slice(from),
+    }
+}
+
+impl<T: Real> Condensation<T> for Factor<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
+        let (interior, trailing) = (self.interior(), self.trailing());
+        let Self { symbolic, values, sweep: x, below, trailing: on_interface, interface: places, .. } = self;
+        permute(symbolic, rhs, x);
+        sweep(Sweep::Forward, (symbolic, values), interior, x, 0, below);
+        on_interface.truncate(places.len());
+        on_interface.copy_from_slice(&x[trailing.clone()]);
+        sweep(Sweep::Forward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
+        sweep(Sweep::Backward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
+        for (x, &place) in interface.iter_mut().zip(places.iter()) {
+            *x = on_interface[place];
+        }
+    }
+
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+        let interior = self.interior();
+        let Self { symbolic, values, sweep: x, below, interface: places, .. } = self;
+        for (&value, &place) in interface.iter().zip(places.iter()) {
+            x[interior.end + place] = value;
+        }
+        sweep(Sweep::Backward, (symbolic, values), interior, x, 0, below);
+        permute_back(symbolic, x, solution);
+    }
+
+    fn solve(&mut self, forces: &mut [T]) {
+        let trailing = self.trailing();
+        let height = trailing.len();
+        if height == 0 {
+            return;
+        }
+        let Self { symbolic, values, below, trailing: x, interface: places, .. } = self;
+        let columns = forces.len() / height;
+        if x.len() < forces.len() {
+            x.resize(forces.len(), T::zero());
+            let tall = match symbolic.raw() {
+                SymbolicCholeskyRaw::Simplicial(_) => 0,
+                SymbolicCholeskyRaw::Supernodal(raw) => tallest(raw),
+            };
+            below.resize(tall * columns, T::zero());
+        }
+        let x = &mut x[..forces.len()];
+        for (forces, x) in forces.chunks_exact(height).zip(x.chunks_exact_mut(height)) {
+            for (&force, &place) in forces.iter().zip(places.iter()) {
+                x[place] = force;
+            }
+        }
+        sweep(Sweep::Forward, (symbolic, values), trailing.clone(), x, trailing.start, below);
+        sweep(Sweep::Backward, (symbolic, values), trailing.clone(), x, trailing.start, below);
+        for (forces, x) in forces.chunks_exact_mut(height).zip(x.chunks_exact(height)) {
+            for (force, &place) in forces.iter_mut().zip(places.iter()) {
+                *force = x[place];
+            }
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Diagonal systems: explicit schemes with a lumped mass.
 
-use super::{Factorization, LinearSolver};
+use super::{Condensation, Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -11,7 +11,10 @@ pub struct Diagonal;
 
 #[derive(Debug)]
 struct Inverse<T> {
-    inverse: Vec<T>,
+    reciprocals: Vec<T>,
+    interface: Vec<usize>,
+    /// The solution between `condense` and `expand`.
+    solution: Vec<T>,
 }
 
 /// Whether every stored entry is on the diagonal.
@@ -20,20 +23,25 @@ pub(super) fn is_diagonal(pattern: SymbolicSparseColMatRef<'_, usize>) -> bool {
 }
 
 impl<T: Real> LinearSolver<T> for Diagonal {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Box<dyn Factorization<T>>> {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
         if !is_diagonal(pattern) {
             return Err(Error::Incompatible {
                 part: "the diagonal solver".into(),
                 reason: "the effective matrix has entries off the diagonal; use Cholesky",
             });
         }
-        Ok(Box::new(Inverse { inverse: vec![T::zero(); pattern.ncols()] }))
+        let zero = || vec![T::zero(); pattern.ncols()];
+        Ok(Box::new(Inverse { reciprocals: zero(), interface: last.to_vec(), solution: zero() }))
     }
 }
 
 impl<T: Real> Factorization<T> for Inverse<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        for (dof, inverse) in self.inverse.iter_mut().enumerate() {
+        for (dof, inverse) in self.reciprocals.iter_mut().enumerate() {
             let value = a.val_of_col(dof).iter().copied().sum::<T>();
             if !(value > T::zero() && value.is_finite()) {
                 return Err(Error::Singular { matrix: "diagonal matrix", dof });
@@ -44,14 +52,46 @@ impl<T: Real> Factorization<T> for Inverse<T> {
     }
 
     fn solve(&mut self, rhs: &mut [T]) {
-        for column in rhs.chunks_exact_mut(self.inverse.len()) {
-            for (x, &inverse) in column.iter_mut().zip(&self.inverse) {
+        for column in rhs.chunks_exact_mut(self.reciprocals.len()) {
+            for (x, &inverse) in column.iter_mut().zip(&self.reciprocals) {
                 *x *= inverse;
             }
         }
     }
 
     fn stored_values(&self) -> usize {
-        self.inverse.len()
+        self.reciprocals.len()
+    }
+
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        Some(self)
+    }
+}
+
+impl<T: Real> Condensation<T> for Inverse<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
+        for ((x, &b), &inverse) in self.solution.iter_mut().zip(rhs).zip(&self.reciprocals) {
+            *x = b * inverse;
+        }
+        for (x, &dof) in interface.iter_mut().zip(&self.interface) {
+            *x = self.solution[dof];
+        }
+    }
+
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+        solution.copy_from_slice(&self.solution);
+        for (&x, &dof) in interface.iter().zip(&self.interface) {
+            solution[dof] = x;
+        }
+    }
+
+    fn solve(&mut self, forces: &mut [T]) {
+        if !self.interface.is_empty() {
+            for column in forces.chunks_exact_mut(self.interface.len()) {
+                for (x, &dof) in column.iter_mut().zip(&self.interface) {
+                    *x *= self.reciprocals[dof];
+                }
+            }
+        }
     }
 }

@@ -1,11 +1,11 @@
 //! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
 
-use super::contact_step::ContactRowsWork;
+use super::contact_step::{ContactRowsWork, InterfaceWork};
 use super::energy::Ledger;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation};
-use super::{Constraints, Simulation, Statistics, Workspace};
+use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
 use crate::analysis;
 use crate::contact::ContactConstraint;
 use crate::contact_solver::{ActiveSet, ContactSolver};
@@ -191,11 +191,12 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        let (mut constraints, mut g) = Constraints::new(constraints, dofs)?;
+        let admitted = admitted(&*integrator, &tableau);
+        let (mut constraints, mut g) = Constraints::new(constraints, dofs, system.prescribed(), admitted)?;
         let rows = constraints.capacity();
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         if rows > 0 {
-            check_contact(&*integrator, &tableau, &self.correctors)?;
+            check_corrections(&*integrator, &tableau, &self.correctors)?;
         }
         let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {
@@ -216,7 +217,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         contact_solver.reserve(rows);
 
-        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, rows };
+        let contact = (rows, constraints.interface());
+        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, contact };
         let program = compiler.compile(&scheme.tableau)?;
         let startup = match history.known < scheme.depth {
             true => Some(compiler.start(&scheme.starter, &scheme.tableau)?),
@@ -224,7 +226,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
-        let mut work = workspace(&mut *system, &program, &self.correctors, projection, rows, slots);
+        let interface = constraints.interface().len();
+        let mut work = workspace(&mut *system, &program, &self.correctors, projection, (rows, interface), slots);
         work.shown = scheme.shown(&state.motion);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
@@ -278,7 +281,7 @@ fn workspace<T: Real>(
     program: &Program<T>,
     correctors: &[Box<dyn Corrector<T> + '_>],
     projection: JumpProjection<T>,
-    rows: usize,
+    (rows, interface): (usize, usize),
     slots: usize,
 ) -> Workspace<T> {
     let dofs = system.dofs();
@@ -305,6 +308,7 @@ fn workspace<T: Real>(
         shown: [Vec::new(), Vec::new()],
         closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
+        interface: InterfaceWork::new(interface),
         rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
@@ -313,42 +317,54 @@ fn workspace<T: Real>(
     }
 }
 
-/// Refuses schemes whose contact condition no multiplier can meet, and corrections of contact that is not imposed on
-/// the displacements of the state.
-fn check_contact<T: Real>(
+/// The contact laws that a scheme can serve.
+fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
+    let mut admitted = Admitted { integrator: integrator.name(), no_rigid: None, no_restitution: None };
+    for stage in &tableau.stages {
+        match stage.contact {
+            ContactLevel::Position { .. } => {
+                admitted.no_restitution = Some(
+                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a scheme \
+                     that imposes it on velocities",
+                );
+                if stage.contact_row().z == 0.0 {
+                    admitted.no_rigid = Some(
+                        "its displacements do not contain the unknown, so a multiplier cannot close a gap; choose a \
+                         compliant law",
+                    );
+                }
+            }
+            ContactLevel::Velocity { .. } if stage.contact_row().z == 0.0 => {
+                admitted.no_rigid = Some(
+                    "its velocities do not contain the unknown, so a multiplier cannot stop an approach; choose a \
+                     compliant law",
+                );
+            }
+            ContactLevel::Velocity { .. } => {}
+        }
+    }
+    admitted
+}
+
+/// Refuses corrections of contact that is not imposed on the displacements of the state.
+fn check_corrections<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
     correctors: &[Box<dyn Corrector<T> + '_>],
 ) -> Result<()> {
-    let refuse = |part: String, reason| Err(Error::Incompatible { part, reason });
+    let Some(corrector) = correctors.first() else { return Ok(()) };
     for stage in &tableau.stages {
-        if stage.contact_row().z == 0.0 {
-            let reason = match stage.contact {
-                ContactLevel::Position { .. } => {
-                    "its displacements do not contain the unknown, so a multiplier cannot close a gap; contact would need a \
-                     compliant law"
-                }
-                ContactLevel::Velocity { .. } => {
-                    "its velocities do not contain the unknown, so a multiplier cannot stop an approach; contact would need \
-                     a compliant law"
-                }
-            };
-            return refuse(integrator.name(), reason);
-        }
-        let Some(corrector) = correctors.first() else { continue };
-        let part = || format!("the correction {} with {}", corrector.name(), integrator.name());
-        match stage.contact {
-            ContactLevel::POSITION => {}
+        let reason = match stage.contact {
+            ContactLevel::POSITION => continue,
             ContactLevel::Position { .. } => {
-                return refuse(
-                    part(),
-                    "the scheme imposes contact ahead of the state, whose velocity still approaches",
-                );
+                "the scheme imposes contact ahead of the state, whose velocity still approaches"
             }
             ContactLevel::Velocity { .. } => {
-                return refuse(part(), "the scheme imposes contact on velocities, which leaves no jump to correct");
+                "the scheme imposes contact on velocities, which leaves no jump to correct"
             }
-        }
+        };
+        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
+        return Err(Error::Incompatible { part, reason });
     }
     Ok(())
 }

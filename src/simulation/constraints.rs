@@ -1,6 +1,6 @@
 //! All constraints of a simulation as one list of rows.
 
-use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE};
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -11,11 +11,41 @@ pub(crate) struct Constraints<'a, T: Real> {
     parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
-    /// Number of dofs of the system.
-    dofs: usize,
+    /// The free dofs that contact may ever act on, ascending.
+    interface: Vec<usize>,
+    /// For each dof of the system its place on the interface.
+    places: Vec<usize>,
+    admitted: Admitted,
     /// Whether candidates have changed since the rows were last read.
     stale: bool,
 }
+
+/// Which laws a scheme can serve.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Admitted {
+    pub(crate) integrator: String,
+    /// Why not rigid ones, if not.
+    pub(crate) no_rigid: Option<&'static str>,
+    /// Why not restitution above zero, if not.
+    pub(crate) no_restitution: Option<&'static str>,
+}
+
+impl Admitted {
+    fn check(&self, law: ContactLaw) -> Result<()> {
+        let restores = matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
+        let refused = match law.is_compliant() {
+            true => None,
+            false => self.no_rigid.or(self.no_restitution.filter(|_| restores)),
+        };
+        match refused {
+            None => Ok(()),
+            Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
+        }
+    }
+}
+
+/// The place of a dof that no constraint has announced.
+const UNKNOWN: usize = usize::MAX - 1;
 
 impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -28,9 +58,28 @@ impl<'a, T: Real> Constraints<'a, T> {
     pub(crate) fn new(
         parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
         dofs: usize,
+        prescribed: &[usize],
+        admitted: Admitted,
     ) -> Result<(Self, ContactJacobian<T>)> {
         for part in &parts {
             part.check(dofs)?;
+        }
+        let mut interface = Vec::new();
+        for part in &parts {
+            part.dofs(&mut interface);
+        }
+        if let Some(&dof) = interface.iter().find(|&&dof| dof >= dofs) {
+            return Err(Error::MissingDof { what: "a contact constraint", dof, dofs });
+        }
+        interface.sort_unstable();
+        interface.dedup();
+        let mut places = vec![UNKNOWN; dofs];
+        for &dof in &interface {
+            places[dof] = NO_RESPONSE;
+        }
+        interface.retain(|dof| prescribed.binary_search(dof).is_err());
+        for (place, &dof) in interface.iter().enumerate() {
+            places[dof] = place;
         }
         let rows: usize = parts.iter().map(ContactConstraint::max_candidates).sum();
         let entries = parts.iter().map(ContactConstraint::max_entries).sum();
@@ -39,8 +88,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
-        let mut constraints =
-            Self { parts, ids: Vec::with_capacity(rows), laws: Vec::with_capacity(rows), dofs, stale: true };
+        let (ids, laws) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let mut constraints = Self { parts, ids, laws, interface, places, admitted, stale: true };
         constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
@@ -64,7 +113,8 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, laws, dofs, stale } = self;
+        let Self { parts, ids, laws, places, admitted, stale, .. } = self;
+        let dofs = places.len();
         jacobian.clear();
         ids.clear();
         laws.clear();
@@ -84,10 +134,17 @@ impl<'a, T: Real> Constraints<'a, T> {
             for row in 0..candidates {
                 let (feature, candidate) = part.identity(row);
                 ids.push(ContactId { constraint, feature, candidate });
-                laws.push(part.law(row));
+                let law = part.law(row);
+                law.check()?;
+                admitted.check(law)?;
+                laws.push(law);
                 for (dof, weight) in jacobian.row(before + row) {
-                    if dof >= *dofs {
-                        return Err(Error::MissingDof { what: "a contact row", dof, dofs: *dofs });
+                    if dof >= dofs {
+                        return Err(Error::MissingDof { what: "a contact row", dof, dofs });
+                    }
+                    if places[dof] == UNKNOWN {
+                        let contact = ContactId { constraint, feature, candidate };
+                        return Err(Error::UnannouncedDof { contact, dof });
                     }
                     if !weight.is_finite() {
                         let value = weight.value();
@@ -96,8 +153,24 @@ impl<'a, T: Real> Constraints<'a, T> {
                 }
             }
         }
+        jacobian.locate(places);
         *stale = false;
         Ok(())
+    }
+
+    /// The free dofs that contact may ever act on, ascending.
+    pub(crate) fn interface(&self) -> &[usize] {
+        &self.interface
+    }
+
+    /// The laws of all rows.
+    pub(crate) fn laws(&self) -> &[ContactLaw] {
+        &self.laws
+    }
+
+    /// Whether any row is compliant.
+    pub(crate) fn has_compliant(&self) -> bool {
+        self.laws.iter().any(ContactLaw::is_compliant)
     }
 
     /// Number of rows.

@@ -5,7 +5,7 @@ use super::program::{CompiledStage, ContactTarget};
 use super::step::finite_supports;
 use super::{Constraints, Statistics, Workspace};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -18,6 +18,13 @@ pub(super) struct ContactRowsWork<T> {
     /// What complementarity holds for, as a length: gaps, or h times gap rates at velocity level.
     pub(super) y: Vec<T>,
     pub(super) tolerance: Vec<T>,
+    /// y is linear in what contact adds to d: its weight.
+    weight: Vec<T>,
+    /// The laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
+    compliance: Vec<T>,
+    shift: Vec<T>,
+    /// Gaps where the balance holds, for compliant laws.
+    balance_gap: Vec<T>,
     /// Rows that may press in this stage; at velocity level those whose gap is forecast to be closed.
     pub(super) enabled: Vec<bool>,
     pub(super) in_problem: Vec<bool>,
@@ -40,19 +47,24 @@ impl<T: Real> ContactRowsWork<T> {
     /// Buffers for `rows` contacts, and for targets of `target_dofs` and forecasts of `forecast_dofs` dofs (0 if the
     /// scheme has none) with `supports` prescribed ones.
     pub(super) fn new(rows: usize, target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
-        let reals = || Vec::with_capacity(rows);
+        let reserved = || Vec::with_capacity(rows);
+        let zero = || vec![T::zero(); rows];
         Self {
             rates: vec![GapRates::default(); rows],
-            y: vec![T::zero(); rows],
-            tolerance: vec![T::zero(); rows],
+            y: zero(),
+            tolerance: zero(),
+            weight: zero(),
+            compliance: zero(),
+            shift: zero(),
+            balance_gap: zero(),
             enabled: vec![true; rows],
             in_problem: vec![false; rows],
             problem: Vec::with_capacity(rows),
             delassus: Vec::with_capacity(rows * rows),
-            offset: reals(),
-            problem_tolerance: reals(),
+            offset: reserved(),
+            problem_tolerance: reserved(),
             bounds: Vec::with_capacity(rows),
-            multipliers: reals(),
+            multipliers: reserved(),
             target: vec![T::zero(); target_dofs],
             forecast: vec![T::zero(); forecast_dofs],
             supports: vec![[T::zero(); 3]; supports],
@@ -98,6 +110,40 @@ impl<T: Real> ContactRowsWork<T> {
     }
 }
 
+/// Vectors on the interface, one entry a dof there.
+pub(super) struct InterfaceWork<T> {
+    /// The increment d: without contact when a stage begins its contact, with it at the end.
+    pub(super) increment: Vec<T>,
+    /// Forces of contact.
+    pub(super) forces: Vec<T>,
+    /// Values at d = 0 of the displacements and of what contact constrains.
+    displacement: Vec<T>,
+    target: Vec<T>,
+    /// A response.
+    response: Vec<T>,
+}
+
+impl<T: Real> InterfaceWork<T> {
+    pub(super) fn new(size: usize) -> Self {
+        let zero = || vec![T::zero(); size];
+        Self { increment: zero(), forces: zero(), displacement: zero(), target: zero(), response: zero() }
+    }
+}
+
+/// `values[dof] = base + weight · increment` on the interface.
+fn advance<T: Real>(dofs: &[usize], base: &[T], weight: T, increment: &[T], values: &mut [T]) {
+    for ((&dof, &base), &d) in dofs.iter().zip(base).zip(increment) {
+        values[dof] = base + weight * d;
+    }
+}
+
+/// Keeps the values on the interface.
+fn keep<T: Real>(dofs: &[usize], values: &[T], kept: &mut [T]) {
+    for (&dof, kept) in dofs.iter().zip(kept) {
+        *kept = values[dof];
+    }
+}
+
 /// Where a stage imposes contact.
 struct Level<'s, T> {
     target: Option<&'s ContactTarget<T>>,
@@ -128,8 +174,12 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     pub(super) statistics: &'s mut Statistics,
 }
 
+/// Times a stage is solved with another linearization of its power laws, at most.
+const LINEARIZATIONS: usize = 100;
+
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Finds the multipliers of the stage and adds their response to d and u.
+    /// Finds the multipliers of the stage from d on the interface, and adds their response to it. `new.u` is left as
+    /// predicted.
     pub(super) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -138,42 +188,273 @@ impl<T: Real> ContactStep<'_, '_, T> {
         past: &[Motion<T>],
         work: &mut Workspace<T>,
     ) -> Result<()> {
+        let dofs = self.constraints.interface();
+        keep(dofs, &new.u, &mut work.interface.displacement);
+        work.interface.forces.fill(T::zero());
         self.aim(system, new, past, work)?;
-        let Self { stage, clock, constraints, g, solver, statistics } = self;
-        let level = Level { target: stage.contact.as_ref(), clock: *clock };
-        let [w_u, ..] = stage.recovery.weights();
-        let weight = level.target.map_or(w_u, |target| target.row.weight);
-        let Workspace { increment, prescribed, trial, rows, .. } = work;
-        rows.evaluate(&level, constraints, g, new, 0.0)?;
-        let ContactRowsWork { y, tolerance, enabled, in_problem, problem, delassus, offset, .. } = rows;
+        let result = match self.condition(operator, new, past, work) {
+            Ok(true) => self.press(operator, new.t, work),
+            Ok(false) => {
+                self.release(work);
+                Ok(())
+            }
+            Err(error) => Err(error),
+        };
+        let interface = &work.interface;
+        for (&dof, &u) in self.constraints.interface().iter().zip(&interface.displacement) {
+            new.u[dof] = u;
+        }
+        if let Some(target) = &self.stage.contact {
+            let dofs = self.constraints.interface();
+            advance(dofs, &interface.target, target.row.weight, &interface.increment, &mut work.rows.target);
+        }
+        result
+    }
+
+    /// Opens every row that d could press.
+    fn release(&self, work: &mut Workspace<T>) {
+        let Workspace { rows, trial, .. } = work;
+        for row in (0..self.constraints.len()).filter(|&row| rows.weight[row] > T::zero()) {
+            trial.lambda_raw[row] = T::zero();
+        }
+    }
+
+    /// Weights of d in what rigid rows constrain, and in the displacements and accelerations of the balance.
+    fn weights(&self) -> [T; 3] {
+        let rigid = self.stage.contact.as_ref().map_or(self.stage.recovery.weights()[0], |target| target.row.weight);
+        let [balance_u, _, balance_a] = self.stage.balance.as_ref().unwrap_or(&self.stage.recovery).weights();
+        [rigid, balance_u, balance_a]
+    }
+
+    /// Evaluates the condition of every row at the present d, applies forces of compliant laws that do not depend on d,
+    /// and says whether any other row has to press.
+    fn condition(
+        &mut self,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<bool> {
+        let [rigid, balance_u, balance_a] = self.weights();
+        let count = self.constraints.len();
+        for row in 0..count {
+            let law = self.constraints.law(row);
+            let inertia = T::of(law.inertia());
+            work.rows.weight[row] = if law.is_compliant() { balance_u + inertia * balance_a } else { rigid };
+        }
+        self.place(new, work);
+        if self.constraints.has_compliant() {
+            self.compliant_gaps(new, work)?;
+            if self.press_without_coupling(operator, work) {
+                self.place(new, work);
+            }
+        }
+        let Self { stage, clock, constraints, g, .. } = self;
+        let Workspace { trial, rows, .. } = work;
+        rows.evaluate(&Level { target: stage.contact.as_ref(), clock: *clock }, constraints, g, new, 0.0)?;
+        self.restitution(past, rows);
+        let constraints = &self.constraints;
+        let mut needed = false;
+        for row in 0..count {
+            let law = constraints.law(row);
+            if law.is_compliant() {
+                rows.y[row] = rows.balance_gap[row];
+                let depth = (-rows.y[row]).max(rows.tolerance[row]);
+                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, trial.lambda_raw[row]);
+            } else {
+                (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
+            }
+            let coupled = rows.weight[row] > T::zero();
+            let threshold = if law.augmentations() > 0 { -rows.shift[row] } else { -rows.tolerance[row] };
+            let violated = rows.enabled[row] && rows.y[row] < threshold || law.is_equality();
+            rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
+            needed |= coupled && violated;
+        }
+        Ok(needed)
+    }
+
+    /// Brings d on the interface into the displacements, into what contact constrains, and into the balance.
+    fn place(&mut self, new: &mut Motion<T>, work: &mut Workspace<T>) {
+        let dofs = self.constraints.interface();
+        let Workspace { interface, rows, .. } = work;
+        let InterfaceWork { increment, displacement, target, .. } = interface;
+        advance(dofs, displacement, self.stage.recovery.weights()[0], increment, &mut new.u);
+        if let Some(aim) = &self.stage.contact {
+            advance(dofs, target, aim.row.weight, increment, &mut rows.target);
+        }
+    }
+
+    /// Gaps where the balance holds, with the inertia of the law.
+    fn compliant_gaps(&mut self, new: &mut Motion<T>, work: &mut Workspace<T>) -> Result<()> {
+        let [_, balance_u, balance_a] = self.weights();
+        let Self { stage, clock, constraints, g, .. } = self;
+        let Workspace { interface, rows, balance, .. } = work;
+        let t = clock.at(stage.load);
+        let reads_past = stage.balance.as_ref().unwrap_or(&stage.recovery).reads_past(2);
+        // In the balance ū is needed once: it may be overwritten.
+        let motion = match (&stage.balance, balance.as_mut()) {
+            (Some(_), Some(balance)) => {
+                for (&dof, &d) in constraints.interface().iter().zip(&interface.increment) {
+                    balance.u[dof] += balance_u * d;
+                }
+                balance
+            }
+            _ => new,
+        };
+        constraints.finite_gaps(t, &motion.u, &mut rows.balance_gap)?;
+        if constraints.laws().iter().all(|law| law.inertia() == 0.0) {
+            return Ok(());
+        }
+        // g̈ at ā: the predicted part, and that of d.
+        let InterfaceWork { response, increment, .. } = interface;
+        for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
+            *a = if reads_past { motion.a[dof] } else { T::zero() } + balance_a * d;
+        }
+        constraints.rates(t, &motion.u, &motion.v, &mut rows.rates);
+        for row in 0..constraints.len() {
+            let inertia = T::of(constraints.law(row).inertia());
+            let acceleration = g.interface_product(row, response) + rows.rates[row].acceleration;
+            rows.balance_gap[row] += inertia * acceleration;
+        }
+        Ok(())
+    }
+
+    /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are any.
+    fn press_without_coupling(&mut self, operator: &mut Operator<T>, work: &mut Workspace<T>) -> bool {
+        let Self { constraints, g, .. } = self;
+        let Workspace { interface, rows, trial, .. } = work;
+        let mut pressed = false;
+        for row in 0..constraints.len() {
+            let law = constraints.law(row);
+            if law.is_compliant() && rows.weight[row] == T::zero() {
+                let force = law.force(rows.balance_gap[row], trial.lambda_raw[row]);
+                trial.lambda_raw[row] = force;
+                g.interface_scatter(row, force, &mut interface.forces);
+                pressed |= force > T::zero();
+            }
+        }
+        if pressed {
+            interface.response.copy_from_slice(&interface.forces);
+            operator.respond(&mut interface.response);
+            T::axpy(T::one(), &interface.response, &mut interface.increment);
+        }
+        pressed
+    }
+
+    /// Adds e times the rate at the start of the stage to the rows under Newton's impact law.
+    fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) {
+        let Self { stage, clock, constraints, g, .. } = self;
+        let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
+        let restores = |law: ContactLaw| matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
+        let (Some(start), true) = (past.first(), constraints.laws().iter().any(|&law| restores(law))) else { return };
+        let h = T::of(clock.h);
+        constraints.rates(start.t, &start.u, &start.v, &mut rows.rates);
+        for row in 0..constraints.len() {
+            if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
+                let rate = g.product(row, &start.v) + T::of(lead) * h * g.product(row, &start.a) + rows.rates[row].rate;
+                rows.y[row] += T::of(coefficient) * h * rate;
+                rows.tolerance[row] += rounding(h * g.magnitude(row, &start.v));
+            }
+        }
+    }
+
+    /// Solves for the multipliers, laws linearized again until they are met.
+    fn press(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
+        let count = self.constraints.len();
+        for pass in 0..LINEARIZATIONS {
+            self.press_linearized(operator, t, work)?;
+            let Workspace { rows, trial, interface, .. } = &mut *work;
+            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, in_problem, .. } =
+                rows;
+            // The laws at the solution.
+            let (mut worst, mut again) = ((0, T::zero()), false);
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                let law = self.constraints.law(row);
+                let pushed = |(&j, &lambda): (&usize, &T)| lambda * self.g.interface_product(row, operator.response(j));
+                match law {
+                    ContactLaw::PowerLaw { .. } => {
+                        let gap = y[row] + weight[row] * problem.iter().zip(&*multipliers).map(pushed).sum::<T>();
+                        let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
+                        let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
+                        let miss = (lambda - law.force(gap, T::zero())).abs() * slope;
+                        if miss > tolerance[row] + rounded * depth {
+                            again = true;
+                            if miss > worst.1 {
+                                worst = (row, miss);
+                            }
+                        }
+                        (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
+                    }
+                    _ if pass < law.augmentations() => {
+                        again = true;
+                        (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
+                    }
+                    _ => {}
+                }
+            }
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                trial.lambda_raw[row] = lambda;
+            }
+            if !again {
+                for row in (0..count).filter(|&row| !in_problem[row] && weight[row] > T::zero()) {
+                    trial.lambda_raw[row] = T::zero();
+                }
+                for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                    if !lambda.is_finite() {
+                        let (contact, value) = (self.constraints.ids[row], lambda.value());
+                        return Err(Error::ContactNotFinite { t, what: "the multiplier", contact, value });
+                    }
+                    if lambda != T::zero() {
+                        T::axpy(lambda, operator.response(row), &mut interface.increment);
+                        self.g.interface_scatter(row, lambda, &mut interface.forces);
+                    }
+                }
+                return Ok(());
+            }
+            if pass + 1 == LINEARIZATIONS {
+                let failure = ContactFailure::NotConverged { iterations: pass, row: worst.0, residual: worst.1 };
+                return Err(contact_error(t, failure, |row| self.constraints.ids[row]));
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves on the rows that may be active; whoever is pushed in by that joins. The set only grows: this ends.
+    fn press_linearized(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
+        let Self { constraints, g, solver, statistics, .. } = self;
+        let Workspace { rows, trial, .. } = work;
+        let ContactRowsWork {
+            y,
+            tolerance,
+            weight,
+            compliance,
+            shift,
+            enabled,
+            in_problem,
+            problem,
+            delassus,
+            offset,
+            ..
+        } = rows;
         let (bounds, multipliers, problem_tolerance) =
             (&mut rows.bounds, &mut rows.multipliers, &mut rows.problem_tolerance);
         let count = constraints.len();
-        let mut needed = false;
-        for row in 0..count {
-            let violated = enabled[row] && y[row] < -tolerance[row] || constraints.law(row) == ContactLaw::Equality;
-            in_problem[row] = violated || enabled[row] && trial.lambda_raw[row] > T::zero();
-            needed |= violated;
-        }
-        if !needed {
-            trial.lambda_raw.fill(T::zero());
-            return Ok(());
-        }
-        // Solve on the rows that may be active; whoever is pushed in by that joins. The set only grows: this ends.
         loop {
             problem.clear();
             problem.extend((0..count).filter(|&row| in_problem[row]));
-            for &row in problem.iter() {
-                operator.prepare(g, row, prescribed);
-            }
+            operator.prepare(g, problem);
             for buffer in [&mut *delassus, &mut *offset, &mut *problem_tolerance, &mut *multipliers] {
                 buffer.clear();
             }
             bounds.clear();
-            for &j in problem.iter() {
-                delassus.extend(problem.iter().map(|&i| weight * g.product(i, operator.response(j))));
-                offset.push(y[j]);
-                problem_tolerance.push(tolerance[j]);
+            // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
+            for (k, &j) in problem.iter().enumerate() {
+                let response = operator.response(j);
+                delassus.extend(problem.iter().map(|&i| g.interface_product(i, response)));
+                let size = problem.len();
+                delassus[k * size + k] += compliance[j] / weight[j];
+                offset.push((y[j] + shift[j]) / weight[j]);
+                problem_tolerance.push(tolerance[j] / weight[j]);
                 multipliers.push(trial.lambda_raw[j]);
                 bounds.push(constraints.law(j).into());
             }
@@ -181,40 +462,23 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let solved = solver.solve(&data, multipliers);
             statistics.contact_solves += 1;
             statistics.contact_iterations +=
-                solved.map_err(|failure| contact_error(new.t, failure, |i| constraints.ids[problem[i]]))? as u64;
+                solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))? as u64;
             let mut grown = false;
             for row in 0..count {
-                if enabled[row] && !in_problem[row] {
-                    let push = |(&j, &lambda): (&usize, &T)| weight * lambda * g.product(row, operator.response(j));
-                    let pushed = y[row] + problem.iter().zip(multipliers.iter()).map(push).sum::<T>();
+                if enabled[row] && !in_problem[row] && weight[row] > T::zero() {
+                    let push = |(&j, &lambda): (&usize, &T)| lambda * g.interface_product(row, operator.response(j));
+                    let pushed = y[row] + weight[row] * problem.iter().zip(multipliers.iter()).map(push).sum::<T>();
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);
+                        let depth = (-pushed).max(tolerance[row]);
+                        (compliance[row], shift[row]) = constraints.law(row).linearized(depth, T::zero());
                     }
                 }
             }
             if !grown {
-                break;
+                return Ok(());
             }
         }
-        trial.lambda_raw.fill(T::zero());
-        for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
-            if !lambda.is_finite() {
-                let contact = constraints.ids[row];
-                return Err(Error::ContactNotFinite {
-                    t: new.t,
-                    what: "the multiplier",
-                    contact,
-                    value: lambda.value(),
-                });
-            }
-            if lambda != T::zero() {
-                trial.lambda_raw[row] = lambda;
-                T::axpy(lambda, operator.response(row), increment);
-                T::axpy(w_u * lambda, operator.response(row), &mut new.u);
-                T::axpy(weight * lambda, operator.response(row), &mut rows.target);
-            }
-        }
-        Ok(())
     }
 
     /// Forms what contact constrains without multipliers, and decides which rows may press.
@@ -226,14 +490,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         work: &mut Workspace<T>,
     ) -> Result<()> {
         let Self { clock, constraints, g, .. } = self;
-        let Workspace { increment, prescribed, rows, .. } = work;
+        let Workspace { prescribed, rows, interface, .. } = work;
         let ContactRowsWork { y, enabled, target, forecast, supports, rates, .. } = rows;
         enabled.fill(true);
         let Some(aim) = &self.stage.contact else { return Ok(()) };
         let h = T::of(clock.h);
         let t = clock.at(aim.at);
         aim.row.predict(past, target);
-        T::axpy(aim.row.weight, increment, target);
+        keep(constraints.interface(), target, &mut interface.target);
         // Displacements of supports, or h times their velocities.
         let mut support = |t: f64, values: &mut [T], what: fn(&[T; 3], T) -> T| {
             if !prescribed.is_empty() {
@@ -249,6 +513,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             return support(t, target, |support, _| support[0]);
         };
         support(t, target, |support, h| h * support[1])?;
+        advance(constraints.interface(), &interface.target, aim.row.weight, &interface.increment, target);
         let t_forecast = clock.at(*at);
         row.predict(past, forecast);
         support(t_forecast, forecast, |support, _| support[0])?;
@@ -258,7 +523,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             // A sliver of one step's approach counts as touching, as at position level.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
             let touching = rounding(g.magnitude(row, forecast) + y[row].abs()) + T::of(1e-10) * approach;
-            enabled[row] = y[row] <= touching || constraints.law(row) == ContactLaw::Equality;
+            let law = constraints.law(row);
+            enabled[row] = y[row] <= touching || law.is_equality() || law.is_compliant();
         }
         Ok(())
     }
@@ -280,10 +546,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let impulse_weight = T::of(clock.h * impulse_weight);
         for row in 0..constraints.len() {
             let raw = trial.lambda_raw[row];
-            let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row];
-            let closed = raw > T::zero() || touching || constraints.law(row) == ContactLaw::Equality;
+            let law = constraints.law(row);
+            let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
+            let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
-            if closed {
+            // A compliant contact leaves no jump to correct.
+            if closed && !law.is_compliant() {
                 buffers.closed.push(row);
             }
             trial.lambda[row] = raw;

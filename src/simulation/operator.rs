@@ -1,4 +1,4 @@
-//! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses A⁻¹Gᵀ of contact rows.
+//! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 
 use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
@@ -9,7 +9,10 @@ use crate::real::Real;
 use crate::sparse::Combination;
 use crate::system::{Damping, System, TangentWeights};
 
-/// A factorized effective matrix and the responses A⁻¹ Gᵀ computed with it so far.
+/// A factorized effective matrix and the responses to contact computed with it so far.
+///
+/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A step is begun,
+/// which gives the solution on the interface, and finished with the values there after contact.
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
     /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
@@ -17,10 +20,16 @@ pub(crate) struct Operator<T> {
     tangent: Tangent,
     combination: Combination,
     factor: Box<dyn Factorization<T>>,
-    dofs: usize,
+    interface: Vec<usize>,
+    /// For each contact row the interface part of A⁻¹ G_rowᵀ, if it has been computed.
     columns: Vec<T>,
     computed: Vec<bool>,
+    /// One vector of the system, for factorizations that cannot condense.
+    full: Vec<T>,
 }
+
+/// Responses computed at once, at most.
+const BATCH: usize = 16;
 
 /// Whether K and C have a part in an effective matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,19 +41,23 @@ enum Tangent {
 }
 
 impl<T: Real> Operator<T> {
-    /// Assembles and factorizes; memory for the responses of `rows` contact rows is reserved.
+    /// Assembles and factorizes; memory for the responses of `rows` contact rows on the `interface` is reserved.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         solver: &dyn LinearSolver<T>,
         weights: [f64; 3],
         h: f64,
-        rows: usize,
+        (rows, interface): (usize, &[usize]),
     ) -> Result<Self> {
-        let dofs = system.dofs();
         let (tangent, combination) = pattern(system, weights)?;
-        let factor = solver.analyze(combination.pattern())?;
-        let columns = memory::zeros(rows, dofs, "the responses of the contact rows")?;
-        let mut operator = Self { weights, tangent, combination, factor, dofs, columns, computed: vec![false; rows] };
+        let mut factor = solver.analyze(combination.pattern(), interface)?;
+        let columns = memory::zeros(rows, interface.len(), "the responses of the contact rows")?;
+        let full = match factor.condensation() {
+            None if rows > 0 => vec![T::zero(); system.dofs()],
+            _ => Vec::new(),
+        };
+        let (interface, computed) = (interface.to_vec(), vec![false; rows]);
+        let mut operator = Self { weights, tangent, combination, factor, interface, columns, computed, full };
         operator.factorize(system, h)?;
         Ok(operator)
     }
@@ -88,28 +101,67 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    /// `x ← A⁻¹ x`.
-    pub(crate) fn solve(&mut self, x: &mut [T]) {
-        self.factor.solve(x);
-    }
-
-    /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response).
-    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, row: usize, prescribed: &[usize]) {
-        if !self.computed[row] {
-            let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];
-            column.fill(T::zero());
-            g.scatter(row, T::one(), column);
-            for &dof in prescribed {
-                column[dof] = T::zero();
-            }
-            self.factor.solve(column);
-            self.computed[row] = true;
+    /// Begins `A d = r` with r in `increment`, and writes d on the interface.
+    pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) {
+        if let Some(condensed) = self.factor.condensation().filter(|_| !on_interface.is_empty()) {
+            condensed.condense(increment, on_interface);
+            return;
+        }
+        self.factor.solve(increment);
+        for (x, &dof) in on_interface.iter_mut().zip(&self.interface) {
+            *x = increment[dof];
         }
     }
 
-    /// A⁻¹ G_rowᵀ.
+    /// Finishes what [`begin`](Self::begin) began: `increment` becomes d with contact `forces` on the interface, which
+    /// have changed d there to `on_interface`.
+    pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) {
+        let Self { factor, interface, full, .. } = self;
+        if let Some(condensed) = factor.condensation().filter(|_| !on_interface.is_empty()) {
+            condensed.expand(on_interface, increment);
+        } else if forces.iter().any(|force| *force != T::zero()) {
+            full.fill(T::zero());
+            for (&force, &dof) in forces.iter().zip(interface.iter()) {
+                full[dof] = force;
+            }
+            factor.solve(full);
+            T::axpy(T::one(), full, increment);
+            for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
+                increment[dof] = x;
+            }
+        }
+    }
+
+    /// `f ← A⁻¹ f` on the interface, for one column of forces there.
+    pub(crate) fn respond(&mut self, forces: &mut [T]) {
+        respond(&mut *self.factor, &self.interface, &mut self.full, forces);
+    }
+
+    /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response) for ascending rows.
+    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
+        let mut rest = rows;
+        while let Some(&first) = rest.first() {
+            // Rows that follow one another go together.
+            let count = (0..rest.len().min(BATCH)).take_while(|&k| rest[k] == first + k && !self.computed[first + k]);
+            let end = first + count.count();
+            let size = self.interface.len();
+            for row in first..end {
+                let column = &mut self.columns[row * size..(row + 1) * size];
+                column.fill(T::zero());
+                g.interface_scatter(row, T::one(), column);
+                self.computed[row] = true;
+            }
+            if end > first {
+                let values = &mut self.columns[first * size..end * size];
+                respond(&mut *self.factor, &self.interface, &mut self.full, values);
+            }
+            rest = &rest[(end - first).max(1)..];
+        }
+    }
+
+    /// A⁻¹ G_rowᵀ on the interface.
     pub(crate) fn response(&self, row: usize) -> &[T] {
-        &self.columns[row * self.dofs..(row + 1) * self.dofs]
+        &self.columns[row * self.interface.len()..(row + 1) * self.interface.len()]
     }
 
     /// Forgets responses to rows that have changed.
@@ -119,6 +171,24 @@ impl<T: Real> Operator<T> {
 
     pub(crate) fn stored_values(&self) -> usize {
         self.factor.stored_values()
+    }
+}
+
+/// `f ← A⁻¹ f` on the interface, for columns of forces there; `full` is scratch for factorizations that cannot condense.
+fn respond<T: Real>(factor: &mut dyn Factorization<T>, interface: &[usize], full: &mut [T], forces: &mut [T]) {
+    if let Some(condensed) = factor.condensation() {
+        condensed.solve(forces);
+        return;
+    }
+    for column in forces.chunks_exact_mut(interface.len().max(1)) {
+        full.fill(T::zero());
+        for (&force, &dof) in column.iter().zip(interface) {
+            full[dof] = force;
+        }
+        factor.solve(full);
+        for (x, &dof) in column.iter_mut().zip(interface) {
+            *x = full[dof];
+        }
     }
 }
 

@@ -216,8 +216,8 @@ pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) system: &'c mut dyn System<T>,
     pub(crate) solver: &'c dyn LinearSolver<T>,
     pub(crate) h: f64,
-    /// Contact rows to reserve responses for.
-    pub(crate) rows: usize,
+    /// Contact rows to reserve responses for, and the dofs they act on.
+    pub(crate) contact: (usize, &'c [usize]),
 }
 
 impl<T: Real> Compiler<'_, T> {
@@ -244,7 +244,7 @@ impl<T: Real> Compiler<'_, T> {
             let weights = stage.balance.each().map(|row| row.z);
             let shared = program.operators.iter().position(|operator| operator.serves(weights));
             if shared.is_none() {
-                program.operators.push(Operator::new(self.system, self.solver, weights, self.h, self.rows)?);
+                program.operators.push(Operator::new(self.system, self.solver, weights, self.h, self.contact)?);
             }
             let increment = stage.increment();
             let (covector, read) = books(s);

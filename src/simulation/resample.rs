@@ -90,7 +90,9 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         conserve_momentum(scheme, state, history, h, &mut past);
-        let closed: Vec<usize> = (0..constraints.len()).filter(|&row| state.contacts.closed[row]).collect();
+        let closed: Vec<usize> = (0..constraints.len())
+            .filter(|&row| state.contacts.closed[row] && !constraints.law(row).is_compliant())
+            .collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
             projection
@@ -145,7 +147,8 @@ impl<T: Real> Simulation<'_, T> {
         contact_solver.reserve(rows);
         let depth = scheme.depth;
         if begun.1.known < depth && startup.is_none() {
-            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, rows };
+            let contact = (rows, constraints.interface());
+            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, contact };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);

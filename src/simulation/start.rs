@@ -123,11 +123,25 @@ impl<T: Real> Start<'_, T> {
         let mut contacts = ContactState::with_capacity(constraints.capacity());
         contacts.reset(&constraints.ids);
         let touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+        // Springs in compression push from the start.
+        for row in 0..constraints.len() {
+            let law = constraints.law(row);
+            if law.is_compliant() && law.inertia() == 0.0 {
+                let force = law.force(contacts.gap[row], T::zero());
+                if force > T::zero() {
+                    projection.prepare(g, &[row]);
+                    projection.push(g, row, force, &mut motion.a);
+                }
+                (contacts.lambda[row], contacts.lambda_raw[row]) = (force, force);
+                contacts.closed[row] = force > T::zero();
+            }
+        }
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let mut problem = match contact.lead() > 0.0 {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
             false => StartProblem::at_rest(constraints, g, &motion, h, &touching),
         };
+        problem.add_inertial(constraints, g, &motion, &contacts.gap);
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
         for (&row, &lambda) in problem.rows.iter().zip(&problem.lambda) {
             projection.push(g, row, lambda, &mut motion.a);
@@ -149,6 +163,8 @@ struct StartProblem<T> {
     /// q and its rounding, one entry a candidate.
     offset: Vec<T>,
     tolerance: Vec<T>,
+    /// Additions to the diagonal of S, one entry a candidate.
+    compliance: Vec<T>,
     lambda: Vec<T>,
 }
 
@@ -169,7 +185,7 @@ impl<T: Real> StartProblem<T> {
             // The sliver of approach that counts as touching does not count as rest.
             let still =
                 rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
-            constraints.law(row) == ContactLaw::Equality || touching[row] && still
+            constraints.law(row).is_equality() || touching[row] && still
         });
         let own = |row: usize| rates[row].acceleration;
         Self {
@@ -179,8 +195,40 @@ impl<T: Real> StartProblem<T> {
             tolerance: (0..constraints.len())
                 .map(|row| rounding(g.magnitude(row, &motion.a) + own(row).abs()))
                 .collect(),
+            compliance: vec![T::zero(); constraints.len()],
             lambda: Vec::new(),
         }
+    }
+
+    /// Adds the laws whose force depends on the acceleration: 0 ≤ g̈ + (k g + λ)/m ⊥ λ ≥ 0.
+    fn add_inertial(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        motion: &Motion<T>,
+        gaps: &[T],
+    ) {
+        let inertia = |law: ContactLaw| T::of(law.inertia());
+        if constraints.laws().iter().all(|&law| inertia(law) == T::zero()) {
+            return;
+        }
+        let mut rates = vec![GapRates::default(); constraints.len()];
+        constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+        for row in 0..constraints.len() {
+            let law = constraints.law(row);
+            if inertia(law) > T::zero() {
+                let per_gap = inertia(law).recip();
+                let (compliance, _) = law.linearized(T::zero(), T::zero());
+                self.compliance[row] = per_gap * compliance;
+                self.offset[row] = g.product(row, &motion.a) + rates[row].acceleration + per_gap * gaps[row];
+                self.tolerance[row] = rounding(g.magnitude(row, &motion.a) + self.offset[row].abs());
+                match gaps[row] < T::zero() {
+                    true => self.rows.push(row),
+                    false => self.waiting.push(row),
+                }
+            }
+        }
+        self.rows.sort_unstable();
     }
 
     /// Contacts that would violate the condition which the scheme imposes ahead of the state.
@@ -230,9 +278,11 @@ impl<T: Real> StartProblem<T> {
         let tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, y)| scale * rounding(g.magnitude(row, &target) + y.abs())).collect();
         let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
-        let takes_part = |row: &usize| constraints.law(*row) == ContactLaw::Equality || offset[*row] < -tolerance[*row];
-        let (rows, waiting) = (0..constraints.len()).filter(|&row| open[row]).partition(takes_part);
-        Ok(Self { rows, waiting, offset, tolerance, lambda: Vec::new() })
+        let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
+        let rigid = |row: &usize| open[*row] && !constraints.law(*row).is_compliant();
+        let (rows, waiting) = (0..constraints.len()).filter(rigid).partition(takes_part);
+        let compliance = vec![T::zero(); constraints.len()];
+        Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })
     }
 
     fn solve(
@@ -243,10 +293,13 @@ impl<T: Real> StartProblem<T> {
         projection: &mut JumpProjection<T>,
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
-        let Self { rows, waiting, offset, tolerance, lambda } = self;
+        let Self { rows, waiting, offset, tolerance, compliance, lambda } = self;
         let mut s = Vec::new();
         while !rows.is_empty() {
             projection.assemble(g, rows, &mut s);
+            for (k, &row) in rows.iter().enumerate() {
+                s[k * rows.len() + k] += compliance[row];
+            }
             let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
             let bounds: Vec<Bound> = rows.iter().map(|&row| constraints.law(row).into()).collect();
             let (q, rounded) = (pick(offset), pick(tolerance));
@@ -303,13 +356,13 @@ fn touching_contacts<T: Real>(
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];
         let tolerance = rounding(g.magnitude(row, &motion.u) + gap.abs()) + T::of(1e-10 * h) * rate.abs();
-        let equality = constraints.law(row) == ContactLaw::Equality;
-        let violated = gap < -tolerance || (equality && gap > tolerance);
+        let law = constraints.law(row);
+        let violated = !law.is_compliant() && gap < -tolerance || law.is_equality() && gap > tolerance;
         if violated && violation == Violation::Refused {
             let contact = constraints.ids[row];
             return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });
         }
-        touching.push(gap <= tolerance);
+        touching.push(gap <= tolerance && !law.is_compliant());
     }
     Ok(touching)
 }

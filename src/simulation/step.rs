@@ -110,16 +110,9 @@ impl<T: Real> Simulation<'_, T> {
             new.t = clock.at(stage.end);
             let operator = &mut program.operators[stage.operator];
             residual(stage, clock.at(stage.load), &mut **system, new, past, work)?;
-            operator.solve(&mut work.increment);
+            operator.begin(&mut work.increment, &mut work.interface.increment);
             statistics.linear_solves += 1;
-            if !T::all_finite(&work.increment) {
-                let dof = work.increment.iter().position(|x| !x.is_finite()).unwrap_or(0);
-                let value = work.increment[dof].value();
-                return Err(Error::StepNotFinite { t: clock.at(0.0), h: clock.h, what: "the increment", dof, value });
-            }
-            let [w_u, w_v, w_a] = stage.recovery.weights();
-            T::axpy(w_u, &work.increment, &mut new.u);
-            if constraints.len() > 0 {
+            if constraints.len() > 0 && T::all_finite(&work.interface.increment) {
                 ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.solve(
                     &mut **system,
                     operator,
@@ -128,6 +121,14 @@ impl<T: Real> Simulation<'_, T> {
                     work,
                 )?;
             }
+            operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+            if !T::all_finite(&work.increment) {
+                let dof = work.increment.iter().position(|x| !x.is_finite()).unwrap_or(0);
+                let value = work.increment[dof].value();
+                return Err(Error::StepNotFinite { t: clock.at(0.0), h: clock.h, what: "the increment", dof, value });
+            }
+            let [w_u, w_v, w_a] = stage.recovery.weights();
+            T::axpy(w_u, &work.increment, &mut new.u);
             T::axpy(w_v, &work.increment, &mut new.v);
             if stage.recovery.reads_past(2) {
                 T::axpy(w_a, &work.increment, &mut new.a);

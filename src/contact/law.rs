@@ -1,0 +1,199 @@
+//! Contact laws: how force and gap of one row belong together.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// The law of one contact row: its force λ ≥ 0 (compression) given its gap g.
+///
+/// Rigid laws determine λ by a condition on the gap, or on its rate where the scheme imposes contact on velocities
+/// ([`ContactLevel`](crate::tableau::ContactLevel)). Compliant laws are springs: they act where the scheme takes all
+/// other forces, so a smooth contact keeps the order of the scheme; correctors leave them alone, and schemes without
+/// multiplier contact take them too. In the contact problem a compliance is an addition to the diagonal of the Delassus
+/// operator, solved with the rigid rows.
+///
+/// Numbers are `f64` in every run, in the units of the host: force/length for a stiffness.
+///
+/// ```
+/// use contact_dynamics::contact::ContactLaw;
+/// // Two glass spheres of radius 0.01, E = 48 GPa, ν = 0.2.
+/// let law = ContactLaw::hertz(48e9 / (2.0 * (1.0 - 0.04)), 0.005);
+/// assert!(matches!(law, ContactLaw::PowerLaw { exponent: 1.5, .. }) && law.is_compliant());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ContactLaw {
+    /// Unilateral and rigid: g ≥ 0, λ ≥ 0, λ g = 0. Impacts lose the approach velocity of the contact node.
+    Rigid,
+    /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multiplier).
+    Equality,
+    /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0 with ġ the rate at the start of the stage. Schemes that
+    /// impose contact on velocities only; with several contacts at once it is the law of simultaneous impact, which
+    /// for Newton's cradle is not the outcome of a sequence of pairwise impacts.
+    Restitution {
+        /// e, from 0 (plastic, the same as `Rigid`) to 1 (elastic).
+        coefficient: f64,
+    },
+    /// λ = k ⟨−g⟩: a linear spring in compression.
+    Penalty {
+        /// k (force/length).
+        stiffness: f64,
+    },
+    /// λ = k ⟨−g⟩^p, for instance Hertz' law with p = 3/2.
+    PowerLaw {
+        /// k (force/length^p).
+        stiffness: f64,
+        /// p ≥ 1.
+        exponent: f64,
+    },
+    /// λ = ⟨−k g − m g̈⟩: a spring and a mass that contact couples in (Asano 1986; Hetherington, Rodríguez-Ferran, Askes
+    /// 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical step.
+    /// Switching the mass on at speed changes the kinetic energy: impacts do not conserve energy.
+    Bipenalty {
+        /// k (force/length).
+        stiffness: f64,
+        /// m (mass).
+        mass: f64,
+    },
+    /// Augmented Lagrangian (Alart and Curnier 1991; Simo and Laursen 1992): λ = ⟨λ̂ − k g⟩ with λ̂ the raw multiplier of the stage
+    /// before, then replaced by λ so many times. The gap of a lasting contact goes to zero; at impact it is that of a
+    /// penalty, reduced by every augmentation.
+    AugmentedLagrangian {
+        /// k (force/length).
+        stiffness: f64,
+        /// How often λ̂ is replaced within a stage.
+        augmentations: usize,
+    },
+}
+
+impl ContactLaw {
+    /// Hertz' law for two elastic bodies: λ = 4/3 E* √R ⟨−g⟩^{3/2}, with 1/E* = Σ (1 − ν²)/E and 1/R = Σ 1/Rᵢ.
+    pub fn hertz(modulus: f64, radius: f64) -> Self {
+        Self::PowerLaw { stiffness: 4.0 / 3.0 * modulus * radius.sqrt(), exponent: 1.5 }
+    }
+
+    /// Whether the force follows from the gap alone (and its acceleration): the gap may be negative.
+    pub fn is_compliant(&self) -> bool {
+        match self {
+            Self::Rigid | Self::Equality | Self::Restitution { .. } => false,
+            Self::Penalty { .. }
+            | Self::PowerLaw { .. }
+            | Self::Bipenalty { .. }
+            | Self::AugmentedLagrangian { .. } => true,
+        }
+    }
+
+    /// Whether the row is bilateral.
+    pub(crate) fn is_equality(&self) -> bool {
+        *self == Self::Equality
+    }
+
+    /// Refuses parameters out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        let inside = |name, value: f64, ok: bool, range| match ok {
+            true => Ok(()),
+            false => Err(Error::Parameter { name, value, range }),
+        };
+        let positive = |name, value: f64| inside(name, value, value > 0.0 && value.is_finite(), "positive and finite");
+        match *self {
+            Self::Rigid | Self::Equality => Ok(()),
+            Self::Restitution { coefficient: e } => {
+                inside("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
+            }
+            Self::Penalty { stiffness } | Self::AugmentedLagrangian { stiffness, .. } => {
+                positive("the contact stiffness", stiffness)
+            }
+            Self::PowerLaw { stiffness, exponent } => {
+                positive("the contact stiffness", stiffness)?;
+                let ok = exponent >= 1.0 && exponent.is_finite();
+                inside("the exponent of the contact law", exponent, ok, "at least 1 and finite")
+            }
+            Self::Bipenalty { stiffness, mass } => {
+                positive("the contact stiffness", stiffness)?;
+                inside("the contact mass", mass, mass >= 0.0 && mass.is_finite(), "not negative and finite")
+            }
+        }
+    }
+
+    /// Weight of g̈ beside g in the condition of a row (time²): m/k of a bipenalty.
+    pub(crate) fn inertia(&self) -> f64 {
+        match self {
+            Self::Bipenalty { stiffness, mass } => mass / stiffness,
+            _ => 0.0,
+        }
+    }
+
+    /// The force of a compliant law for y, the gap with its inertia: zero if y ≥ 0. `before` is the raw multiplier of the
+    /// stage before.
+    pub(crate) fn force<T: Real>(&self, y: T, before: T) -> T {
+        let depth = (-y).max(T::zero());
+        match *self {
+            Self::Penalty { stiffness } | Self::Bipenalty { stiffness, .. } => T::of(stiffness) * depth,
+            Self::PowerLaw { stiffness, exponent } => T::of(stiffness) * depth.powf(T::of(exponent)),
+            // Where the gap does not depend on the force, augmenting within the stage would only repeat the spring.
+            Self::AugmentedLagrangian { stiffness, .. } => (before - T::of(stiffness) * y).max(T::zero()),
+            Self::Rigid | Self::Equality | Self::Restitution { .. } => T::zero(),
+        }
+    }
+
+    /// The law linearized as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
+    ///
+    /// `depth` is where a power law is linearized (positive), `before` the multiplier from which an augmentation starts.
+    pub(crate) fn linearized<T: Real>(&self, depth: T, before: T) -> (T, T) {
+        match *self {
+            Self::Rigid | Self::Equality | Self::Restitution { .. } => (T::zero(), T::zero()),
+            Self::Penalty { stiffness } | Self::Bipenalty { stiffness, .. } => (T::of(stiffness).recip(), T::zero()),
+            Self::AugmentedLagrangian { stiffness, .. } => {
+                let compliance = T::of(stiffness).recip();
+                (compliance, -compliance * before)
+            }
+            Self::PowerLaw { stiffness, exponent } => {
+                let slope = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0));
+                (slope.recip(), depth * (T::one() - T::of(exponent).recip()))
+            }
+        }
+    }
+
+    /// How many times more the stage must be solved with another linearization, whatever its solution.
+    pub(crate) fn augmentations(&self) -> usize {
+        match *self {
+            Self::AugmentedLagrangian { augmentations, .. } => augmentations,
+            _ => 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ContactLaw;
+
+    #[test]
+    fn the_linearization_touches_the_law() {
+        let law = ContactLaw::PowerLaw { stiffness: 3.0, exponent: 1.5 };
+        for depth in [1e-3, 0.2, 5.0_f64] {
+            let force = law.force(-depth, 0.0);
+            let (c, s) = law.linearized(depth, 0.0);
+            assert!((-depth + c * force + s).abs() < 1e-15 * depth.max(1.0));
+            let slope = (law.force(-depth * (1.0 + 1e-6), 0.0) - force) / (depth * 1e-6);
+            assert!((slope * c - 1.0).abs() < 1e-5);
+        }
+        let law = ContactLaw::AugmentedLagrangian { stiffness: 4.0, augmentations: 1 };
+        let (c, s) = law.linearized(0.0, 2.0_f64);
+        let force = law.force(-0.5, 2.0);
+        assert!((-0.5 + c * force + s).abs() < 1e-15);
+    }
+
+    #[test]
+    fn parameters_are_checked() {
+        for law in [
+            ContactLaw::Restitution { coefficient: 1.1 },
+            ContactLaw::Restitution { coefficient: f64::NAN },
+            ContactLaw::Penalty { stiffness: 0.0 },
+            ContactLaw::PowerLaw { stiffness: 1.0, exponent: 0.5 },
+            ContactLaw::PowerLaw { stiffness: f64::INFINITY, exponent: 1.5 },
+            ContactLaw::Bipenalty { stiffness: 1.0, mass: -1.0 },
+            ContactLaw::AugmentedLagrangian { stiffness: -1.0, augmentations: 3 },
+        ] {
+            assert!(law.check().is_err(), "{law:?}");
+        }
+    }
+}
