@@ -5,6 +5,7 @@ pub mod measure;
 pub mod output;
 pub mod plot;
 pub mod schemes;
+pub mod solids;
 pub mod springs;
 pub mod tables;
 
