@@ -27,8 +27,9 @@ impl From<ContactLaw> for Bound {
 
 /// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
 ///
-/// W is the Delassus operator (symmetric, positive definite on independent rows). y has the unit of a gap, and so have
-/// the tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
+/// W is the Delassus operator (symmetric, positive semidefinite; definite on independent rows), with the compliances of
+/// the laws on its diagonal. y has the unit of a gap, and so have the tolerances: a residual compares y_i with W_ii λ_i,
+/// never meters with newtons.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactProblem<'a, T> {
     /// W, column-major, size × size.
@@ -39,6 +40,9 @@ pub struct ContactProblem<'a, T> {
     pub bounds: &'a [Bound],
     /// For each row, the size of y that is rounding.
     pub tolerance: &'a [T],
+    /// A number that changes whenever W does, 0 if unknown: what a solver has computed from W serves it again while the
+    /// number is the same.
+    pub version: u64,
 }
 
 impl<T: Real> ContactProblem<'_, T> {
@@ -52,14 +56,19 @@ impl<T: Real> ContactProblem<'_, T> {
         self.delassus[i + j * self.size()]
     }
 
+    /// Row i of W, which is symmetric: its column i.
+    pub fn row(&self, i: usize) -> &[T] {
+        &self.delassus[i * self.size()..(i + 1) * self.size()]
+    }
+
     /// `y_i = (W λ + q)_i`.
     pub fn gap(&self, i: usize, multipliers: &[T]) -> T {
-        multipliers.iter().enumerate().fold(self.offset[i], |y, (j, &lambda)| y + self.delassus(i, j) * lambda)
+        self.row(i).iter().zip(multipliers).fold(self.offset[i], |y, (&w, &lambda)| y + w * lambda)
     }
 
     /// What of y_i is rounding: its tolerance, and that of the sum `(W λ + q)_i` itself.
     pub fn rounding(&self, i: usize, multipliers: &[T]) -> T {
-        let terms = multipliers.iter().enumerate().map(|(j, &lambda)| (self.delassus(i, j) * lambda).abs());
+        let terms = self.row(i).iter().zip(multipliers).map(|(&w, &lambda)| (w * lambda).abs());
         self.tolerance[i] + T::of(32.0) * T::epsilon() * (self.offset[i].abs() + terms.sum::<T>())
     }
 
@@ -80,10 +89,14 @@ impl<T: Real> ContactProblem<'_, T> {
 /// Why a contact problem was not solved; rows count within the problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactFailure<T> {
-    /// A row that would have to be active depends linearly on the other active ones.
-    Dependent {
-        /// The row.
+    /// No multipliers meet all conditions: rows demand opposite things of the same dofs.
+    Contradictory {
+        /// The row that is violated most.
         row: usize,
+        /// The row that presses hardest against it.
+        other: usize,
+        /// The violation, in the unit of y.
+        residual: T,
     },
     /// The iteration limit was reached.
     NotConverged {
@@ -108,6 +121,7 @@ pub enum ContactFailure<T> {
 ///     offset: &[-2.0, 1.0],
 ///     bounds: &[Bound::NonNegative; 2],
 ///     tolerance: &[1e-14; 2],
+///     version: 0,
 /// };
 /// let mut lambda = [0.0; 2];
 /// solver.solve(&problem, &mut lambda).unwrap();

@@ -5,7 +5,7 @@ mod jump_projection;
 mod persistency;
 
 pub use correction::Correction;
-pub(crate) use correction::{Backup, Buffers, Erased, ErasedGaps, Gaps, Scheme, contact_error, rounding};
+pub(crate) use correction::{Backup, Buffers, Erased, ErasedGaps, Gaps, Scheme, contact_error, no_response, rounding};
 pub use jump_projection::JumpProjection;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 
@@ -48,7 +48,7 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`](crate::Error::DependentContacts), [`Error::Contact`](crate::Error::Contact); the
+    /// [`Error::ContactNotFinite`](crate::Error::ContactNotFinite), [`Error::Contact`](crate::Error::Contact); the
     /// step is then undone.
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()>;
 }

@@ -1,72 +1,167 @@
-//! Cholesky factorization of the small dense matrices of contact: Delassus operators and S = G M⁻¹ Gᵀ.
+//! Cholesky factorization of the small dense matrices of contact, semidefinite ones included: Delassus operators and
+//! S = G M⁻¹ Gᵀ.
 //!
 //! The size is the number of closed contacts. Rows that share no body leave zeros, and these are skipped, so that the
-//! diagonal S of a lumped mass costs next to nothing.
+//! diagonal S of a lumped mass costs next to nothing; large full matrices go to faer's blocked kernel. Redundant contacts
+//! make the matrix semidefinite: of all solutions the one of least norm is then returned.
 
-use crate::real::Real;
+use crate::memory::Scratch;
+use crate::real::{Real, kernels::Kernels};
 
-/// Lower factor L of a symmetric positive definite matrix, kept with its memory.
+/// Lower factor L of a symmetric positive semidefinite matrix, kept with its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DenseCholesky<T> {
     size: usize,
-    /// Row-major lower triangle, stride = size.
+    /// Size × size: the lower triangle of L row by row, or column by column if it is `blocked`.
     l: Vec<T>,
     /// First nonzero column of each row of L (its skyline).
     first: Vec<usize>,
+    /// Diagonal of the matrix.
+    diagonal: Vec<T>,
+    /// Rows that do not depend on those before them. The columns of L of the others are zero.
+    independent: Vec<usize>,
+    kind: Kind,
+    /// Factor of LᵀL on the independent columns, if there are dependent ones.
+    normal: Vec<T>,
+    reduced: Vec<T>,
+    scratch: Scratch,
 }
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Skyline,
+    Blocked,
+}
+
+/// Smallest size for the blocked kernel.
+const BLOCKED: usize = 48;
 
 impl<T: Real> DenseCholesky<T> {
     pub(crate) fn with_capacity(size: usize) -> Self {
-        Self { size: 0, l: Vec::with_capacity(size * size), first: Vec::with_capacity(size) }
+        let mut scratch = Scratch::default();
+        scratch.get(T::dense_cholesky_scratch(size));
+        Self {
+            size: 0,
+            l: Vec::with_capacity(size * size),
+            first: Vec::with_capacity(size),
+            diagonal: Vec::with_capacity(size),
+            independent: Vec::with_capacity(size),
+            kind: Kind::Skyline,
+            normal: Vec::new(),
+            reduced: Vec::with_capacity(size),
+            scratch,
+        }
     }
 
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
-    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry is a dependent row: `Err(row)`.
+    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row. `Err(row)` if the
+    /// matrix is not finite or not semidefinite there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
+        let Self { l, first, diagonal, independent, kind, scratch, .. } = self;
         self.size = size;
-        self.l.clear();
-        self.l.resize(size * size, T::zero());
-        self.first.clear();
-        let dependent = T::of(16.0 * size as f64) * T::epsilon();
+        l.clear();
+        l.resize(size * size, T::zero());
+        first.clear();
+        diagonal.clear();
+        let mut profile = 0;
         for i in 0..size {
-            let (done, rest) = self.l.split_at_mut(i * size);
-            let row = &mut rest[..=i];
+            let row = &mut l[i * size..=i * size + i];
             for (j, x) in row.iter_mut().enumerate() {
                 *x = entry(i, j);
             }
-            let diagonal = row[i];
-            let first = row.iter().position(|x| *x != T::zero()).unwrap_or(i);
-            for j in first..i {
-                let start = first.max(self.first[j]);
-                let other = &done[j * size..=j * size + j];
-                let mut sum = row[j];
-                for k in start..j {
-                    sum -= row[k] * other[k];
-                }
-                row[j] = sum / other[j];
-            }
-            let pivot = row[first..i].iter().fold(diagonal, |p, &x| p - x * x);
-            // Written so that NaN is refused too.
-            if !(pivot > dependent * diagonal && pivot.is_finite()) {
+            diagonal.push(row[i]);
+            first.push(row.iter().position(|x| *x != T::zero()).unwrap_or(i));
+            profile += i - first[i];
+            if !(row[i] >= T::zero() && T::all_finite(row)) {
                 return Err(i);
             }
-            row[i] = pivot.sqrt();
-            self.first.push(first);
+        }
+        let dependent = T::of(16.0 * size as f64) * T::epsilon();
+        independent.clear();
+        if size >= BLOCKED && profile > size * size / 4 {
+            *kind = Kind::Blocked;
+            for i in 0..size {
+                for j in 0..i {
+                    l[i + j * size] = l[i * size + j];
+                }
+            }
+            let memory = scratch.get(<T as Kernels>::dense_cholesky_scratch(size));
+            let sound = |l: &[T], i: usize| l[i + i * size] * l[i + i * size] > dependent * diagonal[i];
+            if T::dense_cholesky(size, l, memory) && (0..size).all(|i| sound(l, i)) {
+                independent.extend(0..size);
+                return Ok(());
+            }
+            // Row by row after all, with what is left of the matrix: its lower triangle, and the diagonal kept apart.
+            for i in 0..size {
+                l[i + i * size] = diagonal[i];
+            }
+        }
+        *kind = Kind::Skyline;
+        for i in 0..size {
+            let (done, rest) = l.split_at_mut(i * size);
+            let row = &mut rest[..=i];
+            for j in first[i]..i {
+                let start = first[i].max(first[j]);
+                let other = &done[j * size..=j * size + j];
+                row[j] = match other[j] > T::zero() {
+                    true => (row[j] - dot(&row[start..j], &other[start..j])) / other[j],
+                    false => T::zero(),
+                };
+            }
+            let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
+            if pivot > dependent * diagonal[i] {
+                row[i] = pivot.sqrt();
+                independent.push(i);
+            } else {
+                row[i] = T::zero();
+            }
+        }
+        if independent.len() < size {
+            self.factorize_normal();
         }
         Ok(())
     }
 
-    /// Solves L Lᵀ x = b in place.
-    pub(crate) fn solve(&self, x: &mut [T]) {
+    /// Whether some row depends on the others.
+    pub(crate) fn is_singular(&self) -> bool {
+        self.independent.len() < self.size
+    }
+
+    /// Factorizes LᵀL on the independent columns.
+    fn factorize_normal(&mut self) {
+        let Self { size, l, independent, normal, .. } = self;
+        let (n, rank) = (*size, independent.len());
+        normal.clear();
+        normal.resize(rank * rank, T::zero());
+        for a in 0..rank {
+            for b in 0..=a {
+                let (i, j) = (independent[a], independent[b]);
+                // Entries of L above the diagonal are leftovers.
+                let mut sum = (i..n).map(|k| l[k * n + i] * l[k * n + j]).sum::<T>();
+                for k in 0..b {
+                    sum -= normal[a * rank + k] * normal[b * rank + k];
+                }
+                normal[a * rank + b] = if a == b { sum.sqrt() } else { sum / normal[b * rank + b] };
+            }
+        }
+    }
+
+    /// Solves A x = b in place; for a singular A the x of least norm among those of least residual.
+    pub(crate) fn solve(&mut self, x: &mut [T]) {
         let n = self.size;
+        if self.kind == Kind::Blocked {
+            T::dense_cholesky_solve(n, &self.l, x);
+            return;
+        }
+        if self.is_singular() {
+            self.solve_least_norm(x);
+            return;
+        }
         for i in 0..n {
             let row = &self.l[i * n..=i * n + i];
-            let mut sum = x[i];
-            for k in self.first[i]..i {
-                sum -= row[k] * x[k];
-            }
-            x[i] = sum / row[i];
+            x[i] = (x[i] - dot(&row[self.first[i]..i], &x[self.first[i]..i])) / row[i];
         }
         for i in (0..n).rev() {
             let row = &self.l[i * n..=i * n + i];
@@ -77,6 +172,44 @@ impl<T: Real> DenseCholesky<T> {
             }
         }
     }
+
+    /// A⁺ b = L (LᵀL)⁻² Lᵀ b.
+    fn solve_least_norm(&mut self, x: &mut [T]) {
+        let Self { size, l, independent, normal, reduced, .. } = self;
+        let (n, rank) = (*size, independent.len());
+        reduced.clear();
+        reduced.extend(independent.iter().map(|&i| (i..n).map(|k| l[k * n + i] * x[k]).sum::<T>()));
+        for _ in 0..2 {
+            for a in 0..rank {
+                let row = &normal[a * rank..=a * rank + a];
+                reduced[a] = (reduced[a] - dot(&row[..a], &reduced[..a])) / row[a];
+            }
+            for a in (0..rank).rev() {
+                let row = &normal[a * rank..=a * rank + a];
+                reduced[a] /= row[a];
+                let value = reduced[a];
+                for (k, &entry) in row[..a].iter().enumerate() {
+                    reduced[k] -= entry * value;
+                }
+            }
+        }
+        for (k, x) in x.iter_mut().enumerate() {
+            let columns = independent.iter().zip(reduced.iter()).take_while(|(i, _)| **i <= k);
+            *x = columns.map(|(&i, &value)| l[k * n + i] * value).sum();
+        }
+    }
+}
+
+/// Σ x y in four partial sums, which the processor can work on at once.
+fn dot<T: Real>(x: &[T], y: &[T]) -> T {
+    let (mut sums, split) = ([T::zero(); 4], x.len() - x.len() % 4);
+    for (x, y) in x[..split].chunks_exact(4).zip(y[..split].chunks_exact(4)) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    let rest = x[split..].iter().zip(&y[split..]).map(|(&x, &y)| x * y).sum::<T>();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 #[cfg(test)]
@@ -84,7 +217,7 @@ mod tests {
     use super::DenseCholesky;
 
     #[test]
-    fn solves_with_a_skyline_and_names_the_dependent_row() {
+    fn solves_with_a_skyline() {
         let a = [[4.0, 0.0, 2.0], [0.0, 3.0, 0.0], [2.0, 0.0, 5.0]];
         let mut factor = DenseCholesky::with_capacity(3);
         factor.factorize(3, |i, j| a[i][j]).unwrap();
@@ -93,8 +226,34 @@ mod tests {
         for (x, expected) in x.iter().zip([1.0, 1.0, 2.0]) {
             assert!((x - expected).abs() < 1e-15);
         }
-        let singular = [[1.0, 2.0], [2.0, 4.0 + 1e-15]];
-        assert_eq!(factor.factorize(2, |i, j| singular[i][j]), Err(1));
         assert_eq!(factor.factorize(1, |_, _| f64::NAN), Err(0));
+        assert_eq!(factor.factorize(2, |i, j| if i == j { i as f64 - 1.0 } else { 0.0 }), Err(0));
+    }
+
+    /// B Bᵀ with B of n × rank.
+    fn product(n: usize, rank: usize) -> Vec<Vec<f64>> {
+        let b = |i: usize, k: usize| ((i * 7 + k * 13 + i * k) % 11) as f64 - 5.0 + if i == k { 40.0 } else { 0.0 };
+        (0..n).map(|i| (0..n).map(|j| (0..rank).map(|k| b(i, k) * b(j, k)).sum()).collect()).collect()
+    }
+
+    #[test]
+    fn least_norm_and_full_rank_at_every_size() {
+        for (n, rank) in [(1, 1), (7, 7), (7, 3), (60, 60), (60, 59), (100, 40)] {
+            let a = product(n, rank);
+            let times =
+                |x: &[f64]| -> Vec<f64> { a.iter().map(|r| r.iter().zip(x).map(|(a, x)| a * x).sum()).collect() };
+            let largest = a.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let z: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
+            // x = A z is in the range of A, hence the solution of least norm of A x = A A z.
+            let x = times(&z);
+            let mut solution = times(&x);
+            let mut factor = DenseCholesky::with_capacity(n);
+            factor.factorize(n, |i, j| a[i][j]).unwrap();
+            assert_eq!(factor.is_singular(), rank < n);
+            factor.solve(&mut solution);
+            let norm = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let worst = solution.iter().zip(&x).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(worst < 1e-7 * norm.max(largest), "{n} {rank}: {worst:e} of {norm:e}");
+        }
     }
 }

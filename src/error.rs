@@ -161,23 +161,20 @@ pub enum Error {
         /// The dof.
         dof: usize,
     },
-    /// Two contact rows demand the same thing.
-    #[error("contact {contact} repeats contact {other} (same row of G, same gap); remove one of them")]
-    DuplicateContact {
-        /// The repeated row.
-        contact: ContactId,
-        /// The row it repeats.
-        other: ContactId,
-    },
-    /// The active contact rows are linearly dependent.
+    /// Closed contacts demand opposite things: no contact forces meet them all.
     #[error(
-        "t = {t:e}: contact {contact} is linearly dependent on the other closed contacts; remove the redundant row"
+        "t = {t:e}: contacts {contact} and {other} contradict each other, {contact} stays violated by {violation:e} (gap \
+         units) whatever the forces; a body is squeezed between obstacles or tied twice"
     )]
-    DependentContacts {
+    ContradictoryContacts {
         /// Time of the stage.
         t: f64,
-        /// The row found dependent.
+        /// The contact that is violated most.
         contact: ContactId,
+        /// The contact that presses hardest against it.
+        other: ContactId,
+        /// The violation, in units of the gap.
+        violation: f64,
     },
     /// The contact problem was not solved.
     #[error(
@@ -265,6 +262,7 @@ impl Error {
         matches!(
             self,
             Self::Contact { .. }
+                | Self::ContradictoryContacts { .. }
                 | Self::StepNotFinite { .. }
                 | Self::ContactNotFinite { .. }
                 | Self::SupportNotFinite { .. }

@@ -1,7 +1,8 @@
-//! Large allocations that may fail: an error instead of an abort.
+//! Large allocations that may fail: an error instead of an abort; scratch that can be cloned.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
+use faer::dyn_stack::{MemBuffer, StackReq};
 
 /// A zero vector of `rows · columns` entries. Pages are touched when they are first written, not here.
 pub(crate) fn zeros<T: Real>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
@@ -15,6 +16,36 @@ pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Res
     let mut vector = Vec::new();
     vector.try_reserve_exact(size).map_err(|_| Error::OutOfMemory { what })?;
     Ok(vector)
+}
+
+/// Scratch for the kernels of faer; a clone begins with none.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    buffer: Option<MemBuffer>,
+    bytes: usize,
+}
+
+impl Scratch {
+    /// Scratch of at least this size, allocated if there is less.
+    pub(crate) fn get(&mut self, required: StackReq) -> &mut MemBuffer {
+        let bytes = required.unaligned_bytes_required();
+        if bytes > self.bytes {
+            (self.buffer, self.bytes) = (None, bytes);
+        }
+        self.buffer.get_or_insert_with(|| MemBuffer::new(required))
+    }
+}
+
+impl Clone for Scratch {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl std::fmt::Debug for Scratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Scratch({} bytes)", self.bytes)
+    }
 }
 
 #[cfg(test)]

@@ -30,7 +30,8 @@ pub trait Real:
 pub(crate) mod kernels {
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
     use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw};
-    use faer::linalg::cholesky::{ldlt::factor::LdltRegularization, llt::factor::LltRegularization};
+    use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+    use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
     use faer::linalg::matmul::matmul;
     use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
     use faer::prelude::{Reborrow, ReborrowMut};
@@ -113,6 +114,13 @@ pub(crate) mod kernels {
         fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
         /// The backward sweep over `columns`; entries behind them hold the solution.
         fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
+        /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots were
+        /// positive.
+        fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool;
+        /// Scratch for [`dense_cholesky`](Self::dense_cholesky).
+        fn dense_cholesky_scratch(size: usize) -> faer::dyn_stack::StackReq;
+        /// Solves L Lᵀ x = b in place.
+        fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]);
         /// Scratch for factorizing and for solving `columns` right-hand sides.
         fn cholesky_scratch(
             kind: Factorization,
@@ -403,6 +411,20 @@ pub(crate) mod kernels {
                 }
                 fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
                     supernodal_backward(factor, columns, x);
+                }
+                fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool {
+                    let a = MatMut::from_column_major_slice_mut(values, size, size);
+                    let (regularization, stack) = (LltRegularization::default(), MemStack::new(memory));
+                    cholesky_in_place(a, regularization, Par::Seq, stack, Spec::default()).is_ok()
+                }
+                fn dense_cholesky_scratch(size: usize) -> faer::dyn_stack::StackReq {
+                    cholesky_in_place_scratch::<$scalar>(size, Par::Seq, Spec::default())
+                }
+                fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]) {
+                    let l = MatRef::from_column_major_slice(values, size, size);
+                    let mut x = MatMut::from_column_major_slice_mut(x, size, 1);
+                    solve_lower_triangular_in_place(l, x.rb_mut(), Par::Seq);
+                    solve_upper_triangular_in_place(l.transpose(), x, Par::Seq);
                 }
                 fn cholesky_scratch(
                     kind: Factorization,

@@ -191,39 +191,24 @@ fn empty_and_misplaced_parts_are_refused() {
 }
 
 #[test]
-fn duplicated_rows_are_named() {
-    let rows = LinearRows::new()
-        .unilateral(&[(0, -1.0), (1, 1.0)], 0.5)
-        .unilateral(&[(0, 1.0)], 0.5)
-        .unilateral(&[(1, 1.0), (0, -1.0)], 0.5);
-    let second = ContactId { constraint: 0, feature: 2, candidate: 0 };
-    let found = error(builder().constraint(rows).build());
-    assert!(matches!(found, Error::DuplicateContact { contact, .. } if contact == second), "{found}");
-    // The same row with another gap is not a duplicate: only the tighter one will ever close.
-    let nested = LinearRows::new().unilateral(&[(0, 1.0)], 0.5).unilateral(&[(0, 1.0)], 0.7);
-    let correction = PersistencyCorrection::with_history_projection();
-    let mut run = builder().velocity(vec![-1.0; 2]).constraint(nested).corrector(correction).build().unwrap();
-    run.run_until(1.0, &mut ()).unwrap();
-    assert!(run.gaps()[0].abs() < 1e-12 && (run.gaps()[1] - 0.2).abs() < 1e-12, "{:?}", run.gaps());
-}
-
-#[test]
-fn dependent_rows_fail_the_step_and_leave_the_state() {
-    // Three rows on two dofs close at once.
-    for corrected in [false, true] {
-        let start = builder().velocity(vec![-1.0, -1.0]);
-        let rows = LinearRows::new()
-            .unilateral(&[(0, 1.0)], 0.095)
-            .unilateral(&[(1, 1.0)], 0.095)
-            .equality(&[(0, 1.0), (1, -1.0)], 0.0);
-        let start = if corrected { start.corrector(PersistencyCorrection::new()) } else { start };
-        let mut run = start.constraint(rows).build().unwrap();
-        run.run_until(0.09, &mut ()).unwrap();
-        let before = (run.state().clone(), run.time());
-        let found = error(run.step());
-        assert!(matches!(found, Error::DependentContacts { .. }), "{found:?}");
-        assert_eq!(before, (run.state().clone(), run.time()));
-    }
+fn contacts_that_contradict_each_other_are_named_and_leave_the_state() {
+    // A mass between a wall and a stop that comes closer: squeezed to nothing at t = 0.1.
+    let stop = GapOffset::moving(|t| [0.1 - 2.0 * t, -2.0, 0.0]);
+    let rows = LinearRows::new().unilateral(&[(0, 1.0)], 0.1).unilateral(&[(0, -1.0)], stop);
+    let mut run = builder().constraint(rows).build().unwrap();
+    let mut before = (run.state().clone(), run.time());
+    let found = loop {
+        match run.step() {
+            Ok(()) => before = (run.state().clone(), run.time()),
+            Err(error) => break error,
+        }
+    };
+    assert!((0.095..0.105).contains(&run.time()), "{}", run.time());
+    let Error::ContradictoryContacts { contact, other, violation, .. } = found else { panic!("{found:?}") };
+    assert_eq!(contact.feature + other.feature, 1);
+    assert!(violation > 0.0 && violation < 0.03, "{violation}");
+    assert!(found.is_recoverable());
+    assert_eq!(before, (run.state().clone(), run.time()));
 }
 
 #[test]

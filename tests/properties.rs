@@ -329,7 +329,7 @@ proptest! {
             .collect();
         let bounds: Vec<_> = (0..n).map(|i| if i < free { Bound::Free } else { Bound::NonNegative }).collect();
         let tolerance = vec![1e-13; n];
-        let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance };
+        let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
         let mut solver = ActiveSet::default();
         solver.reserve(n);
         let mut lambda = guess.iter().map(|&x| if x > 0.5 { x } else { 0.0 }).collect::<Vec<_>>();

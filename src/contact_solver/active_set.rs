@@ -9,94 +9,228 @@ use crate::real::Real;
 /// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
 /// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
 /// on only while the number of violations falls, otherwise a single row, the last one, is exchanged until it falls
-/// again. That is finite for every positive definite W. Steady contact takes one iteration.
+/// again. That is finite for every positive definite W. Steady contact takes one iteration, and while W and the active
+/// rows stay the same no factorization.
+///
+/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are then
+/// those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a W, the
+/// problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control Optim.
+/// 14, 1976). Rows that contradict each other are an error that names them.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     factor: DenseCholesky<T>,
+    /// The version of W and the rows that `factor` belongs to.
+    factored: (u64, Vec<usize>),
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
-    /// What of y is rounding: in a row's own sum, and with that of the multipliers it is coupled to.
+    /// y, and what of it is rounding: in a row's own sum, and with that of the multipliers it is coupled to.
+    y: Vec<T>,
     own: Vec<T>,
     noise: Vec<T>,
+    /// A proximal problem: its diagonal shift, offset and center.
+    shift: Vec<T>,
+    offset: Vec<T>,
+    center: Vec<T>,
 }
 
 /// Block exchanges granted without progress before single ones begin.
 const BLOCK_TRIES: usize = 3;
+/// Proximal steps, each of which shrinks what is left to do by orders of magnitude.
+const PROXIMAL_STEPS: usize = 60;
 
-impl<T: Real> ContactSolver<T> for ActiveSet<T> {
-    fn reserve(&mut self, size: usize) {
-        self.factor = DenseCholesky::with_capacity(size);
-        self.active = Vec::with_capacity(size);
-        self.rows = Vec::with_capacity(size);
-        self.solution = Vec::with_capacity(size);
-        self.own = Vec::with_capacity(size);
-        self.noise = Vec::with_capacity(size);
-    }
+/// How a sequence of exchanges ended.
+enum Exchanges {
+    Solved(usize),
+    /// Semidefinite W: no progress after so many iterations.
+    Stuck(usize),
+}
 
-    fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
+impl<T: Real> ActiveSet<T> {
+    /// Exchanges rows until no sign is violated. With `proximal` the problem is W + shift, offset instead of q.
+    fn exchange(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+        proximal: bool,
+    ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { factor, active, rows, solution, own, noise } = self;
+        let Self { factor, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
+        let offset: &[T] = if proximal { offset } else { problem.offset };
         let (mut fewest, mut tries) = (usize::MAX, BLOCK_TRIES);
         // Single exchanges are finite but may be many; this bound is far above anything seen.
         let limit = 100 + 20 * size;
         for iteration in 1..=limit {
             rows.clear();
             rows.extend((0..size).filter(|&i| active[i]));
-            factor
-                .factorize(rows.len(), |i, j| problem.delassus(rows[i], rows[j]))
-                .map_err(|i| ContactFailure::Dependent { row: rows[i] })?;
+            let known = problem.version > 0 && factored.0 == problem.version && factored.1 == *rows && !proximal;
+            if !known {
+                let diagonal = |i: usize| if proximal { shift[i] } else { T::zero() };
+                let entry = |i: usize, j: usize| {
+                    let w = problem.row(rows[i])[rows[j]];
+                    if i == j { w + diagonal(rows[i]) } else { w }
+                };
+                factored.0 = 0;
+                let not_finite =
+                    |i: usize| ContactFailure::NotConverged { iterations: iteration, row: rows[i], residual: T::nan() };
+                factor.factorize(rows.len(), entry).map_err(not_finite)?;
+                factored.0 = if proximal { 0 } else { problem.version };
+                factored.1.clone_from(rows);
+            }
             solution.clear();
-            solution.extend(rows.iter().map(|&i| -problem.offset[i]));
+            solution.extend(rows.iter().map(|&i| -offset[i]));
             factor.solve(solution);
             multipliers.fill(T::zero());
             for (&i, &lambda) in rows.iter().zip(solution.iter()) {
                 multipliers[i] = lambda;
             }
+            // y = W λ + q and Σ |W λ|, column by column.
+            y.clear();
+            y.extend_from_slice(offset);
+            own.clear();
+            own.extend(offset.iter().map(|q| q.abs()));
+            for (&j, &lambda) in rows.iter().zip(solution.iter()) {
+                for ((&w, y), own) in problem.row(j).iter().zip(y.iter_mut()).zip(own.iter_mut()) {
+                    *y += w * lambda;
+                    *own += (w * lambda).abs();
+                }
+                if proximal {
+                    y[j] += shift[j] * lambda;
+                }
+            }
+            for (own, &tolerance) in own.iter_mut().zip(problem.tolerance) {
+                *own = tolerance + T::of(32.0) * T::epsilon() * *own;
+            }
             // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of
             // a body at rest beside a body under load must not be judged by its own small numbers.
-            own.clear();
-            own.extend((0..size).map(|i| problem.rounding(i, multipliers)));
             noise.clear();
-            noise.extend((0..size).map(|i| {
-                let carried = |j: usize| problem.delassus(i, j).abs() / problem.delassus(j, j) * own[j];
-                (0..size).map(|j| if i == j { own[i] } else { carried(j) }).sum::<T>()
-            }));
-            let violates = |i: usize, multipliers: &[T], active: &[bool]| match problem.bounds[i] {
+            noise.extend_from_slice(own);
+            for (j, &own) in own.iter().enumerate() {
+                let row = problem.row(j);
+                let carried = own / row[j];
+                if carried > T::zero() && carried.is_finite() {
+                    for (i, (&w, noise)) in row.iter().zip(noise.iter_mut()).enumerate() {
+                        if i != j {
+                            *noise += w.abs() * carried;
+                        }
+                    }
+                }
+            }
+            // On dependent rows the equations of the active rows may contradict each other: one that is left open lets go,
+            // one that is left violated waits for the others.
+            let open = |i: usize| factor.is_singular() && y[i] > noise[i];
+            let violates = |i: usize, active: bool| match problem.bounds[i] {
                 Bound::Free => false,
-                Bound::NonNegative if active[i] => problem.delassus(i, i) * multipliers[i] < -noise[i],
-                Bound::NonNegative => problem.gap(i, multipliers) < -noise[i],
+                Bound::NonNegative if active => problem.delassus(i, i) * multipliers[i] < -noise[i] || open(i),
+                Bound::NonNegative => y[i] < -noise[i],
             };
-            let violations = (0..size).filter(|&i| violates(i, multipliers, active));
+            let violations = (0..size).filter(|&i| violates(i, active[i]));
             let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
             if count == 0 {
+                if factor.is_singular() && rows.iter().any(|&i| !(y[i].abs() <= noise[i])) {
+                    return Ok(Exchanges::Stuck(iteration));
+                }
                 for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {
                     if *bound == Bound::NonNegative {
                         *lambda = lambda.max(T::zero());
                     }
                 }
-                return Ok(iteration);
+                return Ok(Exchanges::Solved(iteration));
+            }
+            if factor.is_singular() && iteration > 30 {
+                return Ok(Exchanges::Stuck(iteration));
             }
             if count < fewest {
                 (fewest, tries) = (count, BLOCK_TRIES);
             } else {
                 tries = tries.saturating_sub(1);
             }
-            if tries > 0 {
-                // Inactive rows first: their gaps need the old multipliers of the active ones only.
-                for i in 0..size {
-                    if violates(i, multipliers, active) {
-                        active[i] = !active[i];
+            match tries {
+                0 => active[last] = !active[last],
+                _ => {
+                    for (i, active) in active.iter_mut().enumerate() {
+                        *active ^= violates(i, *active);
                     }
                 }
-            } else {
-                active[last] = !active[last];
             }
         }
         let (row, residual) = problem.residual(multipliers);
         Err(ContactFailure::NotConverged { iterations: limit, row, residual })
+    }
+
+    /// Proximal steps: λ' solves the problem with W + D and q − D λ, D a small share of the diagonal of W.
+    fn proximal(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+        mut iterations: usize,
+    ) -> Result<usize, ContactFailure<T>> {
+        let size = problem.size();
+        let largest = (0..size).fold(T::zero(), |m, i| m.max(problem.delassus(i, i)));
+        // Small enough to converge in a few steps, large enough for a well-posed factorization.
+        let share = T::epsilon().sqrt();
+        self.shift.clear();
+        self.shift.extend(
+            (0..size)
+                .map(|i| share * if problem.delassus(i, i) > T::zero() { problem.delassus(i, i) } else { largest }),
+        );
+        // From zero the first step is, but for D, the solution of least norm.
+        self.center.clear();
+        self.center.resize(size, T::zero());
+        let mut before = T::infinity();
+        for step in 0..PROXIMAL_STEPS {
+            self.offset.clear();
+            let pulled = problem.offset.iter().zip(&self.shift).zip(&self.center);
+            self.offset.extend(pulled.map(|((&q, &d), &c)| q - d * c));
+            match self.exchange(problem, multipliers, true)? {
+                Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
+            }
+            let (row, residual) = problem.residual(multipliers);
+            if residual <= problem.rounding(row, multipliers) {
+                return Ok(iterations);
+            }
+            // What the multipliers gain no longer lowers the residual: there is no solution.
+            if step >= 3 && residual > T::of(0.5) * before {
+                let push = |i: usize| (problem.delassus(row, i) * multipliers[i]).abs();
+                let other = (0..size).filter(|&i| i != row).fold(row, |o, i| match o != row && push(o) >= push(i) {
+                    true => o,
+                    false => i,
+                });
+                return Err(ContactFailure::Contradictory { row, other, residual });
+            }
+            before = residual;
+            self.center.copy_from_slice(multipliers);
+        }
+        let (row, residual) = problem.residual(multipliers);
+        Err(ContactFailure::NotConverged { iterations, row, residual })
+    }
+}
+
+impl<T: Real> ContactSolver<T> for ActiveSet<T> {
+    fn reserve(&mut self, size: usize) {
+        let reals = || Vec::with_capacity(size);
+        *self = Self {
+            factor: DenseCholesky::with_capacity(size),
+            factored: (0, Vec::with_capacity(size)),
+            active: Vec::with_capacity(size),
+            rows: Vec::with_capacity(size),
+            solution: reals(),
+            y: reals(),
+            own: reals(),
+            noise: reals(),
+            shift: reals(),
+            offset: reals(),
+            center: reals(),
+        };
+    }
+
+    fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
+        match self.exchange(problem, multipliers, false)? {
+            Exchanges::Solved(iterations) => Ok(iterations),
+            Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, iterations),
+        }
     }
 }
 
@@ -106,7 +240,7 @@ mod tests {
 
     fn solve(w: &[f64], q: &[f64], bounds: &[Bound], guess: &[f64]) -> Result<Vec<f64>, ContactFailure<f64>> {
         let tolerance = vec![1e-13; q.len()];
-        let problem = ContactProblem { delassus: w, offset: q, bounds, tolerance: &tolerance };
+        let problem = ContactProblem { delassus: w, offset: q, bounds, tolerance: &tolerance, version: 0 };
         let mut lambda = guess.to_vec();
         let mut solver = ActiveSet::default();
         solver.solve(&problem, &mut lambda)?;
@@ -160,8 +294,13 @@ mod tests {
         ];
         let offset = [-6.765_851_609_745_381e-35, 8.129_493_350_609_44e-7, -1.517_144_857_880_793_5e-5];
         let tolerance = [5.3e-37, 2.3e-20, 4.3e-19];
-        let problem =
-            ContactProblem { delassus: &w, offset: &offset, bounds: &[Bound::NonNegative; 3], tolerance: &tolerance };
+        let problem = ContactProblem {
+            delassus: &w,
+            offset: &offset,
+            bounds: &[Bound::NonNegative; 3],
+            tolerance: &tolerance,
+            version: 0,
+        };
         let mut lambda = [0.0_f64; 3];
         let iterations = ActiveSet::default().solve(&problem, &mut lambda).unwrap();
         assert!(iterations <= 4, "{iterations}");
@@ -169,8 +308,76 @@ mod tests {
     }
 
     #[test]
-    fn dependent_rows_are_named() {
-        let failure = solve(&[1.0, 1.0, 1.0, 1.0], &[-1.0, -1.0], &[Bound::NonNegative; 2], &[0.0; 2]);
-        assert_eq!(failure, Err(ContactFailure::Dependent { row: 1 }));
+    fn redundant_rows_share_the_force() {
+        let both = [Bound::NonNegative; 2];
+        let lambda = solve(&[1.0; 4], &[-1.0, -1.0], &both, &[0.0; 2]).unwrap();
+        assert!((lambda[0] - 0.5).abs() < 1e-14 && (lambda[1] - 0.5).abs() < 1e-14, "{lambda:?}");
+        // The same dof at two gaps: the nearer one alone presses, whatever the guess.
+        for guess in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
+            let lambda = solve(&[1.0; 4], &[-1.0, -0.9], &both, &guess).unwrap();
+            assert!((lambda[0] - 1.0).abs() < 1e-12 && lambda[1] == 0.0, "{lambda:?}");
+        }
+        // A tie and a contact on the same dof.
+        let lambda = solve(&[1.0; 4], &[1.0, 1.0], &[Bound::Free, Bound::NonNegative], &[0.0, 1.0]).unwrap();
+        assert!((lambda[0] + lambda[1] + 1.0).abs() < 1e-12 && lambda[1] >= 0.0, "{lambda:?}");
+    }
+
+    #[test]
+    fn four_supports_of_a_rigid_table() {
+        // Heave, pitch and roll of a rigid plate on four corners: rank three.
+        let corners = [[1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0]];
+        let w: Vec<f64> = (0..16)
+            .map(|k| corners[k % 4].iter().zip(&corners[k / 4]).map(|(a, b): (&f64, &f64)| a * b).sum())
+            .collect();
+        // A load off the center: the multipliers carry it, and no others of smaller norm do.
+        for load in [[-4.0, 0.0, 0.0], [-4.0, 1.0, 0.5], [-4.0, -2.0, 1.0]] {
+            let q: Vec<f64> = corners.iter().map(|c| c.iter().zip(&load).map(|(c, l)| c * l).sum()).collect();
+            let lambda = solve(&w, &q, &[Bound::NonNegative; 4], &[0.0; 4]).unwrap();
+            for (axis, load) in load.iter().enumerate() {
+                let carried: f64 = corners.iter().zip(&lambda).map(|(c, l)| c[axis] * l).sum();
+                assert!((carried + load).abs() < 1e-12, "{lambda:?}");
+            }
+            // The null space is the twist (1, −1, 1, −1): none of it where all four press.
+            let twist: f64 = lambda[0] - lambda[1] + lambda[2] - lambda[3];
+            assert!(lambda.iter().any(|&l| l == 0.0) || twist.abs() < 1e-12, "{lambda:?}");
+        }
+    }
+
+    #[test]
+    fn contradictions_are_named() {
+        // A dof that must be above 1 and below −1, and a third contact that has nothing to do with it.
+        let w = [1.0, -1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        for guess in [[0.0; 3], [1.0; 3]] {
+            match solve(&w, &[-1.0, -1.0, -1.0], &[Bound::NonNegative; 3], &guess) {
+                Err(ContactFailure::Contradictory { row, other, residual }) => {
+                    assert!(row < 2 && other < 2 && row != other);
+                    assert!((residual - 1.0).abs() < 0.5, "{residual}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        let tied = solve(&[1.0; 4], &[-1.0, 1.0], &[Bound::Free; 2], &[0.0; 2]);
+        assert!(matches!(tied, Err(ContactFailure::Contradictory { .. })), "{tied:?}");
+    }
+
+    #[test]
+    fn large_problems_and_kept_factors() {
+        let n = 90;
+        let b = |i: usize, k: usize| (((i * 31 + k * 17) % 23) as f64 - 11.0) / 11.0 + if i == k { 4.0 } else { 0.0 };
+        let w: Vec<f64> = (0..n * n).map(|e| (0..n).map(|k| b(e % n, k) * b(e / n, k)).sum()).collect();
+        let q: Vec<f64> = (0..n).map(|i| (i as f64 * 0.9).sin() - 0.3).collect();
+        let (bounds, tolerance) = (vec![Bound::NonNegative; n], vec![1e-14; n]);
+        let problem =
+            |offset, version| ContactProblem { delassus: &w, offset, bounds: &bounds, tolerance: &tolerance, version };
+        let mut solver = ActiveSet::default();
+        let mut cold = vec![0.0; n];
+        solver.solve(&problem(&q, 7), &mut cold).unwrap();
+        assert!(problem(&q, 7).residual(&cold).1 < 1e-12);
+        // The same W again, with a kept factor and without: bit for bit.
+        let other: Vec<f64> = q.iter().map(|q| 1.01 * q).collect();
+        let (mut kept, mut fresh) = (cold.clone(), cold.clone());
+        assert_eq!(solver.solve(&problem(&other, 7), &mut kept).unwrap(), 1);
+        ActiveSet::default().solve(&problem(&other, 0), &mut fresh).unwrap();
+        assert_eq!(kept, fresh);
     }
 }

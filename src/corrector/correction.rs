@@ -230,7 +230,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`], [`Error::Contact`].
+    /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_velocity_jumps(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
@@ -310,7 +310,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`], [`Error::Contact`].
+    /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_acceleration_jumps(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.engaged);
         let mut forces = std::mem::take(&mut self.buffers.forces);
@@ -338,7 +338,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::DependentContacts`]; [`Error::Incompatible`] if the corrector's [`edits`](super::Corrector::edits) is
+    /// [`Error::ContactNotFinite`]; [`Error::Incompatible`] if the corrector's [`edits`](super::Corrector::edits) is
     /// not [`Edits::Past`](super::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
         if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
@@ -346,7 +346,7 @@ impl<T: Real> Correction<'_, T> {
         }
         self.backup.check()?;
         let rows = std::mem::take(&mut self.buffers.engaged);
-        let closing = self.projection.close(self.g, &rows).map_err(|row| self.dependent(row));
+        let closing = self.projection.close(self.g, &rows).map_err(|row| self.no_response(row));
         // States not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
         if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
@@ -399,7 +399,7 @@ impl<T: Real> Correction<'_, T> {
     /// Solves S x + jump for the multipliers x of `rows` under their bounds.
     fn solve(&mut self, rows: &[usize], bounds: &[Bound], x: &mut [T]) -> Result<()> {
         if bounds.iter().all(|&bound| bound == Bound::Free) {
-            self.projection.close(self.g, rows).map_err(|row| self.dependent(row))?;
+            self.projection.close(self.g, rows).map_err(|row| self.no_response(row))?;
             for (x, &jump) in x.iter_mut().zip(&self.buffers.jump) {
                 *x = -jump;
             }
@@ -408,21 +408,26 @@ impl<T: Real> Correction<'_, T> {
         }
         let Buffers { s, jump, tolerance, .. } = &mut *self.buffers;
         self.projection.assemble(self.g, rows, s);
-        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance };
+        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance, version: 0 };
         match self.solver.solve(&problem, x) {
             Ok(_) => Ok(()),
             Err(failure) => Err(contact_error(self.t, failure, |row| self.contacts.ids[rows[row]])),
         }
     }
 
-    fn dependent(&self, row: usize) -> Error {
-        Error::DependentContacts { t: self.t, contact: self.contacts.ids[row] }
+    fn no_response(&self, row: usize) -> Error {
+        no_response(self.t, self.contacts.ids[row])
     }
 }
 
 /// What rounding makes of a sum whose terms have this magnitude.
 pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
     T::of(64.0) * T::epsilon() * magnitude
+}
+
+/// The error of a contact whose bodies' response to a force is not a number.
+pub(crate) fn no_response(t: f64, contact: crate::contact::ContactId) -> Error {
+    Error::ContactNotFinite { t, what: "the response G M⁻¹ Gᵀ", contact, value: f64::NAN }
 }
 
 /// The error of a contact problem that failed at time t.
@@ -432,7 +437,9 @@ pub(crate) fn contact_error<T: Real>(
     id: impl Fn(usize) -> crate::contact::ContactId,
 ) -> Error {
     match failure {
-        ContactFailure::Dependent { row } => Error::DependentContacts { t, contact: id(row) },
+        ContactFailure::Contradictory { row, other, residual } => {
+            Error::ContradictoryContacts { t, contact: id(row), other: id(other), violation: residual.value() }
+        }
         ContactFailure::NotConverged { iterations, row, residual } => {
             Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
         }

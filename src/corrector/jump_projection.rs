@@ -93,11 +93,11 @@ impl<T: Real> JumpProjection<T> {
     }
 
     /// Chooses the rows of G whose jumps are removed, and factorizes their S. Choosing the same rows again costs
-    /// nothing.
+    /// nothing. Rows may depend on one another: of all multipliers those of least norm are then found.
     ///
     /// # Errors
     ///
-    /// The row of G that depends linearly on the others.
+    /// The row of G whose S is not a number.
     pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> std::result::Result<(), usize> {
         if self.factored && self.closed == rows {
             return Ok(());
@@ -117,7 +117,7 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// `target` is γ, the velocity or acceleration of the obstacle along each closed row (zero between bodies). Both
     /// slices have one entry a closed row, in the order given to [`close`](Self::close).
-    pub fn remove_jump(&self, g: &ContactJacobian<T>, target: &[T], x: &mut [T], multipliers: &mut [T]) {
+    pub fn remove_jump(&mut self, g: &ContactJacobian<T>, target: &[T], x: &mut [T], multipliers: &mut [T]) {
         for ((multiplier, &row), &target) in multipliers.iter_mut().zip(&self.closed).zip(target) {
             *multiplier = g.product(row, x) - target;
         }
@@ -133,7 +133,7 @@ impl<T: Real> JumpProjection<T> {
     }
 
     /// `b ← S⁻¹ b` on the closed rows.
-    pub(crate) fn solve(&self, b: &mut [T]) {
+    pub(crate) fn solve(&mut self, b: &mut [T]) {
         self.factor.solve(b);
     }
 

@@ -30,7 +30,8 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) in_problem: Vec<bool>,
     /// Rows of the problem, and its data, one entry a row of the problem.
     pub(super) problem: Vec<usize>,
-    pub(super) delassus: Vec<T>,
+    /// Delassus operators assembled so far.
+    versions: u64,
     pub(super) offset: Vec<T>,
     pub(super) problem_tolerance: Vec<T>,
     pub(super) bounds: Vec<Bound>,
@@ -60,7 +61,7 @@ impl<T: Real> ContactRowsWork<T> {
             enabled: vec![true; rows],
             in_problem: vec![false; rows],
             problem: Vec::with_capacity(rows),
-            delassus: Vec::with_capacity(rows * rows),
+            versions: 0,
             offset: reserved(),
             problem_tolerance: reserved(),
             bounds: Vec::with_capacity(rows),
@@ -432,7 +433,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             enabled,
             in_problem,
             problem,
-            delassus,
+            versions,
             offset,
             ..
         } = rows;
@@ -442,23 +443,20 @@ impl<T: Real> ContactStep<'_, '_, T> {
         loop {
             problem.clear();
             problem.extend((0..count).filter(|&row| in_problem[row]));
-            operator.prepare(g, problem);
-            for buffer in [&mut *delassus, &mut *offset, &mut *problem_tolerance, &mut *multipliers] {
+            for buffer in [&mut *offset, &mut *problem_tolerance, &mut *multipliers] {
                 buffer.clear();
             }
             bounds.clear();
             // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
-            for (k, &j) in problem.iter().enumerate() {
-                let response = operator.response(j);
-                delassus.extend(problem.iter().map(|&i| g.interface_product(i, response)));
-                let size = problem.len();
-                delassus[k * size + k] += compliance[j] / weight[j];
+            for &j in problem.iter() {
                 offset.push((y[j] + shift[j]) / weight[j]);
                 problem_tolerance.push(tolerance[j] / weight[j]);
                 multipliers.push(trial.lambda_raw[j]);
                 bounds.push(constraints.law(j).into());
             }
-            let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance };
+            let compliance_of = |k: usize| compliance[problem[k]] / weight[problem[k]];
+            let (delassus, version) = operator.delassus(g, problem, compliance_of, versions);
+            let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance, version };
             let solved = solver.solve(&data, multipliers);
             statistics.contact_solves += 1;
             statistics.contact_iterations +=

@@ -24,8 +24,20 @@ pub(crate) struct Operator<T> {
     /// For each contact row the interface part of A⁻¹ G_rowᵀ, if it has been computed.
     columns: Vec<T>,
     computed: Vec<bool>,
+    delassus: Delassus<T>,
     /// One vector of the system, for factorizations that cannot condense.
     full: Vec<T>,
+}
+
+/// The Delassus operator of some rows, kept until they or their responses change.
+#[derive(Debug)]
+struct Delassus<T> {
+    rows: Vec<usize>,
+    /// Column-major, with the compliances of the laws on the diagonal.
+    values: Vec<T>,
+    /// The diagonal without them.
+    diagonal: Vec<T>,
+    version: u64,
 }
 
 /// Responses computed at once, at most.
@@ -57,7 +69,13 @@ impl<T: Real> Operator<T> {
             _ => Vec::new(),
         };
         let (interface, computed) = (interface.to_vec(), vec![false; rows]);
-        let mut operator = Self { weights, tangent, combination, factor, interface, columns, computed, full };
+        let delassus = Delassus {
+            rows: Vec::with_capacity(rows),
+            values: memory::reserve(rows, rows, "the Delassus operator")?,
+            diagonal: Vec::with_capacity(rows),
+            version: 0,
+        };
+        let mut operator = Self { weights, tangent, combination, factor, interface, columns, computed, delassus, full };
         operator.factorize(system, h)?;
         Ok(operator)
     }
@@ -164,9 +182,47 @@ impl<T: Real> Operator<T> {
         &self.columns[row * self.interface.len()..(row + 1) * self.interface.len()]
     }
 
+    /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version. `versions`
+    /// counts those given so far.
+    pub(crate) fn delassus(
+        &mut self,
+        g: &ContactJacobian<T>,
+        rows: &[usize],
+        compliance: impl Fn(usize) -> T,
+        versions: &mut u64,
+    ) -> (&[T], u64) {
+        self.prepare(g, rows);
+        let Self { delassus: Delassus { rows: assembled, values, diagonal, version }, columns, interface, .. } = self;
+        let (size, on_interface) = (rows.len(), interface.len());
+        let mut changed = assembled != rows || *version == 0;
+        if changed {
+            assembled.clear();
+            assembled.extend_from_slice(rows);
+            values.clear();
+            diagonal.clear();
+            for (k, &j) in rows.iter().enumerate() {
+                let response = &columns[j * on_interface..(j + 1) * on_interface];
+                values.extend(rows.iter().map(|&i| g.interface_product(i, response)));
+                diagonal.push(values[k * size + k]);
+            }
+        }
+        for (k, &own) in diagonal.iter().enumerate() {
+            let entry = &mut values[k * size + k];
+            let value = own + compliance(k);
+            changed |= *entry != value;
+            *entry = value;
+        }
+        if changed {
+            *versions += 1;
+            *version = *versions;
+        }
+        (values, *version)
+    }
+
     /// Forgets responses to rows that have changed.
     pub(crate) fn reset(&mut self) {
         self.computed.fill(false);
+        self.delassus.version = 0;
     }
 
     pub(crate) fn stored_values(&self) -> usize {

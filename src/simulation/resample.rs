@@ -5,7 +5,7 @@ use super::scheme::Scheme;
 use super::start::{self, Start, Violation, taylor};
 use super::{Constraints, Simulation};
 use crate::contact::{ContactJacobian, GapRates};
-use crate::corrector::{Gaps, JumpProjection};
+use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{Clock, History, Motion, State, Trail};
@@ -44,7 +44,7 @@ impl<T: Real> Simulation<'_, T> {
     /// # Errors
     ///
     /// [`Error::Parameter`] unless h is positive and finite, [`Error::MatrixNotFinite`] or [`Error::Singular`] if the
-    /// effective matrix cannot be factorized with it, [`Error::DependentContacts`]. The simulation is then as it was.
+    /// effective matrix cannot be factorized with it. The simulation is then as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
@@ -95,11 +95,9 @@ impl<T: Real> Simulation<'_, T> {
             .collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
-            projection
-                .close(g, &closed)
-                .map_err(|row| Error::DependentContacts { t: newest.t, contact: constraints.ids[row] })?;
+            projection.close(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
-                project(motion, constraints, g, &projection, &closed);
+                project(motion, constraints, g, &mut projection, &closed);
             }
         }
         Ok(past)
@@ -265,7 +263,7 @@ fn project<T: Real>(
     motion: &mut Motion<T>,
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
-    projection: &JumpProjection<T>,
+    projection: &mut JumpProjection<T>,
     closed: &[usize],
 ) {
     let mut gaps = vec![T::zero(); constraints.len()];

@@ -306,7 +306,7 @@ impl<T: Real> StartProblem<T> {
             lambda.clear();
             lambda.resize(rows.len(), T::zero());
             solver.reserve(rows.len());
-            let problem = ContactProblem { delassus: &s, offset: &q, bounds: &bounds, tolerance: &rounded };
+            let problem = ContactProblem { delassus: &s, offset: &q, bounds: &bounds, tolerance: &rounded, version: 0 };
             solver
                 .solve(&problem, lambda)
                 .map_err(|failure| contact_error(t, failure, |i| constraints.ids[rows[i]]))?;

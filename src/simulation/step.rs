@@ -17,7 +17,7 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::DependentContacts`], [`Error::Contact`], or what
+    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`], or what
     /// the host's own parts return. State and history are then as they were.
     pub fn step(&mut self) -> Result<()> {
         if let Some(ledger) = &mut self.ledger {

@@ -1,0 +1,118 @@
+//! Cost of a step in contact on a block of hex8 elements, beside the bare solve and the step without contact.
+//!
+//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20)
+
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{
+    Automatic, Composite, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation, TimeIntegrator,
+};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use std::hint::black_box;
+use std::time::Instant;
+
+const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+
+fn main() {
+    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
+    let sizes = if sizes.is_empty() { vec![10, 20] } else { sizes };
+    for n in sizes {
+        measure(n);
+    }
+}
+
+/// A measured operation: runs once.
+struct Row<'a> {
+    name: String,
+    run: Box<dyn FnMut() + 'a>,
+    samples: Vec<f64>,
+}
+
+fn measure(n: usize) {
+    let block = Solid::block([1.0; 3], [n; 3], MATERIAL);
+    let h = 1.0 / n as f64 / MATERIAL.wave_speed();
+    let bottom: Vec<usize> = block.surface_nodes().into_iter().filter(|&node| block.nodes[node][2] == 0.0).collect();
+    let candidates: Vec<usize> = bottom.iter().map(|&node| Solid::<3>::dof(node, 2)).collect();
+    println!("block of {n}³ elements, {} dofs, {} candidates, Courant number 1", block.dofs(), candidates.len());
+    let mut rows =
+        vec![bare("bare solve, free order", &block, h, &[]), bare("bare solve, contact last", &block, h, &candidates)];
+    for (name, pressed, corrected) in
+        [("step, open", false, false), ("step, all closed", true, false), ("step, all closed, corrected", true, true)]
+    {
+        let mut run = simulation(&block, &candidates, h, pressed, corrected);
+        for _ in 0..5 {
+            run.step().expect("a well-posed step");
+        }
+        let closed = run.state().contacts().closed().iter().filter(|&&closed| closed).count();
+        assert_eq!(closed, if pressed { candidates.len() } else { 0 });
+        rows.push(Row {
+            name: name.into(),
+            run: Box::new(move || run.step().expect("a well-posed step")),
+            samples: Vec::new(),
+        });
+    }
+    let samples = if n > 25 { 5 } else { 15 };
+    for sample in 0..=samples {
+        for row in &mut rows {
+            let start = Instant::now();
+            (row.run)();
+            if sample > 0 {
+                row.samples.push(start.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+    }
+    println!("{:<32} {:>10} {:>10} {:>14} {:>14}", "", "median ms", "best ms", "/ bare solve", "/ open step");
+    let median = |samples: &mut [f64]| {
+        samples.sort_by(f64::total_cmp);
+        samples[samples.len() / 2]
+    };
+    let (solve, open) = (median(&mut rows[0].samples), median(&mut rows[2].samples));
+    for row in &mut rows {
+        let (median, best) = (median(&mut row.samples), row.samples[0]);
+        println!("{:<32} {median:>10.3} {best:>10.3} {:>14.2} {:>14.2}", row.name, median / solve, median / open);
+    }
+    println!();
+}
+
+/// The solve with the composite scheme's effective matrix.
+fn bare(name: &str, block: &Solid<3>, h: f64, last: &[usize]) -> Row<'static> {
+    let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
+    let (k, mass) = (block.stiffness::<f64>(), block.lumped_mass::<f64>());
+    let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
+    for j in 0..block.dofs() {
+        let k = k.as_ref();
+        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
+    }
+    let a = SparseColMat::<usize, f64>::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("triplets");
+    let mut factor: Box<dyn Factorization<f64>> = Automatic.analyze(a.symbolic(), last).expect("memory");
+    factor.factorize(a.as_ref()).expect("positive definite");
+    let name = format!("{name} ({:.1} M)", factor.stored_values() as f64 / 1e6);
+    let mut x = vec![1.0; block.dofs()];
+    let run = move || {
+        x.fill(1.0);
+        factor.solve(&mut x);
+        black_box(&x);
+    };
+    Row { name, run: Box::new(run), samples: Vec::new() }
+}
+
+/// The block on a floor, pressed on it by its weight, or high above it.
+fn simulation(
+    block: &Solid<3>,
+    candidates: &[usize],
+    h: f64,
+    pressed: bool,
+    corrected: bool,
+) -> Simulation<'static, f64> {
+    let mass = block.lumped_mass::<f64>();
+    let gravity = if pressed { -1e-3 } else { 0.0 };
+    let system = block.system::<f64>().load(move |_, f| {
+        for (f, m) in f.iter_mut().zip(&mass).skip(2).step_by(3) {
+            *f = gravity * m;
+        }
+    });
+    let gap = if pressed { 0.0 } else { 1e3 };
+    let contact = candidates.iter().fold(LinearRows::new(), |rows, &dof| rows.unilateral(&[(dof, 1.0)], gap));
+    let builder = Simulation::builder(system, Composite, h).constraint(contact);
+    let builder = if corrected { builder.corrector(PersistencyCorrection::with_history_projection()) } else { builder };
+    builder.build().expect("a well-posed scene")
+}
