@@ -93,9 +93,11 @@ impl<T: Real> DenseCholesky<T> {
                 independent.extend(0..size);
                 return Ok(());
             }
-            // Row by row after all, with what is left of the matrix: its lower triangle, and the diagonal kept apart.
+            // Row by row after all, from the start: the kernel has written to both triangles.
             for i in 0..size {
-                l[i + i * size] = diagonal[i];
+                for j in 0..=i {
+                    l[i * size + j] = entry(i, j);
+                }
             }
         }
         *kind = Kind::Skyline;
