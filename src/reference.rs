@@ -2,7 +2,8 @@
 //!
 //! [`CollidingBars`] solves the central impact of two linear elastic bars, or of a bar and a rigid wall, by the
 //! method of characteristics; [`single_oscillator`] and [`forced_oscillator`] are the textbook responses of one degree
-//! of freedom. Units are the caller's and need only be consistent.
+//! of freedom; [`PowerLawImpact`] is Hertz' impact, [`BouncingBar`] an elastic bar that falls on a wall again and again.
+//! Units are the caller's and need only be consistent.
 //!
 //! # Method of characteristics
 //!
@@ -30,6 +31,12 @@
 //! - W. Goldsmith, *Impact: The Theory and Physical Behaviour of Colliding Solids*, 1960 (longitudinal impact of rods,
 //!   after Saint-Venant).
 //! - K. F. Graff, *Wave Motion in Elastic Solids*, 1975 (characteristics, impedance).
+
+mod bouncing_bar;
+mod power_law;
+
+pub use bouncing_bar::BouncingBar;
+pub use power_law::PowerLawImpact;
 
 use std::error::Error;
 use std::fmt;

@@ -54,9 +54,11 @@ pub enum ContactLaw {
         /// m (mass).
         mass: f64,
     },
-    /// Augmented Lagrangian (Alart and Curnier 1991; Simo and Laursen 1992): λ = ⟨λ̂ − k g⟩ with λ̂ the raw multiplier of the stage
-    /// before, then replaced by λ so many times. The gap of a lasting contact goes to zero; at impact it is that of a
-    /// penalty, reduced by every augmentation.
+    /// Augmented Lagrangian (Alart and Curnier 1991; Simo and Laursen 1992): λ = ⟨λ̂ − k g⟩ with λ̂ = 0 at first, as a
+    /// penalty, then replaced by λ so many times within the stage. Every augmentation takes the solution closer to that
+    /// of rigid contact, the faster the stiffer the spring. λ̂ is not carried to the next step: in dynamics that
+    /// integrates the gap over time and grows. Where the gap does not depend on the force (explicit schemes) it is a
+    /// penalty.
     AugmentedLagrangian {
         /// k (force/length).
         stiffness: f64,
@@ -122,29 +124,28 @@ impl ContactLaw {
         }
     }
 
-    /// The force of a compliant law for y, the gap with its inertia: zero if y ≥ 0. `before` is the raw multiplier of the
-    /// stage before.
-    pub(crate) fn force<T: Real>(&self, y: T, before: T) -> T {
+    /// The force of a compliant law for y, the gap with its inertia: zero if y ≥ 0.
+    pub(crate) fn force<T: Real>(&self, y: T) -> T {
         let depth = (-y).max(T::zero());
         match *self {
-            Self::Penalty { stiffness } | Self::Bipenalty { stiffness, .. } => T::of(stiffness) * depth,
+            Self::Penalty { stiffness }
+            | Self::Bipenalty { stiffness, .. }
+            | Self::AugmentedLagrangian { stiffness, .. } => T::of(stiffness) * depth,
             Self::PowerLaw { stiffness, exponent } => T::of(stiffness) * depth.powf(T::of(exponent)),
-            // Where the gap does not depend on the force, augmenting within the stage would only repeat the spring.
-            Self::AugmentedLagrangian { stiffness, .. } => (before - T::of(stiffness) * y).max(T::zero()),
             Self::Rigid | Self::Equality | Self::Restitution { .. } => T::zero(),
         }
     }
 
     /// The law linearized as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
     ///
-    /// `depth` is where a power law is linearized (positive), `before` the multiplier from which an augmentation starts.
-    pub(crate) fn linearized<T: Real>(&self, depth: T, before: T) -> (T, T) {
+    /// `depth` is where a power law is linearized (positive), `augmented` the multiplier λ̂ of an augmented Lagrangian.
+    pub(crate) fn linearized<T: Real>(&self, depth: T, augmented: T) -> (T, T) {
         match *self {
             Self::Rigid | Self::Equality | Self::Restitution { .. } => (T::zero(), T::zero()),
             Self::Penalty { stiffness } | Self::Bipenalty { stiffness, .. } => (T::of(stiffness).recip(), T::zero()),
             Self::AugmentedLagrangian { stiffness, .. } => {
                 let compliance = T::of(stiffness).recip();
-                (compliance, -compliance * before)
+                (compliance, -compliance * augmented)
             }
             Self::PowerLaw { stiffness, exponent } => {
                 let slope = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0));
@@ -170,15 +171,15 @@ mod tests {
     fn the_linearization_touches_the_law() {
         let law = ContactLaw::PowerLaw { stiffness: 3.0, exponent: 1.5 };
         for depth in [1e-3, 0.2, 5.0_f64] {
-            let force = law.force(-depth, 0.0);
+            let force = law.force(-depth);
             let (c, s) = law.linearized(depth, 0.0);
             assert!((-depth + c * force + s).abs() < 1e-15 * depth.max(1.0));
-            let slope = (law.force(-depth * (1.0 + 1e-6), 0.0) - force) / (depth * 1e-6);
+            let slope = (law.force(-depth * (1.0 + 1e-6)) - force) / (depth * 1e-6);
             assert!((slope * c - 1.0).abs() < 1e-5);
         }
         let law = ContactLaw::AugmentedLagrangian { stiffness: 4.0, augmentations: 1 };
         let (c, s) = law.linearized(0.0, 2.0_f64);
-        let force = law.force(-0.5, 2.0);
+        let force = 2.0 + 4.0 * 0.5;
         assert!((-0.5 + c * force + s).abs() < 1e-15);
     }
 

@@ -129,7 +129,7 @@ impl<T: Real> ActiveSet<T> {
             let violations = (0..size).filter(|&i| violates(i, active[i]));
             let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
             if count == 0 {
-                if factor.is_singular() && rows.iter().any(|&i| !(y[i].abs() <= noise[i])) {
+                if factor.is_singular() && !rows.iter().all(|&i| y[i].abs() <= noise[i]) {
                     return Ok(Exchanges::Stuck(iteration));
                 }
                 for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {

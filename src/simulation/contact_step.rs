@@ -261,13 +261,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if law.is_compliant() {
                 rows.y[row] = rows.balance_gap[row];
                 let depth = (-rows.y[row]).max(rows.tolerance[row]);
-                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, trial.lambda_raw[row]);
+                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {
                 (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
             }
             let coupled = rows.weight[row] > T::zero();
-            let threshold = if law.augmentations() > 0 { -rows.shift[row] } else { -rows.tolerance[row] };
-            let violated = rows.enabled[row] && rows.y[row] < threshold || law.is_equality();
+            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || law.is_equality();
             rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
             needed |= coupled && violated;
         }
@@ -328,7 +327,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_compliant() && rows.weight[row] == T::zero() {
-                let force = law.force(rows.balance_gap[row], trial.lambda_raw[row]);
+                let force = law.force(rows.balance_gap[row]);
                 trial.lambda_raw[row] = force;
                 g.interface_scatter(row, force, &mut interface.forces);
                 pressed |= force > T::zero();
@@ -362,7 +361,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// Solves for the multipliers, laws linearized again until they are met.
     fn press(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
         let count = self.constraints.len();
-        for pass in 0..LINEARIZATIONS {
+        let augmentations = self.constraints.laws().iter().map(ContactLaw::augmentations).max().unwrap_or(0);
+        let limit = LINEARIZATIONS + augmentations;
+        for pass in 0..limit {
             self.press_linearized(operator, t, work)?;
             let Workspace { rows, trial, interface, .. } = &mut *work;
             let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, in_problem, .. } =
@@ -377,7 +378,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         let gap = y[row] + weight[row] * problem.iter().zip(&*multipliers).map(pushed).sum::<T>();
                         let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
                         let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
-                        let miss = (lambda - law.force(gap, T::zero())).abs() * slope;
+                        let miss = (lambda - law.force(gap)).abs() * slope;
                         if miss > tolerance[row] + rounded * depth {
                             again = true;
                             if miss > worst.1 {
@@ -412,7 +413,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 }
                 return Ok(());
             }
-            if pass + 1 == LINEARIZATIONS {
+            if pass + 1 == limit {
                 let failure = ContactFailure::NotConverged { iterations: pass, row: worst.0, residual: worst.1 };
                 return Err(contact_error(t, failure, |row| self.constraints.ids[row]));
             }

@@ -127,7 +127,7 @@ impl<T: Real> Start<'_, T> {
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_compliant() && law.inertia() == 0.0 {
-                let force = law.force(contacts.gap[row], T::zero());
+                let force = law.force(contacts.gap[row]);
                 if force > T::zero() {
                     projection.prepare(g, &[row]);
                     projection.push(g, row, force, &mut motion.a);
@@ -270,6 +270,12 @@ impl<T: Real> StartProblem<T> {
                 constraints.rates(t, &motion.u, &motion.v, &mut rates);
                 for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
                     *y = g.product(row, &target) + rate.rate;
+                }
+                constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+                for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
+                    if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
+                        *y += T::of(coefficient) * (g.product(row, &motion.v) + rate.rate);
+                    }
                 }
                 (lead, touching.to_vec())
             }
