@@ -2,9 +2,13 @@
 
 mod law;
 mod linear_rows;
+mod nodes_on_obstacle;
+mod obstacle;
 
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
+pub use nodes_on_obstacle::{NodesOnObstacle, SurfaceNode};
+pub use obstacle::{Cylinder, Obstacle, Plane, Side, Sphere};
 
 use crate::error::Result;
 use crate::real::Real;

@@ -24,14 +24,15 @@ mod sparse;
 mod state;
 mod system;
 pub mod tableau;
+pub mod verify;
 
-pub use contact::{ContactConstraint, LinearRows};
+pub use contact::{ContactConstraint, ContactLaw, LinearRows, NodesOnObstacle};
 pub use contact_solver::{ActiveSet, ContactSolver};
 pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
 pub use error::{Error, Result};
 pub use faer;
 pub use integrator::*;
-pub use linear_solver::{Automatic, Cholesky, Diagonal, Factorization, LinearSolver};
+pub use linear_solver::{Automatic, Cholesky, Condensation, Diagonal, Factorization, LinearSolver};
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};
 pub use real::Real;

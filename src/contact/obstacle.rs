@@ -1,0 +1,247 @@
+//! Rigid obstacles: bodies given by their signed distance.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// A rigid body, given by the signed distance of a point from its surface: positive outside, negative inside.
+///
+/// Evaluations are pure. The gradient of a signed distance is the outward unit normal at the nearest point of the surface.
+/// The obstacle stands still in its own frame; [`NodesOnObstacle`](super::NodesOnObstacle) moves it.
+///
+/// ```
+/// use contact_dynamics::contact::Obstacle;
+///
+/// /// A floor with long waves: not quite a distance, but its zero and its normal are right.
+/// #[derive(Debug)]
+/// struct Waves;
+///
+/// impl Obstacle<f64, 2> for Waves {
+///     fn distance(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+///         let (height, slope) = (0.1 * x.sin(), 0.1 * x.cos());
+///         let length = (1.0 + slope * slope).sqrt();
+///         ((y - height) / length, [-slope / length, 1.0 / length])
+///     }
+/// }
+/// assert!(Waves.distance([0.0, 0.5]).0 > 0.0);
+/// ```
+pub trait Obstacle<T: Real, const D: usize>: Send {
+    /// Signed distance of x (length) and its gradient, the unit normal.
+    fn distance(&self, x: [T; D]) -> (T, [T; D]);
+
+    /// wᵀ H w with H the second derivative of the distance: the acceleration of the gap that comes from moving with velocity
+    /// w along a curved surface. Default: none, as on flat surfaces.
+    fn curvature(&self, x: [T; D], w: [T; D]) -> T {
+        let _ = (x, w);
+        T::zero()
+    }
+
+    /// The normal, if it is the same everywhere.
+    fn fixed_normal(&self) -> Option<[T; D]> {
+        None
+    }
+}
+
+/// A half-space: everything on the other side of a plane (a line in two dimensions).
+///
+/// ```
+/// use contact_dynamics::contact::{Obstacle, Plane};
+/// let floor = Plane::new([0.0, 0.0, 1.0], [0.0, 0.0, 2.0])?; // through (0, 0, 1), facing up
+/// assert_eq!(floor.distance([3.0, 4.0, 1.5]), (0.5, [0.0, 0.0, 1.0]));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane<T, const D: usize> {
+    point: [T; D],
+    normal: [T; D],
+}
+
+impl<T: Real, const D: usize> Plane<T, D> {
+    /// Through a point, with a normal of any length that points to where bodies may be.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if the normal is zero, [`Error::NotFinite`].
+    pub fn new(point: [T; D], normal: [T; D]) -> Result<Self> {
+        finite("a point of the plane", &point)?;
+        Ok(Self { point, normal: unit("the normal of the plane", normal)? })
+    }
+}
+
+impl<T: Real, const D: usize> Obstacle<T, D> for Plane<T, D> {
+    fn distance(&self, x: [T; D]) -> (T, [T; D]) {
+        (dot(self.normal, minus(x, self.point)), self.normal)
+    }
+
+    fn fixed_normal(&self) -> Option<[T; D]> {
+        Some(self.normal)
+    }
+}
+
+/// Which side of a closed surface bodies may be on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Outside of a solid obstacle.
+    Outside,
+    /// Inside of a hollow one.
+    Inside,
+}
+
+impl Side {
+    fn sign<T: Real>(self) -> T {
+        match self {
+            Self::Outside => T::one(),
+            Self::Inside => -T::one(),
+        }
+    }
+}
+
+/// A ball (a disc in two dimensions), or the space outside of one.
+///
+/// ```
+/// use contact_dynamics::contact::{Obstacle, Side, Sphere};
+/// let ball = Sphere::new([0.0, 0.0], 1.0, Side::Outside)?;
+/// assert_eq!(ball.distance([0.0, 3.0]), (2.0, [0.0, 1.0]));
+/// let bowl = Sphere::new([0.0, 0.0], 1.0, Side::Inside)?;
+/// assert_eq!(bowl.distance([0.0, 0.25]), (0.75, [0.0, -1.0]));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere<T, const D: usize> {
+    center: [T; D],
+    radius: T,
+    side: Side,
+}
+
+impl<T: Real, const D: usize> Sphere<T, D> {
+    /// Around a center.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless the radius is positive and finite, [`Error::NotFinite`].
+    pub fn new(center: [T; D], radius: T, side: Side) -> Result<Self> {
+        finite("the center of the sphere", &center)?;
+        positive("the radius of the sphere", radius)?;
+        Ok(Self { center, radius, side })
+    }
+}
+
+impl<T: Real, const D: usize> Obstacle<T, D> for Sphere<T, D> {
+    fn distance(&self, x: [T; D]) -> (T, [T; D]) {
+        round(minus(x, self.center), self.radius, self.side)
+    }
+
+    fn curvature(&self, x: [T; D], w: [T; D]) -> T {
+        round_curvature(minus(x, self.center), w, self.side)
+    }
+}
+
+/// A straight cylinder without ends, or the space outside of one.
+///
+/// ```
+/// use contact_dynamics::contact::{Cylinder, Obstacle, Side};
+/// let pipe = Cylinder::new([0.0; 3], [1.0, 0.0, 0.0], 2.0, Side::Inside)?;
+/// assert_eq!(pipe.distance([7.0, 0.0, 1.5]), (0.5, [0.0, 0.0, -1.0]));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cylinder<T> {
+    point: [T; 3],
+    axis: [T; 3],
+    radius: T,
+    side: Side,
+}
+
+impl<T: Real> Cylinder<T> {
+    /// Around an axis through a point.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if the axis is zero or unless the radius is positive and finite, [`Error::NotFinite`].
+    pub fn new(point: [T; 3], axis: [T; 3], radius: T, side: Side) -> Result<Self> {
+        finite("a point of the cylinder's axis", &point)?;
+        positive("the radius of the cylinder", radius)?;
+        Ok(Self { point, axis: unit("the axis of the cylinder", axis)?, radius, side })
+    }
+
+    /// The part across the axis.
+    fn across(&self, x: [T; 3]) -> [T; 3] {
+        let along = dot(x, self.axis);
+        std::array::from_fn(|k| x[k] - along * self.axis[k])
+    }
+}
+
+impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
+    fn distance(&self, x: [T; 3]) -> (T, [T; 3]) {
+        round(self.across(minus(x, self.point)), self.radius, self.side)
+    }
+
+    fn curvature(&self, x: [T; 3], w: [T; 3]) -> T {
+        round_curvature(self.across(minus(x, self.point)), self.across(w), self.side)
+    }
+}
+
+/// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is right.
+fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D]) {
+    let (length, sign) = (dot(r, r).sqrt(), side.sign::<T>());
+    let normal = match length > T::zero() {
+        true => r.map(|x| sign * x / length),
+        false => std::array::from_fn(|k| if k + 1 == D { sign } else { T::zero() }),
+    };
+    (sign * (length - radius), normal)
+}
+
+/// wᵀ H w of a round surface: the speed along it squared over the distance from its center or axis.
+fn round_curvature<T: Real, const D: usize>(r: [T; D], w: [T; D], side: Side) -> T {
+    let square = dot(r, r);
+    if square == T::zero() {
+        return T::zero();
+    }
+    let along = dot(r, w);
+    side.sign::<T>() * (dot(w, w) - along * along / square) / square.sqrt()
+}
+
+impl<T: Real, const D: usize, O: Obstacle<T, D> + ?Sized> Obstacle<T, D> for Box<O> {
+    fn distance(&self, x: [T; D]) -> (T, [T; D]) {
+        (**self).distance(x)
+    }
+    fn curvature(&self, x: [T; D], w: [T; D]) -> T {
+        (**self).curvature(x, w)
+    }
+    fn fixed_normal(&self) -> Option<[T; D]> {
+        (**self).fixed_normal()
+    }
+}
+
+pub(super) fn dot<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> T {
+    x.into_iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+pub(super) fn minus<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> [T; D] {
+    std::array::from_fn(|k| x[k] - y[k])
+}
+
+fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
+    match x.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: x[index].value() }),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn positive<T: Real>(name: &'static str, x: T) -> Result<()> {
+    match x > T::zero() && x.is_finite() {
+        true => Ok(()),
+        false => Err(Error::Parameter { name, value: x.value(), range: "positive and finite" }),
+    }
+}
+
+fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
+    finite(name, &x)?;
+    // Scaled first: squares of very small or large entries leave the range of the scalar.
+    let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
+    if largest == T::zero() {
+        return Err(Error::Parameter { name, value: 0.0, range: "a vector that is not zero" });
+    }
+    let scaled = x.map(|x| x / largest);
+    let length = dot(scaled, scaled).sqrt();
+    Ok(scaled.map(|x| x / length))
+}
