@@ -1,6 +1,7 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
 pub mod bars;
+pub mod drops;
 pub mod measure;
 pub mod output;
 pub mod plot;
