@@ -143,6 +143,39 @@ impl<T: Real> Basis<T> {
         }
     }
 
+    /// All independent free rows become active: Cholesky with diagonal pivoting, the most independent row first.
+    ///
+    /// The rows left out are combinations of these; whether their q agrees is for the acceptance rule to say.
+    fn enter_free(&mut self, problem: &ContactProblem<'_, T>) {
+        let Self { rows, factor, stride, right: rest, .. } = self;
+        let is_free = |&i: &usize| problem.bounds[i] == Bound::Free && problem.delassus(i, i) > T::zero();
+        rows.extend((0..problem.size()).filter(is_free));
+        rest.clear();
+        rest.extend(rows.iter().map(|&i| problem.delassus(i, i)));
+        for k in 0..rows.len() {
+            let share = |at: usize| rest[at] / problem.delassus(rows[at], rows[at]);
+            let best = (k + 1..rows.len()).fold(k, |best, at| if share(at) > share(best) { at } else { best });
+            if share(best) <= T::of(16.0 * problem.size() as f64) * T::epsilon() {
+                rows.truncate(k);
+                return;
+            }
+            rows.swap(k, best);
+            rest.swap(k, best);
+            for c in 0..k {
+                factor.swap(k * *stride + c, best * *stride + c);
+            }
+            let pivot = rest[k].sqrt();
+            factor[k * *stride + k] = pivot;
+            for i in k + 1..rows.len() {
+                let (done, below) = factor.split_at_mut(i * *stride);
+                let done = &done[k * *stride..k * *stride + k];
+                let entry = (problem.delassus(rows[i], rows[k]) - dot(T::zero(), done, &below[..k])) / pivot;
+                below[k] = entry;
+                rest[i] -= entry * entry;
+            }
+        }
+    }
+
     /// The driven row becomes active.
     fn enter(&mut self, p: usize, slope: T) {
         let start = self.rows.len() * self.stride;
@@ -215,20 +248,6 @@ impl<T: Real> Basis<T> {
 }
 
 impl<T: Real> Pivoting<T> {
-    /// Closes all free rows that are independent; whether the others follow is for the acceptance rule to say.
-    fn close_free_rows(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) {
-        for p in 0..problem.size() {
-            if problem.bounds[p] == Bound::Free && problem.delassus(p, p) > T::zero() {
-                let response = self.basis.drive(problem, p);
-                if response.slope > T::zero() {
-                    self.basis.enter(p, response.slope);
-                    self.status[p] = Status::Active;
-                }
-            }
-        }
-        self.basis.close(problem, multipliers);
-    }
-
     /// The row that is violated most, measured in √W_ii.
     fn violated(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> Option<usize> {
         let mut worst: Option<(usize, T)> = None;
@@ -305,7 +324,11 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
         self.basis.clear(size);
         self.status.clear();
         self.status.resize(size, Status::Inactive);
-        self.close_free_rows(problem, multipliers);
+        self.basis.enter_free(problem);
+        self.basis.close(problem, multipliers);
+        for &row in &self.basis.rows {
+            self.status[row] = Status::Active;
+        }
         let mut pivots = self.basis.rows.len();
         // Far above anything seen.
         let limit = 100 + 20 * size;
