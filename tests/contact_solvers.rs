@@ -72,19 +72,20 @@ fn gram(rows: &[Vec<f64>]) -> Vec<f64> {
 fn random(random: &mut Random, size: usize, rank: usize, columns: usize, free: f64) -> (Problem, Vec<f64>) {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for i in 0..size {
-        let row = match i < rank {
-            true => (0..columns).map(|_| random.within(-1.0, 1.0)).collect(),
-            false => {
-                let (a, b) = (&rows[i % rank], &rows[(7 * i + 3) % rank]);
-                let sign = if random.unit() < 0.5 { 1.0 } else { -1.0 };
-                a.iter().zip(b).map(|(a, b)| a + 0.5 * sign * b).collect()
-            }
+        let row = if i < rank {
+            (0..columns).map(|_| random.within(-1.0, 1.0)).collect()
+        } else {
+            let (a, b) = (&rows[i % rank], &rows[(7 * i + 3) % rank]);
+            let sign = if random.unit() < 0.5 { 1.0 } else { -1.0 };
+            a.iter().zip(b).map(|(a, b)| a + 0.5 * sign * b).collect()
         };
         rows.push(row);
     }
     for row in &mut rows {
         let unit = 10_f64.powf(random.within(-1.0, 1.0));
-        row.iter_mut().for_each(|x| *x *= unit);
+        for x in row {
+            *x *= unit;
+        }
     }
     let delassus = gram(&rows);
     let (mut bounds, mut multipliers, mut gaps) = (Vec::new(), Vec::new(), Vec::new());
@@ -223,26 +224,29 @@ fn pivoting_solves_degenerate_problems() {
     }
 }
 
+/// W, q, bounds and λ.
+type Case = ([f64; 4], [f64; 2], [Bound; 2], [f64; 2]);
+
 #[test]
 fn closed_forms() {
     let free = [Bound::Free, Bound::NonNegative];
     let both = [Bound::NonNegative; 2];
-    let cases: [(&[f64], &[f64], &[Bound], &[f64]); 7] = [
+    let cases: [Case; 7] = [
         // Both closed; the second opened by the first; both open.
-        (&[2.0, 1.0, 1.0, 2.0], &[-4.0, -5.0], &both, &[1.0, 2.0]),
-        (&[1.0, 0.9, 0.9, 1.0], &[-1.0, -0.5], &both, &[1.0, 0.0]),
-        (&[1.0, 0.9, 0.9, 1.0], &[0.0, 0.5], &both, &[0.0, 0.0]),
+        ([2.0, 1.0, 1.0, 2.0], [-4.0, -5.0], both, [1.0, 2.0]),
+        ([1.0, 0.9, 0.9, 1.0], [-1.0, -0.5], both, [1.0, 0.0]),
+        ([1.0, 0.9, 0.9, 1.0], [0.0, 0.5], both, [0.0, 0.0]),
         // A bilateral row may pull, alone and against a contact.
-        (&[2.0, 0.0, 0.0, 2.0], &[1.0, 1.0], &free, &[-0.5, 0.0]),
-        (&[2.0, 1.0, 1.0, 2.0], &[1.0, -1.0], &free, &[-1.0, 1.0]),
+        ([2.0, 0.0, 0.0, 2.0], [1.0, 1.0], free, [-0.5, 0.0]),
+        ([2.0, 1.0, 1.0, 2.0], [1.0, -1.0], free, [-1.0, 1.0]),
         // A contact that touches without pressure.
-        (&[1.0, 0.0, 0.0, 1.0], &[0.0, -1.0], &both, &[0.0, 1.0]),
+        ([1.0, 0.0, 0.0, 1.0], [0.0, -1.0], both, [0.0, 1.0]),
         // A row without W and with an open gap is none.
-        (&[0.0, 0.0, 0.0, 4.0], &[1.0, -2.0], &both, &[0.0, 0.5]),
+        ([0.0, 0.0, 0.0, 4.0], [1.0, -2.0], both, [0.0, 0.5]),
     ];
     for (name, mut solver, _) in general::<f64>() {
         for (delassus, offset, bounds, expected) in cases {
-            let problem = Problem { bounds: bounds.to_vec(), ..Problem::unilateral(delassus, offset) };
+            let problem = Problem { bounds: bounds.to_vec(), ..Problem::unilateral(&delassus, &offset) };
             let (found, _) = solve(&mut *solver, &problem, &[0.0; 2]).unwrap();
             for (found, expected) in found.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-11, "{name}: {found:?}, not {expected:?}");

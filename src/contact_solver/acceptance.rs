@@ -101,8 +101,8 @@ impl<T: Real> Settings<T> {
     }
 }
 
-/// The acceptance rule: `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or a given fraction of the largest
-/// |q_i| in every row.
+/// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given
+/// fraction of the largest |q_i|.
 ///
 /// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen.
 #[derive(Debug)]

@@ -14,9 +14,9 @@ use crate::real::Real;
 ///
 /// C. W. Cryer, The solution of a quadratic programming problem using systematic overrelaxation (SIAM J. Control 9,
 /// 1971). It needs no memory, and O(n²) operations a sweep. It converges for every positive semi-definite W if the
-/// problem has a solution and 0 < ω < 2 (Luo and Tseng, SIAM J. Control Optim. 29, 1991), hence with redundant rows
-/// too. Their y is then unique, the multipliers are not: it finds those that its sweeps reach from the guess, which
-/// depend on the guess and on the order of the rows.
+/// problem has a solution and 0 < ω < 2 (Luo and Tseng, SIAM J. Control Optim. 29, 1991, and J. Optim. Theory Appl. 72,
+/// 1992), hence with redundant rows too. y is then unique, the multipliers are not: it finds those that its sweeps
+/// reach, which depend on the guess and on the order of the rows.
 ///
 /// A result is accepted by its residual: in every row `|min(y_i, W_ii λ_i)|` (`|y_i|` of a free row) is rounding or at
 /// most the tolerance times the largest |q_i|. A guess that is accepted is returned after 0 sweeps; one that is not
@@ -36,7 +36,7 @@ use crate::real::Real;
 ///     bounds: &[Bound::NonNegative; 2],
 ///     tolerance: &[1e-15; 2],
 /// };
-/// let mut lambda = [0.0; 2];
+/// let mut lambda = [0.0_f64; 2];
 /// GaussSeidel::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 3.0).abs() < 1e-11);
 /// ```
@@ -82,6 +82,17 @@ impl<T: Real> GaussSeidel<T> {
     }
 }
 
+/// One sweep with relaxation factor `omega`; rows without W_ii are left out.
+pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
+    for i in 0..problem.size() {
+        let diagonal = problem.delassus(i, i);
+        if diagonal > T::zero() {
+            let correction = omega * problem.row_gap(i, multipliers) / diagonal;
+            multipliers[i] = problem.bounds[i].project(multipliers[i] - correction);
+        }
+    }
+}
+
 impl<T: Real> ContactSolver<T> for GaussSeidel<T> {
     fn reserve(&mut self, _size: usize) {}
 
@@ -95,13 +106,7 @@ impl<T: Real> ContactSolver<T> for GaussSeidel<T> {
             if acceptance.accepts(multipliers) {
                 return Ok(sweep);
             }
-            for i in 0..problem.size() {
-                let diagonal = problem.delassus(i, i);
-                if diagonal > T::zero() {
-                    let correction = self.relaxation * problem.row_gap(i, multipliers) / diagonal;
-                    multipliers[i] = problem.bounds[i].project(multipliers[i] - correction);
-                }
-            }
+            sweep_rows(problem, self.relaxation, multipliers);
         }
         let sweeps = self.settings.iterations;
         if acceptance.accepts(multipliers) { Ok(sweeps) } else { Err(acceptance.failure(sweeps, multipliers)) }

@@ -1,10 +1,11 @@
 //! Principal pivoting: exact for every positive semi-definite W, and the proof where there is no solution.
 
 use super::acceptance::{Settings, dot};
+use super::gauss_seidel::sweep_rows;
 use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::real::Real;
 
-/// Principal pivoting on the dense Delassus operator, with redundant rows: the reference solver.
+/// Principal pivoting on the dense Delassus operator, redundant rows included: the reference solver.
 ///
 /// The method of Dantzig, van de Panne and Whinston for symmetric W (Cottle, Pang and Stone, The Linear Complementarity
 /// Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). Free rows become active
@@ -12,21 +13,22 @@ use crate::real::Real;
 ///
 /// * y_p = 0: p becomes active, or
 /// * an active λ_j = 0: j leaves, and p is driven on, or
-/// * neither: λ grows along a direction d ≥ 0 with W d = 0 and qᵀ d < 0. Then no λ makes y ≥ 0, as dᵀ y = dᵀ q: the
-///   problem has no solution, and p is named.
+/// * neither: λ grows along a direction d with W d = 0, qᵀ d < 0 and d ≥ 0 on unilateral rows. No λ makes y ≥ 0 then,
+///   as dᵀ y = dᵀ q: the problem has no solution, and p is named.
 ///
-/// That is finite without a rule for ties: rows leave at most until none is left, so p gets active with λ_p > 0, and
-/// ½ λᵀ W λ + qᵀ λ has fallen. It is the minimum over the active rows, hence no active set comes twice. A row enters
-/// only where it is independent of the active ones, so the active block is positive definite for every semi-definite W,
-/// and its Cholesky factor is kept up to date row by row. Multipliers are solved for anew at each pivot from W and q, with
-/// iterative refinement; nothing drifts.
+/// That is finite, and ties need no rule: rows leave at most until none is left, then p becomes active with λ_p > 0,
+/// and ½ λᵀ W λ + qᵀ λ has fallen. It is the minimum over the active rows, hence no active set comes twice. A row
+/// enters only where it is independent of the active ones, so the active block is positive definite for every
+/// semi-definite W, and its Cholesky factor is kept up to date row by row. Multipliers are solved for anew at each
+/// pivot from W and q, with iterative refinement; nothing drifts.
 ///
 /// A pivot costs O(n²), a problem as a rule O(n³), with about a pivot for each active row; up to a few hundred rows. Of
-/// several solutions it finds a basic one: the rows with λ ≠ 0 are independent. It does not use the guess, so the
-/// multipliers never depend on it.
+/// several solutions it finds a basic one: the rows with λ ≠ 0 are independent. Only if these are so nearly dependent
+/// that the residual is more than rounding, sweeps of Gauss–Seidel spread the load to the rows they imply. It does not
+/// use the guess, so the multipliers never depend on it.
 ///
-/// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen; their
-/// number is limited); a row whose independence is rounding counts as dependent.
+/// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen,
+/// and limited); a row whose independence is rounding counts as dependent.
 ///
 /// ```
 /// use contact_dynamics::contact_solver::{Bound, ContactProblem, ContactSolver, Pivoting};
@@ -35,7 +37,7 @@ use crate::real::Real;
 /// let w = [1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 2.0];
 /// let bounds = [Bound::NonNegative; 3];
 /// let problem = ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3] };
-/// let mut lambda = [0.0; 3];
+/// let mut lambda = [0.0_f64; 3];
 /// Pivoting::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 1.5).abs() < 1e-15 && (lambda[2] - 0.5).abs() < 1e-15);
 /// assert!(lambda[0] == 0.0 || lambda[1] == 0.0);
@@ -50,6 +52,10 @@ pub struct Pivoting<T = f64> {
     basis: Basis<T>,
     status: Vec<Status>,
 }
+
+/// Gauss–Seidel sweeps granted where the active block, though independent, is so badly conditioned that the rows it
+/// implies miss the acceptance rule: they share the load then, and the solution is not basic.
+const POLISH: usize = 1000;
 
 /// Where a row stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,7 +230,7 @@ impl<T: Real> Basis<T> {
         }
     }
 
-    /// What of y_p is rounding: its own, and what the active rows' gaps are known to, carried over by their multipliers.
+    /// What of y_p is rounding: its own, and that of the active rows as their multipliers carry it over.
     fn rounding(&self, problem: &ContactProblem<'_, T>, p: usize, multipliers: &[T]) -> T {
         let carried = self.rows.iter().zip(&self.direction).map(|(&j, r)| r.abs() * problem.rounding(j, multipliers));
         problem.rounding(p, multipliers) + carried.sum::<T>()
@@ -341,6 +347,12 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
         for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {
             *lambda = bound.project(*lambda);
         }
-        if acceptance.accepts(multipliers) { Ok(pivots) } else { Err(acceptance.failure(pivots, multipliers)) }
+        for _ in 0..POLISH {
+            if acceptance.accepts(multipliers) {
+                return Ok(pivots);
+            }
+            sweep_rows(problem, T::one(), multipliers);
+        }
+        Err(acceptance.failure(pivots, multipliers))
     }
 }

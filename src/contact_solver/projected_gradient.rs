@@ -14,11 +14,11 @@ use crate::real::Real;
 /// gradient to y_i / W_ii and the inner products to Σ W_ii a_i b_i. L starts at 1 and is doubled where the step proves
 /// too long, up to a bound that always holds (the largest row sum).
 ///
-/// An iteration costs one product with W, O(n²), and the rows are independent of each other's order, unlike those of
-/// [`GaussSeidel`](super::GaussSeidel). It converges for every positive semi-definite W if the problem has a solution,
-/// hence with redundant rows too. Their y is then unique, the multipliers are not: with free rows only it finds the
-/// solution nearest to the guess in the norm √(Σ W_ii λ_i²), from zero the smallest one; with unilateral rows one near
-/// it, which depends on the guess.
+/// An iteration costs one product with W, O(n²), and the order of the rows does not matter, unlike in
+/// [`GaussSeidel`](super::GaussSeidel). Redundant rows do no harm: the acceleration converges for every positive
+/// semi-definite W if the problem has a solution (restarts save iterations; with them convergence is experience). y is
+/// then unique, the multipliers are not: with free rows only it finds the solution nearest to the guess in the norm
+/// √(Σ W_ii λ_i²), from zero the smallest one; with unilateral rows one near it, which depends on the guess.
 ///
 /// The acceptance rule is that of `GaussSeidel`, as is the treatment of the guess.
 ///
@@ -35,7 +35,7 @@ use crate::real::Real;
 ///     bounds: &[Bound::NonNegative; 2],
 ///     tolerance: &[1e-15; 2],
 /// };
-/// let mut lambda = [0.0; 2];
+/// let mut lambda = [0.0_f64; 2];
 /// ProjectedGradient::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] - 1.0).abs() < 1e-11 && (lambda[1] - 2.0).abs() < 1e-11);
 /// ```
