@@ -193,6 +193,24 @@ fn exact_and_gradient_solvers_bear_bad_condition() {
     }
 }
 
+/// Nearly dependent rows, free ones among them, and far more rows than rank: where rounding can mislead pivots.
+#[test]
+fn pivoting_bears_nearly_dependent_rows() {
+    let (mut numbers, mut solver) = (Random(12), Pivoting::default());
+    for case in 0..1500_usize {
+        let size = 1 + case % 60;
+        let columns = [6, size / 2 + 1, 3 * size / 4 + 1][case % 3];
+        let (problem, gaps) =
+            random(&mut numbers, size, (3 * size).div_ceil(5), columns, [0.0, 0.2, 0.5, 0.2][case % 4]);
+        let (found, pivots) =
+            solve(&mut solver, &problem, &vec![0.0; size]).unwrap_or_else(|e| panic!("case {case}: {e:?}"));
+        assert!(problem.residual(&found) <= 1e-12 && pivots <= 2 * size, "case {case}: {pivots} pivots");
+        for (y, expected) in problem.gaps(&found).iter().zip(&gaps) {
+            assert!((y - expected).abs() <= 1e-9 * problem.scale(), "case {case}: y {y:e}, not {expected:e}");
+        }
+    }
+}
+
 /// Small whole numbers, many of them zero: ties in every ratio, rows at λ = y = 0, equal and opposite rows.
 #[test]
 fn pivoting_solves_degenerate_problems() {
@@ -372,6 +390,8 @@ fn numbers_that_are_not_finite_are_refused() {
                 assert!(refused, "{name}: {failure:?}");
             }
         }
+        // Finite numbers, but λ would be 1e400.
+        assert!(solve(&mut *solver, &Problem::unilateral(&[1e-200], &[-1e200]), &[0.0]).is_err(), "{name}");
         // The memory is fit for use afterward.
         solve(&mut *solver, &problem, &[0.0; 6]).unwrap();
     }
