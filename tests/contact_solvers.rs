@@ -211,6 +211,20 @@ fn pivoting_bears_nearly_dependent_rows() {
     }
 }
 
+/// Two bilateral rows (1, 0) and (1, ε) hold (0, 1) with multipliers of 1/ε, known to eps/ε²: the contact must help.
+#[test]
+fn pivoting_shares_the_load_where_the_active_rows_know_too_little() {
+    for e in [1e-5, 1.3e-5, 1.7e-5, 2e-5, 3e-5, 5e-5] {
+        let problem = Problem {
+            bounds: vec![Bound::Free, Bound::Free, Bound::NonNegative],
+            ..Problem::<f64>::unilateral(&[1.0, 1.0, 0.0, 1.0, 1.0 + e * e, e, 0.0, e, 1.0], &[0.0, -0.7 * e, -0.7])
+        };
+        let (found, _) = solve(&mut Pivoting::default(), &problem, &[0.0; 3]).unwrap();
+        let y = problem.gaps(&found)[2];
+        assert!(y > -1e-12 && (found[2] == 0.0 || y < 1e-12), "{y:e} {found:?}");
+    }
+}
+
 /// Small whole numbers, many of them zero: ties in every ratio, rows at λ = y = 0, equal and opposite rows.
 #[test]
 fn pivoting_solves_degenerate_problems() {
@@ -420,7 +434,8 @@ fn problems_without_a_solution_are_refused() {
             let mut rows: Vec<Vec<f64>> =
                 (1..size).map(|_| (0..2 * size).map(|_| numbers.within(-1.0, 1.0)).collect()).collect();
             let mut offset: Vec<f64> = (1..size).map(|_| numbers.within(-1.0, 1.0)).collect();
-            let weights: Vec<f64> = (1..size).map(|_| numbers.within(0.1, 1.0)).collect();
+            // Rows without weight have no part in the contradiction.
+            let weights: Vec<f64> = (1..size).map(|_| (numbers.within(-0.5, 1.0)).max(0.0)).collect();
             let sum = |column: usize| weights.iter().zip(&rows).map(|(w, row)| w * row[column]).sum::<f64>();
             let opposite = (0..2 * size).map(|column| -sum(column)).collect();
             offset.push(-0.01 - weights.iter().zip(&offset).map(|(w, q)| w * q).sum::<f64>());
