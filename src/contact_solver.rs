@@ -1,8 +1,15 @@
 //! The complementarity problem of a step, and the seam for its solvers.
 
+mod acceptance;
 mod active_set;
+mod gauss_seidel;
+mod pivoting;
+mod projected_gradient;
 
 pub use active_set::ActiveSet;
+pub use gauss_seidel::GaussSeidel;
+pub use pivoting::Pivoting;
+pub use projected_gradient::ProjectedGradient;
 
 use crate::contact::ContactLaw;
 use crate::real::Real;

@@ -1,0 +1,137 @@
+//! When a contact problem counts as solved: the start, the acceptance rule and the failure that solvers share.
+
+use super::{Bound, ContactFailure, ContactProblem};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+impl Bound {
+    /// The admissible multiplier nearest to `multiplier`.
+    pub(super) fn project<T: Real>(self, multiplier: T) -> T {
+        match self {
+            Self::Free => multiplier,
+            Self::NonNegative => multiplier.max(T::zero()),
+        }
+    }
+}
+
+/// `start + x · y`.
+pub(super) fn dot<T: Real>(start: T, x: &[T], y: &[T]) -> T {
+    // Four sums: a single one would wait for each addition.
+    let (x, y) = (x.chunks_exact(4), y.chunks_exact(4));
+    let rest: T = x.remainder().iter().zip(y.remainder()).map(|(&x, &y)| x * y).sum();
+    let sums = x.zip(y).fold([T::zero(); 4], |[a, b, c, d], (x, y)| {
+        [a + x[0] * y[0], b + x[1] * y[1], c + x[2] * y[2], d + x[3] * y[3]]
+    });
+    start + ((sums[0] + sums[1]) + (sums[2] + sums[3]) + rest)
+}
+
+impl<'a, T: Real> ContactProblem<'a, T> {
+    /// Row i of W. W is symmetric: this is column i, which is contiguous.
+    pub(super) fn row(&self, i: usize) -> &'a [T] {
+        &self.delassus[i * self.size()..(i + 1) * self.size()]
+    }
+
+    /// y_i as [`gap`](Self::gap) gives it, but read along a column.
+    pub(super) fn row_gap(&self, i: usize, multipliers: &[T]) -> T {
+        dot(self.offset[i], self.row(i), multipliers)
+    }
+
+    /// By how much row i misses complementarity (unit of y); NaN if that is not finite.
+    fn miss(&self, i: usize, multipliers: &[T]) -> T {
+        let y = self.row_gap(i, multipliers);
+        match self.bounds[i] {
+            // `min` would prefer any number to NaN.
+            _ if !y.is_finite() => T::nan(),
+            Bound::Free => y.abs(),
+            Bound::NonNegative => y.min(self.delassus(i, i) * multipliers[i]).abs(),
+        }
+    }
+}
+
+/// How exactly, and how long, a solver tries.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Settings<T> {
+    /// The admissible residual, as a fraction of the largest |q_i|.
+    tolerance: T,
+    /// Iterations granted.
+    pub(super) iterations: usize,
+}
+
+impl<T: Real> Default for Settings<T> {
+    fn default() -> Self {
+        Self { tolerance: T::of(1e-12).max(T::of(8.0) * T::epsilon()), iterations: 10_000 }
+    }
+}
+
+impl<T: Real> Settings<T> {
+    pub(super) fn with_tolerance(self, tolerance: f64) -> Result<Self> {
+        match (0.0..1.0).contains(&tolerance) {
+            true => Ok(Self { tolerance: T::of(tolerance), ..self }),
+            false => Err(Error::Parameter { name: "tolerance", value: tolerance, range: "in [0, 1)" }),
+        }
+    }
+
+    /// Makes the guess admissible and refuses what no iteration could mend: numbers that are not finite, and rows
+    /// without W_ii whose y_i, which nothing can change, is wrong.
+    ///
+    /// λ = 0 is the guess wherever it is a solution, so that the scale of a guess cannot outlive its cause.
+    pub(super) fn begin<'a>(
+        &self,
+        problem: &'a ContactProblem<'a, T>,
+        multipliers: &mut [T],
+    ) -> std::result::Result<Acceptance<'a, T>, ContactFailure<T>> {
+        let finite = |i: &usize| problem.offset[*i].is_finite() && T::all_finite(problem.row(*i));
+        if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
+            return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
+        }
+        let scale = problem.offset.iter().fold(T::zero(), |scale, q| scale.max(q.abs()));
+        let accepted = self.tolerance * scale;
+        let at_rest = |(&q, &bound): (&T, &Bound)| if bound == Bound::Free { q == T::zero() } else { q >= T::zero() };
+        let open = problem.offset.iter().zip(problem.bounds).all(at_rest);
+        for (i, lambda) in multipliers.iter_mut().enumerate() {
+            let (q, bound) = (problem.offset[i], problem.bounds[i]);
+            let dead = problem.delassus(i, i) <= T::zero();
+            *lambda = if dead || open || !lambda.is_finite() { T::zero() } else { bound.project(*lambda) };
+            let miss = if bound == Bound::Free { q.abs() } else { -q };
+            if dead && miss > accepted.max(problem.tolerance[i]) {
+                return Err(ContactFailure::NotConverged { iterations: 0, row: i, residual: miss });
+            }
+        }
+        Ok(Acceptance { problem, accepted, suspect: 0 })
+    }
+}
+
+/// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given
+/// fraction of the largest |q_i|.
+///
+/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen.
+#[derive(Debug)]
+pub(super) struct Acceptance<'a, T> {
+    problem: &'a ContactProblem<'a, T>,
+    accepted: T,
+    /// The row that failed last, asked first: far from the solution one row costs the check.
+    suspect: usize,
+}
+
+impl<T: Real> Acceptance<'_, T> {
+    pub(super) fn accepts(&mut self, multipliers: &[T]) -> bool {
+        let fails = |i: &usize| {
+            let miss = self.problem.miss(*i, multipliers);
+            // NaN fails both.
+            let fine = miss <= self.accepted || miss <= self.problem.rounding(*i, multipliers);
+            !fine
+        };
+        let size = self.problem.size();
+        let failing = (self.suspect..size).chain(0..self.suspect).find(fails);
+        self.suspect = failing.unwrap_or(self.suspect);
+        failing.is_none()
+    }
+
+    /// The failure that names the worst row.
+    pub(super) fn failure(&self, iterations: usize, multipliers: &[T]) -> ContactFailure<T> {
+        let misses = (0..self.problem.size()).map(|i| (i, self.problem.miss(i, multipliers)));
+        let worse = |worst: (usize, T), x: (usize, T)| if x.1 > worst.1 || x.1.is_nan() { x } else { worst };
+        let (row, residual) = misses.fold((0, T::zero()), worse);
+        ContactFailure::NotConverged { iterations, row, residual }
+    }
+}

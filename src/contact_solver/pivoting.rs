@@ -1,0 +1,358 @@
+//! Principal pivoting: exact for every positive semi-definite W, and the proof where there is no solution.
+
+use super::acceptance::{Settings, dot};
+use super::gauss_seidel::sweep_rows;
+use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use crate::real::Real;
+
+/// Principal pivoting on the dense Delassus operator, redundant rows included: the reference solver.
+///
+/// The method of Dantzig, van de Panne and Whinston for symmetric W (Cottle, Pang and Stone, The Linear Complementarity
+/// Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). Free rows become active
+/// first. Then the row p that is violated most is driven: λ_p grows, the active rows keep y = 0, until
+///
+/// * y_p = 0: p becomes active, or
+/// * an active λ_j = 0: j leaves, and p is driven on, or
+/// * neither: λ grows along a direction d with W d = 0, qᵀ d < 0 and d ≥ 0 on unilateral rows. No λ makes y ≥ 0 then,
+///   as dᵀ y = dᵀ q: the problem has no solution, and p is named.
+///
+/// That is finite, and ties need no rule: rows leave at most until none is left, then p becomes active with λ_p > 0,
+/// and ½ λᵀ W λ + qᵀ λ has fallen. It is the minimum over the active rows, hence no active set comes twice. A row
+/// enters only where it is independent of the active ones, so the active block is positive definite for every
+/// semi-definite W, and its Cholesky factor is kept up to date row by row. Multipliers are solved for anew at each
+/// pivot from W and q, with iterative refinement; nothing drifts.
+///
+/// A pivot costs O(n²), a problem as a rule O(n³), with about a pivot for each active row; up to a few hundred rows. Of
+/// several solutions it finds a basic one: the rows with λ ≠ 0 are independent. Only if these are so nearly dependent
+/// that the residual is more than rounding, sweeps of Gauss–Seidel spread the load to the rows they imply. It does not
+/// use the guess, so the multipliers never depend on it.
+///
+/// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen,
+/// and limited); a row whose independence is rounding counts as dependent.
+///
+/// ```
+/// use contact_dynamics::contact_solver::{Bound, ContactProblem, ContactSolver, Pivoting};
+///
+/// // The same contact twice, and one that it repels.
+/// let w = [1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 2.0];
+/// let bounds = [Bound::NonNegative; 3];
+/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3] };
+/// let mut lambda = [0.0_f64; 3];
+/// Pivoting::default().solve(&problem, &mut lambda).unwrap();
+/// assert!((lambda[0] + lambda[1] - 1.5).abs() < 1e-15 && (lambda[2] - 0.5).abs() < 1e-15);
+/// assert!(lambda[0] == 0.0 || lambda[1] == 0.0);
+///
+/// // Two obstacles closer than the body is thick.
+/// let w = [1.0, -1.0, -1.0, 1.0];
+/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, 0.5], bounds: &bounds[..2], tolerance: &[1e-15; 2] };
+/// assert!(Pivoting::default().solve(&problem, &mut lambda[..2]).is_err());
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Pivoting<T = f64> {
+    basis: Basis<T>,
+    status: Vec<Status>,
+}
+
+/// Gauss–Seidel sweeps granted where the active block, though independent, is so badly conditioned that the rows it
+/// implies miss the acceptance rule: they share the load then, and the solution is not basic.
+const POLISH: usize = 1000;
+
+/// Where a row stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Status {
+    /// λ = 0.
+    Inactive,
+    /// λ = 0, and y = 0 to the rounding of the rows now active.
+    Implied,
+    /// y = 0.
+    Active,
+}
+
+/// The active rows, and the Cholesky factor of their block.
+#[derive(Clone, Debug, Default)]
+struct Basis<T> {
+    rows: Vec<usize>,
+    /// Row-major lower triangle; stride = size of the problem.
+    factor: Vec<T>,
+    stride: usize,
+    /// Of the row that is driven: its row of the factor, if it entered.
+    entry: Vec<T>,
+    /// Change of the active multipliers for a unit change of the driven one.
+    direction: Vec<T>,
+    right: Vec<T>,
+}
+
+/// How the gap of the driven row answers to its multiplier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Response<T> {
+    /// ∂y_p/∂λ_p; zero if the row depends on the active ones.
+    slope: T,
+    /// What of the direction's entries, times √W_jj, is rounding.
+    noise: T,
+}
+
+impl<T: Real> Basis<T> {
+    fn reserve(&mut self, size: usize) {
+        self.rows = Vec::with_capacity(size);
+        self.factor = Vec::with_capacity(size * size);
+        self.entry = Vec::with_capacity(size);
+        self.direction = Vec::with_capacity(size);
+        self.right = Vec::with_capacity(size);
+    }
+
+    fn clear(&mut self, size: usize) {
+        self.rows.clear();
+        self.factor.clear();
+        self.factor.resize(size * size, T::zero());
+        self.stride = size;
+    }
+
+    /// L⁻¹ b in place.
+    fn forward(factor: &[T], stride: usize, b: &mut [T]) {
+        for i in 0..b.len() {
+            let row = &factor[i * stride..=i * stride + i];
+            b[i] = (b[i] - dot(T::zero(), &row[..i], &b[..i])) / row[i];
+        }
+    }
+
+    /// L⁻ᵀ b in place.
+    fn backward(factor: &[T], stride: usize, b: &mut [T]) {
+        for i in (0..b.len()).rev() {
+            let row = &factor[i * stride..=i * stride + i];
+            b[i] /= row[i];
+            let x = b[i];
+            for (b, &l) in b[..i].iter_mut().zip(row) {
+                *b -= l * x;
+            }
+        }
+    }
+
+    /// Prepares to drive row p.
+    fn drive(&mut self, problem: &ContactProblem<'_, T>, p: usize) -> Response<T> {
+        let Self { rows, factor, stride, entry, direction, .. } = self;
+        let row = problem.row(p);
+        entry.clear();
+        entry.extend(rows.iter().map(|&j| row[j]));
+        Self::forward(factor, *stride, entry);
+        direction.clear();
+        direction.extend(entry.iter().map(|&x| -x));
+        Self::backward(factor, *stride, direction);
+        // The slope is rᵀ W r with r = (direction, 1): the rounding of W comes out multiplied with r twice.
+        let slope = row[p] - dot(T::zero(), entry, entry);
+        let size = |(&j, r): (&usize, &T)| problem.delassus(j, j).sqrt() * r.abs();
+        let length = row[p].sqrt() + rows.iter().zip(direction.iter()).map(size).sum::<T>();
+        let dependent = slope <= T::of(32.0) * T::epsilon() * length * length;
+        // A direction is known to the rounding of W times its condition; a pivot on less would invent huge multipliers.
+        Response {
+            slope: if dependent { T::zero() } else { slope },
+            noise: T::epsilon().powf(T::of(2.0 / 3.0)) * length,
+        }
+    }
+
+    /// All independent free rows become active: Cholesky with diagonal pivoting, the most independent row first.
+    ///
+    /// The rows left out are combinations of these; whether their q agrees is for the acceptance rule to say.
+    fn enter_free(&mut self, problem: &ContactProblem<'_, T>) {
+        let Self { rows, factor, stride, right: rest, .. } = self;
+        let is_free = |&i: &usize| problem.bounds[i] == Bound::Free && problem.delassus(i, i) > T::zero();
+        rows.extend((0..problem.size()).filter(is_free));
+        rest.clear();
+        rest.extend(rows.iter().map(|&i| problem.delassus(i, i)));
+        for k in 0..rows.len() {
+            let share = |at: usize| rest[at] / problem.delassus(rows[at], rows[at]);
+            let best = (k + 1..rows.len()).fold(k, |best, at| if share(at) > share(best) { at } else { best });
+            if share(best) <= T::of(16.0 * problem.size() as f64) * T::epsilon() {
+                rows.truncate(k);
+                return;
+            }
+            rows.swap(k, best);
+            rest.swap(k, best);
+            for c in 0..k {
+                factor.swap(k * *stride + c, best * *stride + c);
+            }
+            let pivot = rest[k].sqrt();
+            factor[k * *stride + k] = pivot;
+            for i in k + 1..rows.len() {
+                let (done, below) = factor.split_at_mut(i * *stride);
+                let done = &done[k * *stride..k * *stride + k];
+                let entry = (problem.delassus(rows[i], rows[k]) - dot(T::zero(), done, &below[..k])) / pivot;
+                below[k] = entry;
+                rest[i] -= entry * entry;
+            }
+        }
+    }
+
+    /// The driven row becomes active.
+    fn enter(&mut self, p: usize, slope: T) {
+        let start = self.rows.len() * self.stride;
+        let row = self.factor[start..].iter_mut();
+        for (l, &x) in row.zip(self.entry.iter().chain(std::iter::once(&slope.sqrt()))) {
+            *l = x;
+        }
+        self.rows.push(p);
+    }
+
+    /// The k-th active row leaves: its row of the factor is dropped, and rotations restore the triangle.
+    fn leave(&mut self, k: usize) -> usize {
+        let Self { rows, factor, stride, .. } = self;
+        let row = rows.remove(k);
+        let last = rows.len();
+        for i in k..last {
+            let below = (i + 1) * *stride;
+            factor.copy_within(below..=below + i + 1, i * *stride);
+        }
+        for c in k..last {
+            let (a, b) = (factor[c * *stride + c], factor[c * *stride + c + 1]);
+            let length = a.hypot(b);
+            let (cosine, sine) = (a / length, b / length);
+            for i in c..last {
+                let at = i * *stride + c;
+                let (x, y) = (factor[at], factor[at + 1]);
+                factor[at] = cosine * x + sine * y;
+                factor[at + 1] = cosine * y - sine * x;
+            }
+        }
+        row
+    }
+
+    /// Solves y = 0 on the active rows; the other multipliers stay.
+    fn close(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) {
+        let Self { rows, factor, stride, right, .. } = self;
+        // The second pass is iterative refinement.
+        for _ in 0..2 {
+            right.clear();
+            right.extend(rows.iter().map(|&i| problem.row_gap(i, multipliers)));
+            Self::forward(factor, *stride, right);
+            Self::backward(factor, *stride, right);
+            for (&i, &correction) in rows.iter().zip(right.iter()) {
+                multipliers[i] -= correction;
+            }
+        }
+    }
+
+    /// What of y_p is rounding: its own, and that of the active rows as their multipliers carry it over.
+    fn rounding(&self, problem: &ContactProblem<'_, T>, p: usize, multipliers: &[T]) -> T {
+        let carried = self.rows.iter().zip(&self.direction).map(|(&j, r)| r.abs() * problem.rounding(j, multipliers));
+        problem.rounding(p, multipliers) + carried.sum::<T>()
+    }
+
+    /// How far λ_p can grow before an active multiplier is zero, and which (by position).
+    fn blocking(&self, problem: &ContactProblem<'_, T>, noise: T, multipliers: &[T]) -> Option<(usize, T)> {
+        let mut first: Option<(usize, T, T)> = None;
+        for (k, (&j, &r)) in self.rows.iter().zip(&self.direction).enumerate() {
+            let pivot = -r * problem.delassus(j, j).sqrt();
+            if problem.bounds[j] == Bound::NonNegative && pivot > noise {
+                let step = multipliers[j].max(T::zero()) / -r;
+                // Of ties the largest pivot, for accuracy.
+                if first.is_none_or(|(_, least, largest)| step < least || (step == least && pivot > largest)) {
+                    first = Some((k, step, pivot));
+                }
+            }
+        }
+        first.map(|(k, step, _)| (k, step))
+    }
+}
+
+impl<T: Real> Pivoting<T> {
+    /// The row that is violated most, measured in √W_ii.
+    fn violated(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> Option<usize> {
+        let mut worst: Option<(usize, T)> = None;
+        for i in 0..problem.size() {
+            let diagonal = problem.delassus(i, i);
+            if problem.bounds[i] == Bound::NonNegative && self.status[i] == Status::Inactive && diagonal > T::zero() {
+                let y = problem.row_gap(i, multipliers);
+                let scaled = y / diagonal.sqrt();
+                if worst.is_none_or(|(_, least)| scaled < least) && y < -problem.rounding(i, multipliers) {
+                    worst = Some((i, scaled));
+                }
+            }
+        }
+        worst.map(|(i, _)| i)
+    }
+
+    /// Drives row p until it is active, or found to be implied; `pivots` counts on, up to `limit`.
+    fn drive(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        p: usize,
+        multipliers: &mut [T],
+        pivots: &mut usize,
+        limit: usize,
+    ) -> Result<(), ContactFailure<T>> {
+        let Self { basis, status } = self;
+        while *pivots < limit {
+            let Response { slope, noise } = basis.drive(problem, p);
+            let y = problem.row_gap(p, multipliers);
+            if multipliers[p] == T::zero() && y >= -basis.rounding(problem, p, multipliers) {
+                status[p] = Status::Implied;
+                return Ok(());
+            }
+            *pivots += 1;
+            let closing = (slope > T::zero()).then(|| (-y / slope).max(T::zero()));
+            let blocking = basis.blocking(problem, if closing.is_some() { T::zero() } else { noise }, multipliers);
+            match (closing, blocking) {
+                (None, None) => {
+                    return Err(ContactFailure::NotConverged { iterations: *pivots, row: p, residual: -y });
+                }
+                (closing, Some((k, step))) if closing.is_none_or(|closing| step < closing) => {
+                    multipliers[p] += step;
+                    let row = basis.leave(k);
+                    multipliers[row] = T::zero();
+                    status[row] = Status::Inactive;
+                    basis.close(problem, multipliers);
+                }
+                (_, _) => {
+                    basis.enter(p, slope);
+                    status[p] = Status::Active;
+                    basis.close(problem, multipliers);
+                    // Another active set: what the old one implied is open again.
+                    for status in status.iter_mut().filter(|status| **status == Status::Implied) {
+                        *status = Status::Inactive;
+                    }
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real> ContactSolver<T> for Pivoting<T> {
+    fn reserve(&mut self, size: usize) {
+        self.basis.reserve(size);
+        self.status = Vec::with_capacity(size);
+    }
+
+    fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
+        let size = problem.size();
+        multipliers.fill(T::zero());
+        let mut acceptance = Settings::default().begin(problem, multipliers)?;
+        self.basis.clear(size);
+        self.status.clear();
+        self.status.resize(size, Status::Inactive);
+        self.basis.enter_free(problem);
+        self.basis.close(problem, multipliers);
+        for &row in &self.basis.rows {
+            self.status[row] = Status::Active;
+        }
+        let mut pivots = self.basis.rows.len();
+        // Far above anything seen.
+        let limit = 100 + 20 * size;
+        while pivots < limit {
+            match self.violated(problem, multipliers) {
+                Some(p) => self.drive(problem, p, multipliers, &mut pivots, limit)?,
+                None => break,
+            }
+        }
+        for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {
+            *lambda = bound.project(*lambda);
+        }
+        for _ in 0..POLISH {
+            if acceptance.accepts(multipliers) {
+                return Ok(pivots);
+            }
+            sweep_rows(problem, T::one(), multipliers);
+        }
+        Err(acceptance.failure(pivots, multipliers))
+    }
+}
