@@ -12,6 +12,7 @@ pub use pivoting::Pivoting;
 pub use projected_gradient::ProjectedGradient;
 
 use crate::contact::ContactLaw;
+use crate::dense::dot;
 use crate::real::Real;
 
 /// What the multiplier of a row may be.
@@ -52,7 +53,7 @@ pub struct ContactProblem<'a, T> {
     pub version: u64,
 }
 
-impl<T: Real> ContactProblem<'_, T> {
+impl<'a, T: Real> ContactProblem<'a, T> {
     /// Number of rows.
     pub fn size(&self) -> usize {
         self.offset.len()
@@ -64,13 +65,13 @@ impl<T: Real> ContactProblem<'_, T> {
     }
 
     /// Row i of W, which is symmetric: its column i.
-    pub fn row(&self, i: usize) -> &[T] {
+    pub fn row(&self, i: usize) -> &'a [T] {
         &self.delassus[i * self.size()..(i + 1) * self.size()]
     }
 
     /// `y_i = (W λ + q)_i`.
     pub fn gap(&self, i: usize, multipliers: &[T]) -> T {
-        self.row(i).iter().zip(multipliers).fold(self.offset[i], |y, (&w, &lambda)| y + w * lambda)
+        self.offset[i] + dot(self.row(i), multipliers)
     }
 
     /// What of y_i is rounding: its tolerance, and that of the sum `(W λ + q)_i` itself.

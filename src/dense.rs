@@ -48,7 +48,7 @@ impl<T: Real> DenseCholesky<T> {
             diagonal: Vec::with_capacity(size),
             independent: Vec::with_capacity(size),
             kind: Kind::Skyline,
-            normal: Vec::new(),
+            normal: Vec::with_capacity(size * size),
             reduced: Vec::with_capacity(size),
             scratch,
         }
@@ -203,7 +203,7 @@ impl<T: Real> DenseCholesky<T> {
 }
 
 /// Σ x y in four partial sums, which the processor can work on at once.
-fn dot<T: Real>(x: &[T], y: &[T]) -> T {
+pub(crate) fn dot<T: Real>(x: &[T], y: &[T]) -> T {
     let (mut sums, split) = ([T::zero(); 4], x.len() - x.len() % 4);
     for (x, y) in x[..split].chunks_exact(4).zip(y[..split].chunks_exact(4)) {
         for k in 0..4 {

@@ -40,7 +40,7 @@ impl<T: Real> Problem<T> {
 
     fn view(&self) -> ContactProblem<'_, T> {
         let Self { delassus, offset, bounds, tolerance } = self;
-        ContactProblem { delassus, offset, bounds, tolerance }
+        ContactProblem { delassus, offset, bounds, tolerance, version: 0 }
     }
 
     fn gaps(&self, multipliers: &[T]) -> Vec<T> {
@@ -131,13 +131,8 @@ fn general<T: Real>() -> Vec<Listed<T>> {
         ("relaxed Gauss-Seidel", Box::new(GaussSeidel::new(1.3).unwrap().sweeps(SWEEPS)), 1e-9),
         ("projected gradient", Box::new(ProjectedGradient::default()), 1e-9),
         ("pivoting", Box::new(Pivoting::default()), 1e-12),
+        ("active set", Box::new(ActiveSet::default()), 1e-12),
     ]
-}
-
-fn all<T: Real>() -> Vec<Listed<T>> {
-    let mut solvers = general();
-    solvers.push(("active set", Box::new(ActiveSet::default()), 1e-12));
-    solvers
 }
 
 fn assert_solves(listed: &mut Listed<f64>, problem: &Problem, gaps: &[f64], guess: &[f64]) {
@@ -154,7 +149,7 @@ fn assert_solves(listed: &mut Listed<f64>, problem: &Problem, gaps: &[f64], gues
 
 #[test]
 fn solvers_agree_on_independent_rows() {
-    let (mut numbers, mut solvers) = (Random(1), all());
+    let (mut numbers, mut solvers) = (Random(1), general());
     for size in 1..=40 {
         for free in [0.0, 0.3] {
             let (problem, gaps) = random(&mut numbers, size, size, 2 * size + 2, free);
@@ -343,7 +338,13 @@ fn guess_does_not_change_the_result() {
         for (name, mut solver, _) in general::<f64>() {
             let (solution, cold) = solve(&mut *solver, &problem, &vec![0.0; size]).unwrap();
             let (_, warm) = solve(&mut *solver, &problem, &solution).unwrap();
-            assert!(warm == if name == "pivoting" { cold } else { 0 }, "{name}: {warm} after {cold}");
+            // Pivoting starts anew, the active set makes sure.
+            let fine = match name {
+                "pivoting" => warm == cold,
+                "active set" => warm == 1 || rank < size && warm <= cold + 1,
+                _ => warm == 0,
+            };
+            assert!(fine, "{name}: {warm} after {cold}");
         }
     }
 }
@@ -378,7 +379,7 @@ fn single_precision_runs() {
                 assert!(problem.residual(&found) < 5e-5, "{name}: {:e}", problem.residual(&found));
                 for (&y, gap) in problem.gaps(&found).iter().zip(&gaps) {
                     let error = (f64::from(y) - gap).abs() / exact.scale();
-                    assert!(error < 1e-4, "{name}: {error:e}");
+                    assert!(error < 2e-4, "{name}: {error:e}");
                 }
             }
         }
@@ -418,8 +419,10 @@ fn problems_without_a_solution_are_refused() {
         ("Gauss-Seidel", Box::new(GaussSeidel::default().sweeps(300)), 0.0),
         ("projected gradient", Box::new(ProjectedGradient::default().iterations(300)), 0.0),
         ("pivoting", Box::new(Pivoting::default()), 0.0),
+        ("active set", Box::new(ActiveSet::default()), 0.0),
     ];
     for (name, solver, _) in &mut solvers {
+        let exact = matches!(*name, "pivoting" | "active set");
         // Nothing acts on the second row, and it is closed.
         let stuck = Problem::unilateral(&[1.0, 0.0, 0.0, 0.0], &[-1.0, -2.0]);
         let failure = solve(&mut **solver, &stuck, &[0.0; 2]);
@@ -435,14 +438,17 @@ fn problems_without_a_solution_are_refused() {
                 (1..size).map(|_| (0..2 * size).map(|_| numbers.within(-1.0, 1.0)).collect()).collect();
             let mut offset: Vec<f64> = (1..size).map(|_| numbers.within(-1.0, 1.0)).collect();
             // Rows without weight have no part in the contradiction.
-            let weights: Vec<f64> = (1..size).map(|_| (numbers.within(-0.5, 1.0)).max(0.0)).collect();
+            let mut weights: Vec<f64> = (1..size).map(|_| (numbers.within(-0.5, 1.0)).max(0.0)).collect();
+            weights[0] += 0.1;
             let sum = |column: usize| weights.iter().zip(&rows).map(|(w, row)| w * row[column]).sum::<f64>();
             let opposite = (0..2 * size).map(|column| -sum(column)).collect();
             offset.push(-0.01 - weights.iter().zip(&offset).map(|(w, q)| w * q).sum::<f64>());
             rows.push(opposite);
             let problem = Problem::unilateral(&gram(&rows), &offset);
             let failure = solve(&mut **solver, &problem, &vec![0.0; size]);
-            assert!(matches!(failure, Err(ContactFailure::NotConverged { .. })), "{name}: {failure:?}");
+            // The exact solvers say that there is no solution, the iterative ones that they have found none.
+            let told = matches!(failure, Err(ContactFailure::Contradictory { row, other, .. }) if row != other);
+            assert!(failure.is_err() && told == exact, "{name}: {failure:?}");
         }
     }
 }

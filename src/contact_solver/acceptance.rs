@@ -14,31 +14,10 @@ impl Bound {
     }
 }
 
-/// `start + x · y`.
-pub(super) fn dot<T: Real>(start: T, x: &[T], y: &[T]) -> T {
-    // Four sums: a single one would wait for each addition.
-    let (x, y) = (x.chunks_exact(4), y.chunks_exact(4));
-    let rest: T = x.remainder().iter().zip(y.remainder()).map(|(&x, &y)| x * y).sum();
-    let sums = x.zip(y).fold([T::zero(); 4], |[a, b, c, d], (x, y)| {
-        [a + x[0] * y[0], b + x[1] * y[1], c + x[2] * y[2], d + x[3] * y[3]]
-    });
-    start + ((sums[0] + sums[1]) + (sums[2] + sums[3]) + rest)
-}
-
-impl<'a, T: Real> ContactProblem<'a, T> {
-    /// Row i of W. W is symmetric: this is column i, which is contiguous.
-    pub(super) fn row(&self, i: usize) -> &'a [T] {
-        &self.delassus[i * self.size()..(i + 1) * self.size()]
-    }
-
-    /// y_i as [`gap`](Self::gap) gives it, but read along a column.
-    pub(super) fn row_gap(&self, i: usize, multipliers: &[T]) -> T {
-        dot(self.offset[i], self.row(i), multipliers)
-    }
-
+impl<T: Real> ContactProblem<'_, T> {
     /// By how much row i misses complementarity (unit of y); NaN if that is not finite.
     fn miss(&self, i: usize, multipliers: &[T]) -> T {
-        let y = self.row_gap(i, multipliers);
+        let y = self.gap(i, multipliers);
         match self.bounds[i] {
             // `min` would prefer any number to NaN.
             _ if !y.is_finite() => T::nan(),

@@ -1,5 +1,6 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
+use super::acceptance::Settings;
 use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
@@ -46,18 +47,71 @@ enum Exchanges {
     Stuck(usize),
 }
 
+/// Which problem the exchanges solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// W λ + q.
+    Given,
+    /// (W + shift) λ + offset.
+    Proximal,
+}
+
+/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding.
+fn judge<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    (offset, shift, form): (&[T], &[T], Form),
+    (rows, solution): (&[usize], &[T]),
+    y: &mut Vec<T>,
+    own: &mut Vec<T>,
+    noise: &mut Vec<T>,
+) {
+    // y = W λ + q and Σ |W λ|, column by column.
+    y.clear();
+    y.extend_from_slice(offset);
+    own.clear();
+    own.extend(offset.iter().map(|q| q.abs()));
+    for (&j, &lambda) in rows.iter().zip(solution) {
+        for ((&w, y), own) in problem.row(j).iter().zip(y.iter_mut()).zip(own.iter_mut()) {
+            *y += w * lambda;
+            *own += (w * lambda).abs();
+        }
+        if form == Form::Proximal {
+            y[j] += shift[j] * lambda;
+        }
+    }
+    for (own, &tolerance) in own.iter_mut().zip(problem.tolerance) {
+        *own = tolerance + T::of(32.0) * T::epsilon() * *own;
+    }
+    // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a body
+    // at rest beside a body under load must not be judged by its own small numbers.
+    noise.clear();
+    noise.extend_from_slice(own);
+    for (j, &own) in own.iter().enumerate() {
+        let row = problem.row(j);
+        let carried = own / row[j];
+        if carried > T::zero() && carried.is_finite() {
+            for (i, (&w, noise)) in row.iter().zip(noise.iter_mut()).enumerate() {
+                if i != j {
+                    *noise += w.abs() * carried;
+                }
+            }
+        }
+    }
+}
+
 impl<T: Real> ActiveSet<T> {
-    /// Exchanges rows until no sign is violated. With `proximal` the problem is W + shift, offset instead of q.
+    /// Exchanges rows until no sign is violated.
     fn exchange(
         &mut self,
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
-        proximal: bool,
+        form: Form,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
         let Self { factor, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
+        let proximal = form == Form::Proximal;
         let offset: &[T] = if proximal { offset } else { problem.offset };
         let (mut fewest, mut tries) = (usize::MAX, BLOCK_TRIES);
         // Single exchanges are finite but may be many; this bound is far above anything seen.
@@ -86,38 +140,10 @@ impl<T: Real> ActiveSet<T> {
             for (&i, &lambda) in rows.iter().zip(solution.iter()) {
                 multipliers[i] = lambda;
             }
-            // y = W λ + q and Σ |W λ|, column by column.
-            y.clear();
-            y.extend_from_slice(offset);
-            own.clear();
-            own.extend(offset.iter().map(|q| q.abs()));
-            for (&j, &lambda) in rows.iter().zip(solution.iter()) {
-                for ((&w, y), own) in problem.row(j).iter().zip(y.iter_mut()).zip(own.iter_mut()) {
-                    *y += w * lambda;
-                    *own += (w * lambda).abs();
-                }
-                if proximal {
-                    y[j] += shift[j] * lambda;
-                }
+            if let Some(row) = multipliers.iter().position(|lambda| !lambda.is_finite()) {
+                return Err(ContactFailure::NotConverged { iterations: iteration, row, residual: T::nan() });
             }
-            for (own, &tolerance) in own.iter_mut().zip(problem.tolerance) {
-                *own = tolerance + T::of(32.0) * T::epsilon() * *own;
-            }
-            // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of
-            // a body at rest beside a body under load must not be judged by its own small numbers.
-            noise.clear();
-            noise.extend_from_slice(own);
-            for (j, &own) in own.iter().enumerate() {
-                let row = problem.row(j);
-                let carried = own / row[j];
-                if carried > T::zero() && carried.is_finite() {
-                    for (i, (&w, noise)) in row.iter().zip(noise.iter_mut()).enumerate() {
-                        if i != j {
-                            *noise += w.abs() * carried;
-                        }
-                    }
-                }
-            }
+            judge(problem, (offset, shift, form), (rows, solution), y, own, noise);
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets go,
             // one that is left violated waits for the others.
             let open = |i: usize| factor.is_singular() && y[i] > noise[i];
@@ -184,7 +210,7 @@ impl<T: Real> ActiveSet<T> {
             self.offset.clear();
             let pulled = problem.offset.iter().zip(&self.shift).zip(&self.center);
             self.offset.extend(pulled.map(|((&q, &d), &c)| q - d * c));
-            match self.exchange(problem, multipliers, true)? {
+            match self.exchange(problem, multipliers, Form::Proximal)? {
                 Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
             }
             let (row, residual) = problem.residual(multipliers);
@@ -227,7 +253,11 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     }
 
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
-        match self.exchange(problem, multipliers, false)? {
+        if problem.size() == 0 {
+            return Ok(0);
+        }
+        Settings::default().begin(problem, multipliers)?;
+        match self.exchange(problem, multipliers, Form::Given)? {
             Exchanges::Solved(iterations) => Ok(iterations),
             Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, iterations),
         }

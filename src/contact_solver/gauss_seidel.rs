@@ -35,6 +35,7 @@ use crate::real::Real;
 ///     offset: &[-3.0, -3.0],
 ///     bounds: &[Bound::NonNegative; 2],
 ///     tolerance: &[1e-15; 2],
+///     version: 0,
 /// };
 /// let mut lambda = [0.0_f64; 2];
 /// GaussSeidel::default().solve(&problem, &mut lambda).unwrap();
@@ -87,7 +88,7 @@ pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, mul
     for i in 0..problem.size() {
         let diagonal = problem.delassus(i, i);
         if diagonal > T::zero() {
-            let correction = omega * problem.row_gap(i, multipliers) / diagonal;
+            let correction = omega * problem.gap(i, multipliers) / diagonal;
             multipliers[i] = problem.bounds[i].project(multipliers[i] - correction);
         }
     }

@@ -1,8 +1,9 @@
 //! Principal pivoting: exact for every positive semi-definite W, and the proof where there is no solution.
 
-use super::acceptance::{Settings, dot};
+use super::acceptance::Settings;
 use super::gauss_seidel::sweep_rows;
 use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use crate::dense::dot;
 use crate::real::Real;
 
 /// Principal pivoting on the dense Delassus operator, redundant rows included: the reference solver.
@@ -36,7 +37,7 @@ use crate::real::Real;
 /// // The same contact twice, and one that it repels.
 /// let w = [1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 2.0];
 /// let bounds = [Bound::NonNegative; 3];
-/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3] };
+/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3], version: 0 };
 /// let mut lambda = [0.0_f64; 3];
 /// Pivoting::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 1.5).abs() < 1e-15 && (lambda[2] - 0.5).abs() < 1e-15);
@@ -44,7 +45,7 @@ use crate::real::Real;
 ///
 /// // Two obstacles closer than the body is thick.
 /// let w = [1.0, -1.0, -1.0, 1.0];
-/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, 0.5], bounds: &bounds[..2], tolerance: &[1e-15; 2] };
+/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, 0.5], bounds: &bounds[..2], tolerance: &[1e-15; 2], version: 0 };
 /// assert!(Pivoting::default().solve(&problem, &mut lambda[..2]).is_err());
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -111,7 +112,7 @@ impl<T: Real> Basis<T> {
     fn forward(factor: &[T], stride: usize, b: &mut [T]) {
         for i in 0..b.len() {
             let row = &factor[i * stride..=i * stride + i];
-            b[i] = (b[i] - dot(T::zero(), &row[..i], &b[..i])) / row[i];
+            b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
         }
     }
 
@@ -138,7 +139,7 @@ impl<T: Real> Basis<T> {
         direction.extend(entry.iter().map(|&x| -x));
         Self::backward(factor, *stride, direction);
         // The slope is rᵀ W r with r = (direction, 1): the rounding of W comes out multiplied with r twice.
-        let slope = row[p] - dot(T::zero(), entry, entry);
+        let slope = row[p] - dot(entry, entry);
         let size = |(&j, r): (&usize, &T)| problem.delassus(j, j).sqrt() * r.abs();
         let length = row[p].sqrt() + rows.iter().zip(direction.iter()).map(size).sum::<T>();
         let dependent = slope <= T::of(32.0) * T::epsilon() * length * length;
@@ -175,7 +176,7 @@ impl<T: Real> Basis<T> {
             for i in k + 1..rows.len() {
                 let (done, below) = factor.split_at_mut(i * *stride);
                 let done = &done[k * *stride..k * *stride + k];
-                let entry = (problem.delassus(rows[i], rows[k]) - dot(T::zero(), done, &below[..k])) / pivot;
+                let entry = (problem.delassus(rows[i], rows[k]) - dot(done, &below[..k])) / pivot;
                 below[k] = entry;
                 rest[i] -= entry * entry;
             }
@@ -221,7 +222,7 @@ impl<T: Real> Basis<T> {
         // The second pass is iterative refinement.
         for _ in 0..2 {
             right.clear();
-            right.extend(rows.iter().map(|&i| problem.row_gap(i, multipliers)));
+            right.extend(rows.iter().map(|&i| problem.gap(i, multipliers)));
             Self::forward(factor, *stride, right);
             Self::backward(factor, *stride, right);
             for (&i, &correction) in rows.iter().zip(right.iter()) {
@@ -234,6 +235,13 @@ impl<T: Real> Basis<T> {
     fn rounding(&self, problem: &ContactProblem<'_, T>, p: usize, multipliers: &[T]) -> T {
         let carried = self.rows.iter().zip(&self.direction).map(|(&j, r)| r.abs() * problem.rounding(j, multipliers));
         problem.rounding(p, multipliers) + carried.sum::<T>()
+    }
+
+    /// The active row that presses hardest against the driven one.
+    fn opponent(&self, problem: &ContactProblem<'_, T>, p: usize) -> usize {
+        let size = |k: usize| self.direction[k].abs() * problem.delassus(self.rows[k], self.rows[k]).sqrt();
+        let hardest = (0..self.rows.len()).reduce(|hardest, k| if size(k) > size(hardest) { k } else { hardest });
+        hardest.map_or(p, |k| self.rows[k])
     }
 
     /// How far λ_p can grow before an active multiplier is zero, and which (by position).
@@ -260,7 +268,7 @@ impl<T: Real> Pivoting<T> {
         for i in 0..problem.size() {
             let diagonal = problem.delassus(i, i);
             if problem.bounds[i] == Bound::NonNegative && self.status[i] == Status::Inactive && diagonal > T::zero() {
-                let y = problem.row_gap(i, multipliers);
+                let y = problem.gap(i, multipliers);
                 let scaled = y / diagonal.sqrt();
                 if worst.is_none_or(|(_, least)| scaled < least) && y < -problem.rounding(i, multipliers) {
                     worst = Some((i, scaled));
@@ -282,7 +290,7 @@ impl<T: Real> Pivoting<T> {
         let Self { basis, status } = self;
         while *pivots < limit {
             let Response { slope, noise } = basis.drive(problem, p);
-            let y = problem.row_gap(p, multipliers);
+            let y = problem.gap(p, multipliers);
             if multipliers[p] == T::zero() && y >= -basis.rounding(problem, p, multipliers) {
                 status[p] = Status::Implied;
                 return Ok(());
@@ -292,7 +300,11 @@ impl<T: Real> Pivoting<T> {
             let blocking = basis.blocking(problem, if closing.is_some() { T::zero() } else { noise }, multipliers);
             match (closing, blocking) {
                 (None, None) => {
-                    return Err(ContactFailure::NotConverged { iterations: *pivots, row: p, residual: -y });
+                    return Err(ContactFailure::Contradictory {
+                        row: p,
+                        other: basis.opponent(problem, p),
+                        residual: -y,
+                    });
                 }
                 (closing, Some((k, step))) if closing.is_none_or(|closing| step < closing) => {
                     multipliers[p] += step;

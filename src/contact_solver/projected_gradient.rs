@@ -34,6 +34,7 @@ use crate::real::Real;
 ///     offset: &[-4.0, -5.0],
 ///     bounds: &[Bound::NonNegative; 2],
 ///     tolerance: &[1e-15; 2],
+///     version: 0,
 /// };
 /// let mut lambda = [0.0_f64; 2];
 /// ProjectedGradient::default().solve(&problem, &mut lambda).unwrap();
@@ -138,7 +139,7 @@ impl<T: Real> Memory<T> {
 /// y = W λ + q.
 fn evaluate<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T], gaps: &mut [T]) {
     for (i, y) in gaps.iter_mut().enumerate() {
-        *y = problem.row_gap(i, multipliers);
+        *y = problem.gap(i, multipliers);
     }
 }
 
