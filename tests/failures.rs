@@ -1,7 +1,7 @@
 //! Wrong inputs: a typed error with the numbers, never a panic, and a failed step that leaves everything as it was.
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
-use contact_dynamics::contact::{ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapOffset};
+use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{Row, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{

@@ -189,7 +189,7 @@ fn a_body_rests_on_a_table_that_shakes() {
 fn bodies_far_away_are_no_candidates_and_cost_no_contact_problem() {
     // A ball flies over another one, in reach for a short time only.
     let ball = Sphere::new([0.0, 0.0, -1.0], 1.0, Side::Outside).unwrap();
-    let nodes: Vec<_> = (0..30).map(|i| node([-3.0 - 0.1 * f64::from(i), 0.0, 0.01], i as usize)).collect();
+    let nodes: Vec<_> = (0..30).map(|i| node([-3.0 - 0.1 * i as f64, 0.0, 0.01], i)).collect();
     let contact = NodesOnObstacle::new(ball, nodes).unwrap().reach(0.2).unwrap();
     let velocity: Vec<f64> = (0..90).map(|dof| if dof % 3 == 0 { 1.0 } else { 0.0 }).collect();
     let mut run = Simulation::builder(particles::<3>(30, 0.0), Composite, 0.01)

@@ -9,6 +9,7 @@ pub mod schemes;
 pub mod solids;
 pub mod springs;
 pub mod tables;
+pub mod wall_bar;
 
 pub use bars::{Bars, MassKind};
 pub use measure::{Figures, Record, record};
