@@ -18,6 +18,43 @@ fn main() {
     for n in sizes {
         measure(n);
     }
+    plate();
+}
+
+/// Ten thousand candidates, five hundred of them pressed: a thick plate on a floor, loaded in the middle.
+fn plate() {
+    let cells = [100, 100, 4];
+    let size = [10.0, 10.0, 0.4];
+    let plate = Solid::block(size, cells, MATERIAL);
+    let h = 2.0 * size[0] / cells[0] as f64 / MATERIAL.wave_speed();
+    let bottom: Vec<usize> = plate.surface_nodes().into_iter().filter(|&node| plate.nodes[node][2] == 0.0).collect();
+    let candidates: Vec<usize> = bottom.iter().map(|&node| Solid::<3>::dof(node, 2)).collect();
+    // A saucer: only the nodes near the middle touch.
+    let gap = |node: usize| {
+        let [x, y, _] = plate.nodes[node];
+        let square = (x - 5.0).powi(2) + (y - 5.0).powi(2);
+        if square < 2.4 { 0.0 } else { 1e-2 * (square - 2.4) }
+    };
+    let mut rows =
+        vec![bare("bare solve, free order", &plate, h, &[]), bare("bare solve, contact last", &plate, h, &candidates)];
+    for (name, pressed) in [("step, open", false), ("step, in contact", true)] {
+        let contact = bottom.iter().zip(&candidates).fold(LinearRows::new(), |rows, (&node, &dof)| {
+            rows.unilateral(&[(dof, 1.0)], if pressed { gap(node) } else { 1e3 })
+        });
+        let mut run = build(&plate, contact, h, if pressed { -1e-4 } else { 0.0 }, false);
+        for _ in 0..10 {
+            run.step().expect("a well-posed step");
+        }
+        let closed = run.state().contacts().closed().iter().filter(|&&closed| closed).count();
+        println!("{name}: {closed} of {} candidates closed", candidates.len());
+        rows.push(Row {
+            name: name.into(),
+            run: Box::new(move || run.step().expect("a well-posed step")),
+            samples: Vec::new(),
+        });
+    }
+    println!("plate of {cells:?} elements, {} dofs", plate.dofs());
+    sample(&mut rows, 9);
 }
 
 /// A measured operation: runs once.
@@ -50,9 +87,13 @@ fn measure(n: usize) {
             samples: Vec::new(),
         });
     }
-    let samples = if n > 25 { 5 } else { 15 };
+    sample(&mut rows, if n > 25 { 5 } else { 15 });
+}
+
+/// Runs all rows in turn, and prints medians and ratios.
+fn sample(rows: &mut [Row<'_>], samples: usize) {
     for sample in 0..=samples {
-        for row in &mut rows {
+        for row in &mut *rows {
             let start = Instant::now();
             (row.run)();
             if sample > 0 {
@@ -66,7 +107,7 @@ fn measure(n: usize) {
         samples[samples.len() / 2]
     };
     let (solve, open) = (median(&mut rows[0].samples), median(&mut rows[2].samples));
-    for row in &mut rows {
+    for row in rows {
         let (median, best) = (median(&mut row.samples), row.samples[0]);
         println!("{:<32} {median:>10.3} {best:>10.3} {:>14.2} {:>14.2}", row.name, median / solve, median / open);
     }
@@ -103,15 +144,25 @@ fn simulation(
     pressed: bool,
     corrected: bool,
 ) -> Simulation<'static, f64> {
-    let mass = block.lumped_mass::<f64>();
-    let gravity = if pressed { -1e-3 } else { 0.0 };
-    let system = block.system::<f64>().load(move |_, f| {
+    let gap = if pressed { 0.0 } else { 1e3 };
+    let contact = candidates.iter().fold(LinearRows::new(), |rows, &dof| rows.unilateral(&[(dof, 1.0)], gap));
+    build(block, contact, h, if pressed { -1e-3 } else { 0.0 }, corrected)
+}
+
+/// A body under gravity in contact.
+fn build(
+    body: &Solid<3>,
+    contact: LinearRows<'static, f64>,
+    h: f64,
+    gravity: f64,
+    corrected: bool,
+) -> Simulation<'static, f64> {
+    let mass = body.lumped_mass::<f64>();
+    let system = body.system::<f64>().load(move |_, f| {
         for (f, m) in f.iter_mut().zip(&mass).skip(2).step_by(3) {
             *f = gravity * m;
         }
     });
-    let gap = if pressed { 0.0 } else { 1e3 };
-    let contact = candidates.iter().fold(LinearRows::new(), |rows, &dof| rows.unilateral(&[(dof, 1.0)], gap));
     let builder = Simulation::builder(system, Composite, h).constraint(contact);
     let builder = if corrected { builder.corrector(PersistencyCorrection::with_history_projection()) } else { builder };
     builder.build().expect("a well-posed scene")

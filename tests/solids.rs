@@ -5,8 +5,8 @@ use contact_dynamics::contact::{Plane, Side, Sphere, SurfaceNode};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::{
-    ActiveSet, Automatic, Composite, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection,
-    Result, Simulation, TimeIntegrator,
+    Automatic, Composite, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection, Result,
+    Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::drops::{Drop, DropFigures, LANDINGS, Landing};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -22,7 +22,7 @@ fn candidates<const D: usize>(solid: &Solid<D>, nodes: impl IntoIterator<Item = 
 fn gravity<const D: usize>(solid: &Solid<D>, g: f64) -> impl FnMut(f64, &mut [f64]) + Send + 'static {
     let mass = solid.lumped_mass::<f64>();
     move |_, f| {
-        f.iter_mut().zip(&mass).enumerate().for_each(|(i, (f, m))| *f = if i % D == D - 1 { -g * m } else { 0.0 })
+        f.iter_mut().zip(&mass).enumerate().for_each(|(i, (f, m))| *f = if i % D == D - 1 { -g * m } else { 0.0 });
     }
 }
 
@@ -153,7 +153,9 @@ fn a_soft_disc_bounces_without_gaining_energy_or_a_checkered_pressure() {
     for side in disc.boundary() {
         let [a, b] = [disc.nodes[side[0]], disc.nodes[side[1]]];
         let length = (a[0] - b[0]).hypot(a[1] - b[1]);
-        side.iter().for_each(|&n| share[n] += 0.5 * length);
+        for &n in &side {
+            share[n] += 0.5 * length;
+        }
     }
     let schemes: [Box<dyn TimeIntegrator>; 2] = [Box::new(Composite), Box::new(Newmark::trapezoidal())];
     for scheme in schemes {
