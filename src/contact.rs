@@ -1,8 +1,12 @@
 //! Contact constraints: where the gap is, which way it pushes, under which law.
 
 mod linear_rows;
+#[cfg(feature = "search")]
+mod node_to_facet;
 
 pub use linear_rows::{GapOffset, LinearRows};
+#[cfg(feature = "search")]
+pub use node_to_facet::{Facet, NodeToFacet};
 
 use crate::error::Result;
 use crate::real::Real;
@@ -93,6 +97,14 @@ pub trait ContactConstraint<T: Real>: Send {
         let _ = (t, u, v);
         out.fill(GapRates::default());
     }
+
+    /// Appends every dof that a row may ever act on (repetitions allowed), from the first search to the last: the solver
+    /// eliminates these last, so that contact works on them alone. Default: the dofs of the rows there are now.
+    fn dofs(&self, out: &mut Vec<usize>) {
+        let mut g = ContactJacobian::default();
+        self.jacobian(&mut g);
+        out.extend(g.dofs);
+    }
 }
 
 impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> {
@@ -125,6 +137,9 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     }
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
         (**self).rates(t, u, v, out);
+    }
+    fn dofs(&self, out: &mut Vec<usize>) {
+        (**self).dofs(out);
     }
 }
 
