@@ -252,8 +252,8 @@ impl<T: Real> NodeToFacet<T> {
         let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &coordinates)?;
         let mut sorted = nodes.to_vec();
         sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            let part = format!("contact node {}", pair[0]);
+        if let Some([node, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it is listed twice" });
         }
         let bodies = [sorted, surface.nodes().to_vec()];

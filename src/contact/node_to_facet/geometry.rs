@@ -101,10 +101,8 @@ impl Shape {
     pub(super) fn bounds(&self) -> [Point; 2] {
         let [mut lower, mut upper] = [self.corners[0]; 2];
         for corner in &self.corners[1..self.count] {
-            for i in 0..3 {
-                lower[i] = lower[i].min(corner[i]);
-                upper[i] = upper[i].max(corner[i]);
-            }
+            lower = std::array::from_fn(|i| lower[i].min(corner[i]));
+            upper = std::array::from_fn(|i| upper[i].max(corner[i]));
         }
         [lower, upper]
     }
@@ -175,7 +173,7 @@ impl Shape {
     /// The closest point of the facet; none if the facet is degenerate.
     ///
     /// Beyond an open side the facet goes on for [`RIM`] of its extent, so that lever arms stay exact there.
-    pub(super) fn project(&self, p: Point, rim: &Rim) -> Option<Foot> {
+    pub(super) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
         match self.count {
             2 => self.project_on_segment(p, rim),
             3 => self.project_on_triangle(p, rim),
@@ -183,7 +181,7 @@ impl Shape {
         }
     }
 
-    fn project_on_segment(&self, p: Point, rim: &Rim) -> Option<Foot> {
+    fn project_on_segment(&self, p: Point, rim: Rim) -> Option<Foot> {
         let side = self.side(0);
         let square = dot(side, side);
         if square <= 0.0 {
@@ -201,7 +199,7 @@ impl Shape {
         Some(self.foot(p, [1.0 - s, s, 0.0, 0.0], location))
     }
 
-    fn project_on_triangle(&self, p: Point, rim: &Rim) -> Option<Foot> {
+    fn project_on_triangle(&self, p: Point, rim: Rim) -> Option<Foot> {
         let (first, second) = (self.side(0), sub(self.corners[2], self.corners[0]));
         let normal = cross(first, second);
         let square = dot(normal, normal);
@@ -211,18 +209,16 @@ impl Shape {
         let r = sub(p, self.corners[0]);
         let (w1, w2) = (dot(cross(r, second), normal) / square, dot(cross(first, r), normal) / square);
         let weights = [1.0 - w1 - w2, w1, w2, 0.0];
-        let mut outside = [false; 4];
-        for k in 0..3 {
-            outside[k] = self.inset(&weights, k) < if rim.sides[k] { -RIM } else { 0.0 };
-        }
+        let outside = |k: usize| self.inset(&weights, k) < if rim.sides[k] { -RIM } else { 0.0 };
+        let outside = [outside(0), outside(1), outside(2), false];
         match outside.contains(&true) {
             false => Some(self.foot(p, weights, Location::Inside)),
-            true => self.nearest_on_sides(p, rim, &outside),
+            true => self.nearest_on_sides(p, rim, outside),
         }
     }
 
     /// The closest point of the sides. Open sides count only if the node stands outside of them.
-    fn nearest_on_sides(&self, p: Point, rim: &Rim, outside: &[bool; 4]) -> Option<Foot> {
+    fn nearest_on_sides(&self, p: Point, rim: Rim, outside: [bool; 4]) -> Option<Foot> {
         let mut best: Option<Foot> = None;
         for k in (0..self.count).filter(|&k| outside[k] || !rim.sides[k]) {
             let side = self.side(k);
@@ -266,14 +262,14 @@ impl Shape {
         [blend(eta, sub(x1, x0), sub(x2, x3)), blend(xi, sub(x3, x0), sub(x2, x1))]
     }
 
-    fn project_on_quadrilateral(&self, p: Point, rim: &Rim) -> Option<Foot> {
+    fn project_on_quadrilateral(&self, p: Point, rim: Rim) -> Option<Foot> {
         let [bottom, right, top, left] = rim.sides.map(|open| if open { 1.0 + 2.0 * RIM } else { 1.0 });
         let (lower, upper) = ([-left, -bottom], [right, top]);
         let Some(z) = self.minimize_distance(p, self.start(p), lower, upper) else {
-            return self.nearest_on_sides(p, rim, &[true; 4]);
+            return self.nearest_on_sides(p, rim, [true; 4]);
         };
         let at_bound = [z[1] <= lower[1], z[0] >= upper[0], z[1] >= upper[1], z[0] <= lower[0]];
-        let sides = self.nearest_on_sides(p, rim, &at_bound);
+        let sides = self.nearest_on_sides(p, rim, at_bound);
         if at_bound.contains(&true) {
             return sides;
         }
@@ -292,7 +288,7 @@ impl Shape {
         let halves = [([x0, x1, x2, x2], [0, 1, 2]), ([x0, x2, x3, x3], [0, 2, 3])];
         let mut best: Option<(f64, [f64; 4])> = None;
         for (corners, vertices) in halves {
-            let Some(foot) = Self::new(corners, 3).project_on_triangle(p, &closed) else { continue };
+            let Some(foot) = Self::new(corners, 3).project_on_triangle(p, closed) else { continue };
             if best.is_none_or(|(distance, _)| foot.distance < distance) {
                 let mut weights = [0.0; 4];
                 for (vertex, weight) in vertices.into_iter().zip(foot.weights) {
@@ -309,11 +305,11 @@ impl Shape {
     fn minimize_distance(&self, p: Point, start: [f64; 2], lower: [f64; 2], upper: [f64; 2]) -> Option<[f64; 2]> {
         const ITERATIONS: usize = 60;
         const TINY: f64 = 1e-7;
+        // Steps made after convergence is in sight: one squares the error, one more settles the last digits.
+        const POLISH: usize = 3;
         let [x0, x1, x2, x3] = self.corners;
         // ∂²x/∂ξ∂η.
         let twist = add_scaled(add_scaled([0.0; 3], 0.25, sub(x0, x1)), 0.25, sub(x2, x3));
-        // Steps made after convergence is in sight: one squares the error, one more settles the last digits.
-        const POLISH: usize = 3;
         let (mut z, mut polished) = (start, 0);
         let residual = |z: [f64; 2]| sub(self.point(&Self::bilinear(z)), p);
         for _ in 0..ITERATIONS {

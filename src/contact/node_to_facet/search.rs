@@ -18,10 +18,8 @@ impl Bounds {
     pub(super) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
 
     pub(super) fn include(&mut self, x: Point) {
-        for i in 0..3 {
-            self.lower[i] = self.lower[i].min(x[i]);
-            self.upper[i] = self.upper[i].max(x[i]);
-        }
+        self.lower = std::array::from_fn(|i| self.lower[i].min(x[i]));
+        self.upper = std::array::from_fn(|i| self.upper[i].max(x[i]));
     }
 
     pub(super) fn of_points(points: impl IntoIterator<Item = Point>) -> Self {

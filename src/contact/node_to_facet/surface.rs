@@ -74,7 +74,7 @@ impl Surface {
         sides.sort_unstable();
         for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             match *group {
-                [_] => {}
+                [] | [_] => {}
                 [(.., i, k, one), (.., j, l, other)] if one != other => {
                     self.neighbors[i][k] = Some((j, l));
                     self.neighbors[j][l] = Some((i, k));
@@ -90,7 +90,6 @@ impl Surface {
                         "it shares a side with two facets or more, and a surface must not branch",
                     ));
                 }
-                [] => {}
             }
         }
         Ok(())
@@ -129,7 +128,7 @@ impl Surface {
     /// The closest point of a facet, with the shape of the facet.
     pub(super) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
         let shape = self.facets[facet].shape(positions);
-        shape.project(p, &self.rims[facet]).map(|foot| (shape, foot))
+        shape.project(p, self.rims[facet]).map(|foot| (shape, foot))
     }
 
     /// Sum of the normals on both sides of a side, at its share `s`.
