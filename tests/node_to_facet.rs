@@ -138,9 +138,9 @@ fn imbalance<const D: usize>(contact: &NodeToFacet<f64>, positions: &[[f64; D]])
             let (i, mut f) = (dof % D, [0.0; 3]);
             f[i] = weight;
             force[i] += weight;
-            for k in 0..3 {
+            for (k, moment) in moment.iter_mut().enumerate() {
                 let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-                moment[k] += x[l] * f[m] - x[m] * f[l];
+                *moment += x[l] * f[m] - x[m] * f[l];
             }
         }
         worst = force.iter().fold(worst, |worst, f| worst.max(f.abs()));
@@ -515,7 +515,9 @@ fn far_bodies_have_no_candidates_and_flying_bodies_keep_their_lists() {
     assert_eq!(contact.candidates(), 1);
     assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Unchanged);
     for _ in 0..100 {
-        u.iter_mut().for_each(|u| *u += 0.25);
+        for u in &mut u {
+            *u += 0.25;
+        }
         assert_eq!(gaps(&mut contact, &u).len(), 1);
     }
     assert_eq!(contact.rebuilds(), 1);
@@ -538,7 +540,9 @@ fn searches_between_rebuilds_do_not_allocate() {
     let (mut candidates, mut changes) = (0, 0);
     let counted = allocation_counter::measure(|| {
         for _ in 0..50 {
-            u.iter_mut().for_each(|u| *u += 0.001 * random.next());
+            for u in &mut u {
+                *u += 0.001 * random.next();
+            }
             changes += usize::from(contact.search(0.0, &u, &u).unwrap() == Candidates::Changed);
             candidates += contact.candidates();
         }
@@ -573,7 +577,9 @@ fn two_passes_treat_both_surfaces_alike() {
     let count = |pass: usize| a.iter().filter(|row| row.0.1 == pass).count();
     assert!(count(0) > 20 && count(1) > 12, "{} {}", count(0), count(1));
     assert!(a.iter().any(|row| row.1 < 0.0) && a.iter().any(|row| row.1 > 0.0));
-    a.iter_mut().for_each(|row| row.0.1 = 1 - row.0.1);
+    for row in &mut a {
+        row.0.1 = 1 - row.0.1;
+    }
     a.sort_by_key(|row| (row.0.1, row.0.0));
     assert_eq!(a, b);
     assert_eq!(one.max_candidates(), mesh.coordinates.len());
@@ -769,8 +775,8 @@ fn a_run_with_candidates_that_change() {
         deepest = run.gaps().iter().fold(deepest, |deepest, &gap| deepest.min(gap));
         closed += usize::from(run.gaps().iter().any(|gap| gap.abs() < 1e-10));
     }
-    for i in 0..2 {
-        assert!((momentum(&run, i) - before[i]).abs() < 1e-12, "{} {}", momentum(&run, i), before[i]);
+    for (i, before) in before.into_iter().enumerate() {
+        assert!((momentum(&run, i) - before).abs() < 1e-12, "{} {before}", momentum(&run, i));
     }
     assert!(closed > 10, "{closed} steps in contact");
     assert!(deepest > -1e-4, "{deepest}");
