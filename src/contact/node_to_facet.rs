@@ -102,8 +102,8 @@ struct Pass {
 ///
 /// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
 /// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on those of
-/// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum and angular
-/// momentum at the configuration of the search. Nodes at a depth of up to `reach` are found as well as nodes outside.
+/// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
+/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at a depth of up to `reach` are found as well as nodes outside.
 ///
 /// # Linearization
 ///
@@ -111,7 +111,8 @@ struct Pass {
 /// and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in a step:
 /// what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is the
 /// derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step is left
-/// out.
+/// out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run; a gap within the
+/// rounding of coordinates (16 ε of the largest) is zero.
 ///
 /// # Which facet, which normal
 ///
@@ -414,7 +415,7 @@ impl<T: Real> NodeToFacet<T> {
     fn find_rows(&mut self, pass: usize, near: &Bounds, u: &[T]) {
         /// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
         const SAME_SIDE: f64 = 0.5;
-        let Self { positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let Self { coordinates, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
         let (surface, own) = match (pass, &self.own_surface) {
             (0, own) => (&self.surface, own.as_ref()),
             (_, Some(own)) => (own, Some(&self.surface)),
@@ -476,7 +477,11 @@ impl<T: Real> NodeToFacet<T> {
             found.jacobian.pointers.push(found.jacobian.dofs.len());
             found.identities.push((node, pass));
             found.facets.push(facet);
-            found.gaps.push(T::of(gap));
+            // Touching is touching, whatever rounding the coordinates carry: the tolerances of contact know only that of u.
+            let reference = coordinates[node];
+            let magnitude = [p, foot.point, reference].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let rounding = 16.0 * T::epsilon().value() * magnitude;
+            found.gaps.push(if gap.abs() <= rounding { T::zero() } else { T::of(gap) });
         }
     }
 }
