@@ -641,6 +641,13 @@ fn touching_is_a_gap_of_zero() {
     let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
     assert_eq!(found.len(), 50);
     assert!(found.iter().all(|row| row.1 == 0.0), "{found:?}");
+    // A run may start there, and rests.
+    let masses = vec![1.0; mesh.size()];
+    let stiffness = SparseColMat::try_new_from_triplets(mesh.size(), mesh.size(), &[]).unwrap();
+    let system = LinearSystem::lumped(masses, stiffness).unwrap();
+    let mut run = Simulation::builder(system, Composite, 1e-3).constraint(contact).build().unwrap();
+    run.step().unwrap();
+    assert!(run.gaps().len() == 50 && run.gaps().iter().all(|&gap| gap == 0.0));
 }
 
 #[test]

@@ -103,7 +103,8 @@ struct Pass {
 /// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
 /// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on those of
 /// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
-/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at a depth of up to `reach` are found as well as nodes outside.
+/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at a
+/// depth of up to `reach` are found as well as nodes outside.
 ///
 /// # Linearization
 ///
@@ -326,10 +327,10 @@ impl<T: Real> NodeToFacet<T> {
     /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only the
     /// first pass makes a row.
     ///
-    /// Two passes treat both surfaces alike, but have more rows than independent gaps: on a flat interface that closes as
-    /// a whole the rows of rigid contact are linearly dependent
-    /// ([`Error::DependentContacts`]), where one pass is not. They are meant for edges, vertices and scattered
-    /// contacts, and for laws with compliance.
+    /// Two passes treat both surfaces alike, but have more rows than independent gaps: where a flat interface closes as a
+    /// whole, moving both sides together leaves all gaps, so the rows of both passes are linearly dependent, and rigid
+    /// contact may be refused ([`Error::DependentContacts`]). They are meant for edges, vertices and scattered contacts,
+    /// and for laws with compliance.
     ///
     /// # Errors
     ///
