@@ -1,4 +1,4 @@
-//! Contact of nodes with facets: gaps against brute force and finite differences, sides, rims, kept lists, balance of forces.
+//! Contact of nodes with facets: gaps against brute force and differences, sides, rims, kept lists, balance of forces.
 #![cfg(feature = "search")]
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
@@ -53,7 +53,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// A grid of quadrilaterals over [0, n]², each cut into triangles if `cut`, at the height z(x, y), normals upward.
+/// What a grid is made of.
 #[derive(Clone, Copy, PartialEq)]
 enum Cells {
     Quadrilaterals,
@@ -61,6 +61,7 @@ enum Cells {
     Mixed,
 }
 
+/// A grid over [0, n]² at the height z(x, y), normals upward.
 fn grid(n: usize, cells: Cells, z: impl Fn(f64, f64) -> f64) -> Mesh<3> {
     let mut mesh = Mesh::default();
     for j in 0..=n {
@@ -282,7 +283,8 @@ fn closest_points_of_warped_quadrilaterals_are_those_of_brute_force() {
     }
 }
 
-/// The surface of an octahedron, its triangles halved in both directions, with corners at random distances from the origin.
+/// The surface of an octahedron, its triangles halved in both directions, with corners at random distances from the
+/// origin.
 fn star(random: &mut Random) -> Mesh<3> {
     let mut mesh = Mesh::<3>::default();
     let mut node = |x: [f64; 3]| match mesh.coordinates.iter().position(|y| *y == x) {
@@ -765,8 +767,8 @@ fn wrong_input_is_refused() {
     assert!(matches!(contact.two_pass([[3, 4, 2]]), Err(Error::Incompatible { .. })));
 }
 
-/// A node flies obliquely onto two segments of elastically joined masses: it is stopped there, slides on over the vertex, and
-/// momentum is kept in both directions.
+/// A node flies obliquely onto two segments of elastically joined masses: it is stopped there, slides on over the
+/// vertex, and momentum is kept in both directions.
 #[test]
 fn a_run_with_candidates_that_change() {
     let coordinates = [[2.0, 0.0], [1.0, 0.05], [0.0, 0.0], [0.4, 0.2]];

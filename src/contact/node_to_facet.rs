@@ -101,28 +101,28 @@ struct Pass {
 /// bilinear quadrilaterals in three.
 ///
 /// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
-/// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on those of
-/// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
-/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at a
-/// depth of up to `reach` are found as well as nodes outside.
+/// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on
+/// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
+/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at
+/// a depth of up to `reach` are found as well as nodes outside.
 ///
 /// # Linearization
 ///
-/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; until the next one normals
-/// and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in a step:
-/// what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is the
-/// derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step is left
-/// out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run; a gap within the
-/// rounding of coordinates (16 ε of the largest) is zero.
+/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; until the next one
+/// normals and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in
+/// a step: what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is
+/// the derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step
+/// is left out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run; a gap
+/// within the rounding of coordinates (16 ε of the largest) is zero.
 ///
 /// # Which facet, which normal
 ///
-/// A node has at most one row a pass, from the closest facet. Inside of a facet n is the facet's normal. If the closest point
-/// is on a side or a vertex that facets share, n is the direction between it and the node, so that the gap is continuous
-/// when a node passes from one facet to the next; if the node is closer to it than √ε of the facet's longest side (ε of
-/// the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind a convex edge the closest facet changes at the
-/// bisector, and with it the normal, not the gap. A node that stands beyond the rim of an open surface has no row; by 1e-3 of
-/// the facet the surface goes on beyond its rim.
+/// A node has at most one row a pass, from the closest facet. Inside of a facet n is the facet's normal. If the closest
+/// point is on a side or a vertex that facets share, n is the direction between it and the node, so that the gap is
+/// continuous when a node passes from one facet to the next; if the node is closer to it than √ε of the facet's longest
+/// side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind a convex edge the closest
+/// facet changes at the bisector, and with it the normal, not the gap. A node that stands beyond the rim of an open
+/// surface has no row; by 1e-3 of the facet the surface goes on beyond its rim.
 ///
 /// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
 /// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing).
@@ -134,10 +134,11 @@ struct Pass {
 ///
 /// # Search
 ///
-/// One pass over the nodes compares the bounding boxes of the two surfaces; apart by more than `reach` they have no candidates.
-/// Otherwise each node looks at the facets of its list. Lists hold the facets within `reach` and a [`skin`](Self::skin);
-/// they are built anew, from an R*-tree, when nodes of the two surfaces have moved by more than the skin relative to each
-/// other (in any coordinate). Memory is allocated then and at no other time. Bodies that fly together rebuild nothing.
+/// One pass over the nodes compares the bounding boxes of the two surfaces; apart by more than `reach` they have no
+/// candidates. Otherwise each node looks at the facets of its list. Lists hold the facets within `reach` and a
+/// [`skin`](Self::skin); they are built anew, from an R*-tree, when nodes of the two surfaces have moved by more than
+/// the skin relative to each other (in any coordinate). Memory is allocated then and at no other time. Bodies that fly
+/// together rebuild nothing.
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -211,17 +212,17 @@ fn positive(name: &'static str, value: f64) -> Result<f64> {
 impl<T: Real> NodeToFacet<T> {
     /// Contact of `nodes` with `facets`, found within the distance `reach` (length) outside and inside of the facets.
     ///
-    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the dofs of
-    /// their displacements; `nodes` and `facets` name nodes by their index there. Nodes that neither names are not
-    /// read later. The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
+    /// dofs of their displacements; `nodes` and `facets` name nodes by their index there. Nodes that neither names are
+    /// not read later. The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
     /// [`with_law`](Self::with_law) gives another.
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if D is not 2 or 3, if the lists differ in length, if a facet does not fit D, or if a node does
-    /// not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without nodes or facets;
-    /// [`Error::Parameter`] for `reach`; [`Error::Incompatible`] for a facet without area, folded, turned against its
-    /// neighbor or at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
+    /// [`Error::Dimension`] if D is not 2 or 3, if the lists differ in length, if a facet does not fit D, or if a node
+    /// does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without nodes or
+    /// facets; [`Error::Parameter`] for `reach`; [`Error::Incompatible`] for a facet without area, folded, turned
+    /// against its neighbor or at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
     pub fn new<F: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -289,8 +290,8 @@ impl<T: Real> NodeToFacet<T> {
         self
     }
 
-    /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built anew;
-    /// half of the reach if not given. It changes the cost, not the result.
+    /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built
+    /// anew; half of the reach if not given. It changes the cost, not the result.
     ///
     /// # Errors
     ///
@@ -324,13 +325,13 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Adds the second pass: the nodes of the facets given first also meet `facets`, those of the other surface.
     ///
-    /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only the
-    /// first pass makes a row.
+    /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only
+    /// the first pass makes a row.
     ///
-    /// Two passes treat both surfaces alike, but have more rows than independent gaps: where a flat interface closes as a
-    /// whole, moving both sides together leaves all gaps, so the rows of both passes are linearly dependent, and rigid
-    /// contact may be refused ([`Error::DependentContacts`]). They are meant for edges, vertices and scattered contacts,
-    /// and for laws with compliance.
+    /// Two passes treat both surfaces alike, but have more rows than independent gaps: where a flat interface closes as
+    /// a whole, moving both sides together leaves all gaps, so the rows of both passes are linearly dependent, and
+    /// rigid contact may be refused ([`Error::DependentContacts`]). They are meant for edges, vertices and scattered
+    /// contacts, and for laws with compliance.
     ///
     /// # Errors
     ///
@@ -478,7 +479,8 @@ impl<T: Real> NodeToFacet<T> {
             found.jacobian.pointers.push(found.jacobian.dofs.len());
             found.identities.push((node, pass));
             found.facets.push(facet);
-            // Touching is touching, whatever rounding the coordinates carry: the tolerances of contact know only that of u.
+            // Touching is touching, whatever rounding the coordinates carry: the tolerances of contact know only that
+            // of u.
             let reference = coordinates[node];
             let magnitude = [p, foot.point, reference].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
             let rounding = 16.0 * T::epsilon().value() * magnitude;

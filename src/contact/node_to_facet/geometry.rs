@@ -3,8 +3,8 @@
 /// A point or a vector; in two dimensions the third component is zero.
 pub(super) type Point = [f64; 3];
 
-/// How far outside an open side of a surface a projection still counts as inside, in shares of the facet: nodes at the rim
-/// of matching meshes must not lose their row to rounding or to a little stretch.
+/// How far outside an open side of a surface a projection still counts as inside, in shares of the facet: nodes at the
+/// rim of matching meshes must not lose their row to rounding or to a little stretch.
 pub(super) const RIM: f64 = 1e-3;
 
 pub(super) fn sub(x: Point, y: Point) -> Point {
@@ -300,8 +300,8 @@ impl Shape {
         best.map_or([0.0; 2], |(_, weights)| Self::coordinates(&weights).map(|z| z.clamp(-1.0, 1.0)))
     }
 
-    /// Minimum of ½|p − x(ξ, η)|² in a box by Newton's method, with bounds as an active set and descent enforced; none if
-    /// it does not converge.
+    /// Minimum of ½|p − x(ξ, η)|² in a box by Newton's method, with bounds as an active set and descent enforced; none
+    /// if it does not converge.
     fn minimize_distance(&self, p: Point, start: [f64; 2], lower: [f64; 2], upper: [f64; 2]) -> Option<[f64; 2]> {
         const ITERATIONS: usize = 60;
         const TINY: f64 = 1e-7;

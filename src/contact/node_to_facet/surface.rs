@@ -180,10 +180,10 @@ impl Surface {
 
     /// The normal along which a node at p stands on a facet, and its signed distance along it.
     ///
-    /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or away from
-    /// it if the node is behind the mean normal of the facets there (the sign is right on any surface that does not
-    /// intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the facet, where that
-    /// direction is lost in rounding, the mean normal itself.
+    /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
+    /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
+    /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
+    /// facet, where that direction is lost in rounding, the mean normal itself.
     pub(super) fn direction(
         &self,
         facet: usize,
