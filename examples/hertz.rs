@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example hertz` prints both tables and writes them; `--quick` with coarse meshes.
 
-use contact_dynamics::contact::{Plane, SurfaceNode};
+use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{
@@ -112,13 +112,12 @@ fn ball(contact: f64, across: usize, cells: [usize; 3]) -> Result<Ball, Box<dyn 
             let [x, y, z] = solid.nodes[n];
             ((x * x + y * y + (z - radius).powi(2)).sqrt() - radius).abs() < 1e-9
         })
-        .map(|n| SurfaceNode { place: solid.nodes[n], dofs: [3 * n, 3 * n + 1, 3 * n + 2] })
         .collect();
     let count = candidates.len();
     let plane = Plane::new([0.0, 0.0, -2.5 * h * exact.velocity], [0.0, 0.0, 1.0])?;
     let mut run = Simulation::builder(system, Composite, h)
         .velocity(solid.uniform([0.0, 0.0, -exact.velocity]))
-        .constraint(NodesOnObstacle::new(plane, candidates)?)
+        .constraint(NodesOnObstacle::new(plane, &solid.nodes, &solid.node_dofs(), &candidates)?)
         .corrector(PersistencyCorrection::with_history_projection())
         .build()?;
     let start = run.energy().total();

@@ -2,12 +2,16 @@
 
 mod law;
 mod linear_rows;
+#[cfg(feature = "search")]
+mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
 
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
-pub use nodes_on_obstacle::{NodesOnObstacle, SurfaceNode};
+#[cfg(feature = "search")]
+pub use node_to_facet::{Facet, NodeToFacet};
+pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Plane, Side, Sphere};
 
 use crate::error::Result;
@@ -199,6 +203,14 @@ impl<T: Real> ContactJacobian<T> {
             self.weights.push(weight);
         }
         self.pointers.push(self.dofs.len());
+    }
+
+    /// Appends the rows of another one.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let before = self.dofs.len();
+        self.dofs.extend_from_slice(&other.dofs);
+        self.weights.extend_from_slice(&other.weights);
+        self.pointers.extend(other.pointers[1..].iter().map(|end| before + end));
     }
 
     /// Number of rows.

@@ -35,12 +35,12 @@ pub struct GapJacobianError {
 /// [`check`](ContactConstraint::check).
 ///
 /// ```
-/// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere, SurfaceNode};
+/// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
 /// use contact_dynamics::verify;
 ///
 /// let ball = Sphere::new([0.0, 0.0, 0.0], 1.0, Side::Outside)?;
-/// let node = SurfaceNode { place: [0.8, 0.5, 0.7], dofs: [0, 1, 2] };
-/// let mut contact = NodesOnObstacle::new(ball, vec![node])?.moving(|t| [[0.0, 0.3 * t, 0.0], [0.0, 0.3, 0.0], [0.0; 3]]);
+/// let mut contact = NodesOnObstacle::new(ball, &[[0.8, 0.5, 0.7]], &[[0, 1, 2]], &[0])?
+///     .moving(|t| [[0.0, 0.3 * t, 0.0], [0.0, 0.3, 0.0], [0.0; 3]]);
 /// let error = verify::gap_jacobian(&mut contact, 0.0, &[0.01, 0.0, -0.02], &[1.0; 3], 1e-5)?;
 /// assert!(error.rows == 1 && error.jacobian < 1e-9 && error.rate < 1e-6, "{error:?}");
 /// # Ok::<(), contact_dynamics::Error>(())

@@ -1,8 +1,6 @@
 //! Nodes against rigid obstacles: geometry, motion of the obstacle, curved surfaces, bodies far away.
 
-use contact_dynamics::contact::{
-    Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere, SurfaceNode,
-};
+use contact_dynamics::contact::{Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
@@ -18,8 +16,11 @@ fn particles<const D: usize>(count: usize, gravity: f64) -> LinearSystem<'static
     LinearSystem::lumped(vec![1.0; n], k).unwrap().load(load)
 }
 
-fn node<const D: usize>(place: [f64; D], index: usize) -> SurfaceNode<f64, D> {
-    SurfaceNode { place, dofs: std::array::from_fn(|axis| D * index + axis) }
+/// Particles at these places on an obstacle.
+fn on<'a, const D: usize>(obstacle: impl Obstacle<f64, D> + 'a, places: &[[f64; D]]) -> NodesOnObstacle<'a, f64, D> {
+    let dofs: Vec<[usize; D]> = (0..places.len()).map(|i| std::array::from_fn(|axis| D * i + axis)).collect();
+    let all: Vec<usize> = (0..places.len()).collect();
+    NodesOnObstacle::new(obstacle, places, &dofs, &all).unwrap()
 }
 
 /// Numbers that look random, in [−1, 1].
@@ -30,8 +31,8 @@ fn noise(count: usize, seed: f64) -> Vec<f64> {
 #[test]
 fn jacobians_are_the_derivatives_of_the_gaps() {
     let places = noise(60, 0.3);
-    let nodes3: Vec<_> = (0..20).map(|i| node([places[3 * i], places[3 * i + 1], places[3 * i + 2]], i)).collect();
-    let nodes2: Vec<_> = (0..20).map(|i| node([places[2 * i], places[2 * i + 1]], i)).collect();
+    let nodes3: Vec<_> = (0..20).map(|i| [places[3 * i], places[3 * i + 1], places[3 * i + 2]]).collect();
+    let nodes2: Vec<_> = (0..20).map(|i| [places[2 * i], places[2 * i + 1]]).collect();
     let (u, v) = (noise(60, 7.7).iter().map(|x| 0.1 * x).collect::<Vec<_>>(), noise(60, 3.1));
     let motion3 = |t: f64| [[0.1 * t, t * t, 0.0], [0.1, 2.0 * t, 0.0], [0.0, 2.0, 0.0]];
     let motion2 = |t: f64| [[0.1 * t, t * t], [0.1, 2.0 * t], [0.0, 2.0]];
@@ -39,12 +40,12 @@ fn jacobians_are_the_derivatives_of_the_gaps() {
     let mut solids: Vec<(&str, NodesOnObstacle<'_, f64, 3>)> = Vec::new();
     for side in [Side::Outside, Side::Inside] {
         let sphere = Sphere::new(center, 0.7, side).unwrap();
-        solids.push(("sphere", NodesOnObstacle::new(sphere, nodes3.clone()).unwrap()));
+        solids.push(("sphere", on(sphere, &nodes3)));
         let cylinder = Cylinder::new(center, [1.0, 2.0, -0.5], 0.4, side).unwrap();
-        solids.push(("cylinder", NodesOnObstacle::new(cylinder, nodes3.clone()).unwrap()));
+        solids.push(("cylinder", on(cylinder, &nodes3)));
     }
     let plane = Plane::new(center, [0.3, -2.0, 1.0]).unwrap();
-    solids.push(("plane", NodesOnObstacle::new(plane, nodes3.clone()).unwrap()));
+    solids.push(("plane", on(plane, &nodes3)));
     for (name, contact) in solids {
         let mut contact = contact.moving(motion3);
         let error = verify::gap_jacobian(&mut contact, 0.4, &u, &v, 1e-6).unwrap();
@@ -53,7 +54,7 @@ fn jacobians_are_the_derivatives_of_the_gaps() {
     }
     for side in [Side::Outside, Side::Inside] {
         let disc = Sphere::new([0.05, 0.04], 0.7, side).unwrap();
-        let mut contact = NodesOnObstacle::new(disc, nodes2.clone()).unwrap().moving(motion2);
+        let mut contact = on(disc, &nodes2).moving(motion2);
         let error = verify::gap_jacobian(&mut contact, 0.4, &u, &v, 1e-6).unwrap();
         assert!(error.rows == 20 && error.jacobian < 1e-7 && error.rate < 1e-5, "{error:?}");
     }
@@ -119,7 +120,7 @@ fn a_particle_in_a_bowl_swings_like_a_pendulum() {
     let run = |h: f64| {
         let bowl = Sphere::new([0.0, radius], radius, Side::Inside).unwrap();
         let start = [radius * angle.sin(), radius * (1.0 - angle.cos())];
-        let contact = NodesOnObstacle::new(bowl, vec![node(start, 0)]).unwrap();
+        let contact = on(bowl, &[start]);
         let mut run = Simulation::builder(particles::<2>(1, g), Newmark::trapezoidal(), h)
             .constraint(contact)
             .corrector(PersistencyCorrection::new())
@@ -167,7 +168,7 @@ fn a_body_rests_on_a_table_that_shakes() {
         let z = [amplitude * (1.0 - c), amplitude * omega * s, amplitude * omega * omega * c];
         z.map(|z| [0.0, 0.0, z])
     };
-    let contact = NodesOnObstacle::new(table, vec![node([0.3, 0.2, 0.0], 0)]).unwrap().moving(motion);
+    let contact = on(table, &[[0.3, 0.2, 0.0]]).moving(motion);
     let mut run = Simulation::builder(particles::<3>(1, g), Composite, 1e-3)
         .constraint(contact)
         .corrector(PersistencyCorrection::with_history_projection())
@@ -189,8 +190,8 @@ fn a_body_rests_on_a_table_that_shakes() {
 fn bodies_far_away_are_no_candidates_and_cost_no_contact_problem() {
     // A ball flies over another one, in reach for a short time only.
     let ball = Sphere::new([0.0, 0.0, -1.0], 1.0, Side::Outside).unwrap();
-    let nodes: Vec<_> = (0..30).map(|i| node([-3.0 - 0.1 * i as f64, 0.0, 0.01], i)).collect();
-    let contact = NodesOnObstacle::new(ball, nodes).unwrap().reach(0.2).unwrap();
+    let nodes: Vec<_> = (0..30).map(|i| [-3.0 - 0.1 * f64::from(i), 0.0, 0.01]).collect();
+    let contact = on(ball, &nodes).reach(0.2).unwrap();
     let velocity: Vec<f64> = (0..90).map(|dof| if dof % 3 == 0 { 1.0 } else { 0.0 }).collect();
     let mut run = Simulation::builder(particles::<3>(30, 0.0), Composite, 0.01)
         .velocity(velocity)
@@ -214,7 +215,7 @@ fn bodies_far_away_are_no_candidates_and_cost_no_contact_problem() {
 #[test]
 fn planes_keep_their_rows() {
     let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
-    let mut contact = NodesOnObstacle::new(floor, vec![node([0.0, 0.0, 1.0], 0), node([1.0, 0.0, 1.0], 1)]).unwrap();
+    let mut contact = on(floor, &[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]);
     assert_eq!(contact.search(0.0, &[0.0; 6], &[0.0; 6]).unwrap(), Candidates::Changed);
     assert_eq!(contact.search(0.1, &[0.5; 6], &[0.0; 6]).unwrap(), Candidates::Unchanged);
     // Only the normal dofs are eliminated last.
@@ -234,9 +235,13 @@ fn obstacles_refuse_what_is_no_geometry() {
     ));
     let plane = Plane::new([0.0; 2], [0.0, 1e-200]).unwrap();
     assert_eq!(plane.distance([5.0, 2.0]), (2.0, [0.0, 1.0]));
-    assert!(NodesOnObstacle::new(plane, vec![node([f64::NAN, 0.0], 0)]).is_err());
-    assert!(NodesOnObstacle::new(plane, vec![node([0.0; 2], 0)]).unwrap().reach(0.0).is_err());
-    let contact = NodesOnObstacle::new(plane, vec![node([0.0; 2], 3)]).unwrap();
+    let built =
+        |places: &[[f64; 2]], dofs: &[[usize; 2]], node| NodesOnObstacle::new(plane, places, dofs, &[node]).map(|_| ());
+    assert!(matches!(built(&[[f64::NAN, 0.0]], &[[0, 1]], 0), Err(Error::NotFinite { index: 0, .. })));
+    assert!(matches!(built(&[[0.0; 2]], &[], 0), Err(Error::Dimension { expected: 1, found: 0, .. })));
+    assert!(matches!(built(&[[0.0; 2]], &[[0, 1]], 3), Err(Error::Dimension { found: 3, .. })));
+    assert!(on(plane, &[[0.0; 2]]).reach(0.0).is_err());
+    let contact = NodesOnObstacle::new(plane, &[[0.0; 2]], &[[6, 7]], &[0]).unwrap();
     let built = Simulation::builder(particles::<2>(1, 0.0), Composite, 0.1).constraint(contact).build();
     assert!(matches!(built, Err(Error::MissingDof { .. })));
 }

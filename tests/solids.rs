@@ -1,7 +1,7 @@
 //! Solids in two and three dimensions on rigid obstacles: drops of a block, solvers side by side, several contact zones,
 //! a soft disc.
 
-use contact_dynamics::contact::{Plane, Side, Sphere, SurfaceNode};
+use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::{
@@ -12,12 +12,6 @@ use contact_dynamics_scenes::drops::{Drop, DropFigures, LANDINGS, Landing};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 const SOFT: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
-
-/// Nodes as contact candidates.
-fn candidates<const D: usize>(solid: &Solid<D>, nodes: impl IntoIterator<Item = usize>) -> Vec<SurfaceNode<f64, D>> {
-    let node = |n: usize| SurfaceNode { place: solid.nodes[n], dofs: std::array::from_fn(|axis| D * n + axis) };
-    nodes.into_iter().map(node).collect()
-}
 
 fn gravity<const D: usize>(solid: &Solid<D>, g: f64) -> impl FnMut(f64, &mut [f64]) + Send + 'static {
     let mass = solid.lumped_mass::<f64>();
@@ -100,13 +94,13 @@ fn squeezed(solver: impl LinearSolver<f64> + 'static) -> Simulation<'static, f64
     let floor = Plane::new([0.0, 0.0, -0.01], [0.0, 0.0, 1.0]).unwrap();
     let wall = Plane::new([1.05, 0.0, 0.0], [-1.0, 0.1, 0.2]).unwrap();
     let ball = Sphere::new([0.5, 0.4, 2.75], 1.5, Side::Outside).unwrap();
-    let on = |nodes| candidates(&solid, nodes);
+    let dofs = solid.node_dofs();
     Simulation::builder(solid.system(), Composite, 0.01)
         .velocity(solid.uniform([0.5, 0.1, -0.7]))
-        .constraint(NodesOnObstacle::new(floor, on(near(|p| p[2] < 0.01))).unwrap())
-        .constraint(NodesOnObstacle::new(wall, on(near(|p| p[0] > 0.99))).unwrap())
+        .constraint(NodesOnObstacle::new(floor, &solid.nodes, &dofs, &near(|p| p[2] < 0.01)).unwrap())
+        .constraint(NodesOnObstacle::new(wall, &solid.nodes, &dofs, &near(|p| p[0] > 0.99)).unwrap())
         .constraint(
-            NodesOnObstacle::new(ball, on(near(|p| p[2] > 1.19)))
+            NodesOnObstacle::new(ball, &solid.nodes, &dofs, &near(|p| p[2] > 1.19))
                 .unwrap()
                 .moving(|t| [[0.0, 0.0, -0.4 * t], [0.0, 0.0, -0.4], [0.0; 3]]),
         )
@@ -161,7 +155,7 @@ fn a_soft_disc_bounces_without_gaining_energy_or_a_checkered_pressure() {
     for scheme in schemes {
         let (name, mass) = (scheme.name(), disc.lumped_mass::<f64>());
         let mut run = Simulation::builder(disc.system().load(gravity(&disc, g)), scheme, h)
-            .constraint(NodesOnObstacle::new(floor, candidates(&disc, nodes.clone())).unwrap())
+            .constraint(NodesOnObstacle::new(floor, &disc.nodes, &disc.node_dofs(), &nodes).unwrap())
             .corrector(PersistencyCorrection::with_history_projection())
             .build()
             .unwrap();
@@ -185,7 +179,7 @@ fn a_soft_disc_bounces_without_gaining_energy_or_a_checkered_pressure() {
             if force > largest {
                 largest = force;
                 let pressed = contacts.ids().iter().zip(contacts.forces()).filter(|(_, f)| **f > 0.0);
-                pressures = pressed.map(|(id, f)| f / share[nodes[id.feature]]).collect();
+                pressures = pressed.map(|(id, f)| f / share[id.feature]).collect();
             }
         }
         assert!(highest - start < 0.01 * scale, "{name}");

@@ -160,12 +160,7 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn jacobian(&self, out: &mut ContactJacobian<T>) {
-        for row in 0..self.len() {
-            let range = self.jacobian.pointers[row]..self.jacobian.pointers[row + 1];
-            out.dofs.extend_from_slice(&self.jacobian.dofs[range.clone()]);
-            out.weights.extend_from_slice(&self.jacobian.weights[range]);
-            out.pointers.push(out.dofs.len());
-        }
+        out.append(&self.jacobian);
     }
 
     fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {

@@ -8,37 +8,28 @@ use crate::real::Real;
 /// Translation of an obstacle at t, its velocity and its acceleration.
 type Motion<'a, T, const D: usize> = Box<dyn FnMut(f64) -> [[T; D]; 3] + Send + 'a>;
 
-/// A node of a contact surface: where it is at u = 0, and the dofs of its displacement along each axis.
+/// A node: its number, where it is at u = 0, and the dofs of its displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceNode<T, const D: usize> {
-    /// Coordinates at u = 0.
-    pub place: [T; D],
-    /// Dofs of the displacement.
-    pub dofs: [usize; D],
+struct Node<T, const D: usize> {
+    number: usize,
+    place: [T; D],
+    dofs: [usize; D],
 }
 
-impl<T: Real, const D: usize> SurfaceNode<T, D> {
+impl<T: Real, const D: usize> Node<T, D> {
     /// Coordinates at u.
-    pub(super) fn at(&self, u: &[T]) -> [T; D] {
+    fn at(&self, u: &[T]) -> [T; D] {
         std::array::from_fn(|axis| self.place[axis] + u[self.dofs[axis]])
     }
 
     /// The entries of a vector of the system.
-    pub(super) fn of(&self, x: &[T]) -> [T; D] {
+    fn of(&self, x: &[T]) -> [T; D] {
         self.dofs.map(|dof| x[dof])
-    }
-
-    /// Refuses coordinates that are not numbers.
-    pub(super) fn check_finite(nodes: &[Self]) -> Result<()> {
-        let worst = nodes.iter().enumerate().find_map(|(i, n)| n.place.iter().find(|x| !x.is_finite()).map(|x| (i, x)));
-        match worst {
-            None => Ok(()),
-            Some((index, x)) => Err(Error::NotFinite { what: "the place of a contact node", index, value: x.value() }),
-        }
     }
 }
 
-/// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal.
+/// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
+/// identified by the number of the node.
 ///
 /// The rows are linearized where a step begins: within the step a node sees the tangent plane (and the obstacle's own
 /// motion exactly), which on a surface of radius R leaves a gap of up to (h v)²/(2R) that the next step corrects. On planes
@@ -46,13 +37,12 @@ impl<T: Real, const D: usize> SurfaceNode<T, D> {
 /// box.
 ///
 /// ```
-/// use contact_dynamics::contact::{ContactConstraint, Plane, SurfaceNode};
-/// use contact_dynamics::contact::{ContactLaw, NodesOnObstacle};
+/// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
 ///
-/// let node = |x: f64, y: f64, first: usize| SurfaceNode { place: [x, y], dofs: [first, first + 1] };
+/// let (coordinates, dofs) = ([[1.0, 0.0], [0.0, 0.5]], [[0, 1], [2, 3]]);
 /// let slope = Plane::new([0.0, 0.0], [0.6, 0.8])?;
-/// let mut contact = NodesOnObstacle::new(slope, vec![node(1.0, 0.0, 0), node(0.0, 0.5, 2)])?
-///     .law(ContactLaw::Rigid)
+/// let mut contact = NodesOnObstacle::new(slope, &coordinates, &dofs, &[0, 1])?
+///     .with_law(ContactLaw::Rigid)
 ///     .moving(|t| [[0.0, -0.1 * t], [0.0, -0.1], [0.0, 0.0]]); // sinks with speed 0.1
 /// let mut gaps = [0.0; 2];
 /// contact.search(0.0, &[0.0; 4], &[0.0; 4])?;
@@ -62,7 +52,7 @@ impl<T: Real, const D: usize> SurfaceNode<T, D> {
 /// ```
 pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     obstacle: Box<dyn Obstacle<T, D> + 'a>,
-    nodes: Vec<SurfaceNode<T, D>>,
+    nodes: Vec<Node<T, D>>,
     law: ContactLaw,
     reach: T,
     motion: Option<Motion<'a, T, D>>,
@@ -71,7 +61,7 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     before: Vec<Row<T, D>>,
 }
 
-/// A node that is a candidate.
+/// A node that is a candidate, by its place in the list of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row<T, const D: usize> {
     node: usize,
@@ -91,13 +81,37 @@ impl<T: Real, const D: usize> std::fmt::Debug for NodesOnObstacle<'_, T, D> {
 }
 
 impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
-    /// Rigid contact of all these nodes with an obstacle at rest.
+    /// Rigid contact of `nodes` with an obstacle at rest.
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh and `dofs` the dofs of their displacements;
+    /// `nodes` names nodes by their index there.
     ///
     /// # Errors
     ///
-    /// [`Error::NotFinite`] if a node is nowhere.
-    pub fn new(obstacle: impl Obstacle<T, D> + 'a, nodes: Vec<SurfaceNode<T, D>>) -> Result<Self> {
-        SurfaceNode::check_finite(&nodes)?;
+    /// [`Error::Dimension`] if the lists differ in length or a node does not exist, [`Error::NotFinite`] for the
+    /// coordinates (index: node).
+    pub fn new(
+        obstacle: impl Obstacle<T, D> + 'a,
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        nodes: &[usize],
+    ) -> Result<Self> {
+        let count = coordinates.len();
+        if dofs.len() != count {
+            return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
+        }
+        if let Some(&found) = nodes.iter().find(|&&node| node >= count) {
+            let (what, expected) = ("a contact node (at most)", count.saturating_sub(1));
+            return Err(Error::Dimension { what, expected, found });
+        }
+        for &index in nodes {
+            if let Some(x) = coordinates[index].iter().find(|x| !x.is_finite()) {
+                let what = "the list of coordinates (by node)";
+                return Err(Error::NotFinite { what, index, value: x.value() });
+            }
+        }
+        let node = |&number: &usize| Node { number, place: coordinates[number], dofs: dofs[number] };
+        let nodes: Vec<_> = nodes.iter().map(node).collect();
         let capacity = nodes.len();
         let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
@@ -106,7 +120,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
 
     /// The law of all rows; [`ContactLaw::Rigid`] by default.
     #[must_use]
-    pub fn law(mut self, law: ContactLaw) -> Self {
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
@@ -203,7 +217,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn identity(&self, row: usize) -> (usize, usize) {
-        (self.rows[row].node, 0)
+        (self.nodes[self.rows[row].node].number, 0)
     }
 
     fn law(&self, _: usize) -> ContactLaw {

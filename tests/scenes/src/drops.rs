@@ -1,7 +1,7 @@
 //! A block of hex8 elements dropped on a floor: flat, on an edge, on a corner.
 
 use crate::solids::{Material, Solid};
-use contact_dynamics::contact::{Plane, SurfaceNode};
+use contact_dynamics::contact::Plane;
 use contact_dynamics::{
     ActiveSet, Composite, ContactSolver, NodesOnObstacle, PersistencyCorrection, Result, Simulation, TimeIntegrator,
 };
@@ -83,10 +83,9 @@ impl Drop {
             Landing::Flat => surface.filter(|&node| solid.nodes[node][2] < 0.5 / self.cells as f64).collect(),
             _ => surface.filter(|&node| solid.nodes[node][2] < 0.35).collect(),
         };
-        let node = |&n: &usize| SurfaceNode { place: solid.nodes[n], dofs: [3 * n, 3 * n + 1, 3 * n + 2] };
         Simulation::builder(solid.system(), scheme, self.step())
             .velocity(solid.uniform([0.0, 0.0, -SPEED]))
-            .constraint(NodesOnObstacle::new(floor, nodes.iter().map(node).collect())?)
+            .constraint(NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &nodes)?)
             .contact_solver(solver)
             .corrector(PersistencyCorrection::with_history_projection())
             .build()

@@ -336,9 +336,9 @@ impl<const D: usize> Solid<D> {
         (0..self.dofs()).map(|dof| T::of(value[dof % D])).collect()
     }
 
-    /// Coordinates of some nodes.
-    pub fn places(&self, nodes: &[usize]) -> Vec<[f64; D]> {
-        nodes.iter().map(|&node| self.nodes[node]).collect()
+    /// The dofs of all nodes.
+    pub fn node_dofs(&self) -> Vec<[usize; D]> {
+        (0..self.nodes.len()).map(|node| std::array::from_fn(|axis| Self::dof(node, axis))).collect()
     }
 }
 

@@ -1,0 +1,565 @@
+//! Contact of the nodes of one deforming surface with the facets of another.
+
+mod geometry;
+mod search;
+mod surface;
+
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use geometry::{Foot, Location, Point, Shape, dot};
+use search::{Bounds, Neighborhood, overhang};
+use surface::Surface;
+
+/// A facet of a surface: the numbers of its 2, 3 or 4 nodes.
+///
+/// Its normal points out of the body: a segment (two dimensions) is walked with the body on the left, a triangle or a
+/// bilinear quadrilateral (three dimensions) goes counter-clockwise if seen from outside.
+///
+/// ```
+/// use contact_dynamics::contact::Facet;
+/// let mixed = [Facet::from([0, 1, 2]), Facet::from([1, 3, 4, 2])];
+/// assert_eq!(mixed[1].nodes(), [1, 3, 4, 2]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facet {
+    nodes: [usize; 4],
+    count: usize,
+}
+
+impl From<[usize; 2]> for Facet {
+    fn from([i, j]: [usize; 2]) -> Self {
+        Self { nodes: [i, j, j, j], count: 2 }
+    }
+}
+
+impl From<[usize; 3]> for Facet {
+    fn from([i, j, k]: [usize; 3]) -> Self {
+        Self { nodes: [i, j, k, k], count: 3 }
+    }
+}
+
+impl From<[usize; 4]> for Facet {
+    fn from(nodes: [usize; 4]) -> Self {
+        Self { nodes, count: 4 }
+    }
+}
+
+impl Facet {
+    /// The nodes in the order given.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes[..self.count]
+    }
+
+    fn shape(&self, positions: &[Point]) -> Shape {
+        Shape::new(self.nodes.map(|node| positions[node]), self.count)
+    }
+}
+
+/// The rows that a search found.
+#[derive(Debug)]
+struct Rows<T> {
+    jacobian: ContactJacobian<T>,
+    /// (node, pass)
+    identities: Vec<(usize, usize)>,
+    /// Index of the facet in the list of its pass.
+    facets: Vec<usize>,
+    /// Gaps at the search.
+    gaps: Vec<T>,
+    /// Displacements at the search, one an entry of G.
+    displacements: Vec<T>,
+}
+
+impl<T: Real> Rows<T> {
+    fn with_capacity(rows: usize, entries: usize) -> Self {
+        Self {
+            jacobian: ContactJacobian::with_capacity(rows, entries),
+            identities: Vec::with_capacity(rows),
+            facets: Vec::with_capacity(rows),
+            gaps: Vec::with_capacity(rows),
+            displacements: Vec::with_capacity(entries),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.jacobian.clear();
+        self.identities.clear();
+        self.facets.clear();
+        self.gaps.clear();
+        self.displacements.clear();
+    }
+}
+
+/// One direction of contact: nodes against a surface.
+#[derive(Debug)]
+struct Pass {
+    nodes: Vec<usize>,
+    neighborhood: Neighborhood,
+}
+
+/// Contact of the nodes of one deforming surface with the facets of another: segments in two dimensions, triangles and
+/// bilinear quadrilaterals in three.
+///
+/// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
+/// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on
+/// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
+/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at
+/// a depth of up to `reach` are found as well as nodes outside.
+///
+/// # Linearization
+///
+/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; until the next one
+/// normals and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in
+/// a step: what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is
+/// the derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step
+/// is left out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run; a gap
+/// within the rounding of coordinates (16 ε of the largest) is zero.
+///
+/// # Which facet, which normal
+///
+/// A node has at most one row a pass, from the closest facet. Inside of a facet n is the facet's normal. If the closest
+/// point is on a side or a vertex that facets share, n is the direction between it and the node, so that the gap is
+/// continuous when a node passes from one facet to the next; if the node is closer to it than √ε of the facet's longest
+/// side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind a convex edge the closest
+/// facet changes at the bisector, and with it the normal, not the gap. A node that stands beyond the rim of an open
+/// surface has no row; by 1e-3 of the facet the surface goes on beyond its rim.
+///
+/// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
+/// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing).
+///
+/// # Identity
+///
+/// (number of the node, pass). A node that slides from one facet to the next keeps its multiplier;
+/// [`facet`](Self::facet) tells the facet.
+///
+/// # Search
+///
+/// One pass over the nodes compares the bounding boxes of the two surfaces; apart by more than `reach` they have no
+/// candidates. Otherwise each node looks at the facets of its list. Lists hold the facets within `reach` and a
+/// [`skin`](Self::skin); they are built anew, from an R*-tree, when nodes of the two surfaces have moved by more than
+/// the skin relative to each other (in any coordinate). Memory is allocated then and at no other time. Bodies that fly
+/// together rebuild nothing.
+///
+/// ```
+/// use contact_dynamics::ContactConstraint;
+/// use contact_dynamics::contact::{ContactJacobian, NodeToFacet};
+///
+/// // The top side of a body, walked with the body on the left, and a node 0.1 above it.
+/// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.25, 0.1]];
+/// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+/// let mut contact = NodeToFacet::new(&coordinates, &dofs, &[3], [[0, 1], [1, 2]], 0.5)?;
+///
+/// let mut u = [0.0; 8];
+/// contact.search(0.0, &u, &[0.0; 8])?;
+/// assert_eq!(contact.candidates(), 1);
+/// assert_eq!(contact.identity(0), (3, 0));
+/// assert_eq!(contact.facet(0), 1);
+///
+/// let mut g = ContactJacobian::default();
+/// contact.jacobian(&mut g);
+/// assert_eq!(g.row(0).collect::<Vec<_>>(), [(7, 1.0), (3, -0.25), (5, -0.75)]);
+///
+/// u[7] = -0.3; // the node is pushed into the body
+/// let mut gap = [0.0];
+/// contact.gap(0.0, &u, &mut gap);
+/// assert!((gap[0] + 0.2_f64).abs() < 1e-15);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct NodeToFacet<T: Real> {
+    dimension: usize,
+    /// Reference coordinates, by node.
+    coordinates: Vec<Point>,
+    /// Dofs of the displacement, by node; the first `dimension` count.
+    dofs: Vec<[usize; 3]>,
+    /// Positions now and when the lists were built, by node.
+    positions: Vec<Point>,
+    built_at: Vec<Point>,
+    /// Facets that the nodes meet.
+    surface: Surface,
+    /// Facets that the nodes belong to, if known.
+    own_surface: Option<Surface>,
+    /// All nodes of the two bodies: the one of the nodes, the one of the facets.
+    bodies: [Vec<usize>; 2],
+    passes: Vec<Pass>,
+    law: ContactLaw,
+    reach: f64,
+    skin: f64,
+    rebuilds: usize,
+    largest_dof: usize,
+    /// The node that a node of the first pass stands on exactly.
+    partners: Vec<Option<usize>>,
+    rows: Rows<T>,
+    /// What the search under way finds.
+    found: Rows<T>,
+}
+
+fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> {
+    match nodes.iter().find(|&&node| node >= count) {
+        Some(&node) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found: node }),
+        None => Ok(()),
+    }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<f64> {
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(Error::Parameter { name, value, range: "positive and finite" })
+    }
+}
+
+impl<T: Real> NodeToFacet<T> {
+    /// Contact of `nodes` with `facets`, found within the distance `reach` (length) outside and inside of the facets.
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
+    /// dofs of their displacements; `nodes` and `facets` name nodes by their index there. Nodes that neither names are
+    /// not read later. The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
+    /// [`with_law`](Self::with_law) gives another.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if D is not 2 or 3, if the lists differ in length, if a facet does not fit D, or if a node
+    /// does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without nodes or
+    /// facets; [`Error::Parameter`] for `reach`; [`Error::Incompatible`] for a facet without area, folded, turned
+    /// against its neighbor or at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
+    pub fn new<F: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        nodes: &[usize],
+        facets: impl IntoIterator<Item = F>,
+        reach: T,
+    ) -> Result<Self> {
+        if D != 2 && D != 3 {
+            return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
+        }
+        let count = coordinates.len();
+        if dofs.len() != count {
+            return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
+        }
+        for (index, x) in coordinates.iter().enumerate() {
+            if let Some(x) = x.iter().find(|x| !x.is_finite()) {
+                let what = "the list of coordinates (by node)";
+                return Err(Error::NotFinite { what, index, value: x.value() });
+            }
+        }
+        let reach = positive("the reach of a contact search", reach.value())?;
+        if nodes.is_empty() {
+            let what = "the list of contact nodes";
+            return Err(Error::Empty { what, remedy: "give at least one node" });
+        }
+        check_nodes("a contact node (at most)", nodes, count)?;
+        let coordinates: Vec<_> = coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect();
+        let dofs: Vec<[usize; 3]> =
+            dofs.iter().map(|dofs| std::array::from_fn(|i| dofs.get(i).copied().unwrap_or(0))).collect();
+        let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &coordinates)?;
+        let mut sorted = nodes.to_vec();
+        sorted.sort_unstable();
+        if let Some([node, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            let part = format!("contact node {node}");
+            return Err(Error::Incompatible { part, reason: "it is listed twice" });
+        }
+        let bodies = [sorted, surface.nodes().to_vec()];
+        let mut contact = Self {
+            dimension: D,
+            positions: coordinates.clone(),
+            built_at: Vec::new(),
+            coordinates,
+            dofs,
+            surface,
+            own_surface: None,
+            passes: vec![Pass { nodes: bodies[0].clone(), neighborhood: Neighborhood::default() }],
+            bodies,
+            law: ContactLaw::Rigid,
+            reach,
+            skin: 0.5 * reach,
+            rebuilds: 0,
+            largest_dof: 0,
+            partners: Vec::new(),
+            rows: Rows::with_capacity(0, 0),
+            found: Rows::with_capacity(0, 0),
+        };
+        contact.prepare()?;
+        Ok(contact)
+    }
+
+    /// The law of all rows.
+    #[must_use]
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built
+    /// anew; half of the reach if not given. It changes the cost, not the result.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn skin(mut self, skin: T) -> Result<Self> {
+        self.skin = positive("the skin of a contact search", skin.value())?;
+        self.built_at.clear();
+        Ok(self)
+    }
+
+    /// Tells the facets that the nodes belong to: a node then meets only facets turned against its own normal, which is
+    /// the mean of its facets' normals (refused: an angle of less than 60° between the two).
+    ///
+    /// This keeps a node from the far side of a thin body, and from facets that it comes to from behind.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`new`](Self::new) about facets.
+    pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
+        let own = Surface::new(facets.into_iter().map(Into::into).collect(), self.dimension, &self.coordinates)?;
+        let body = &mut self.bodies[0];
+        body.clone_from(&self.passes[0].nodes);
+        body.extend(own.nodes());
+        body.sort_unstable();
+        body.dedup();
+        self.own_surface = Some(own);
+        self.passes.truncate(1);
+        self.prepare()?;
+        Ok(self)
+    }
+
+    /// Adds the second pass: the nodes of the facets given first also meet `facets`, those of the other surface.
+    ///
+    /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only
+    /// the first pass makes a row.
+    ///
+    /// Two passes treat both surfaces alike, but have more rows than independent gaps where a flat interface closes as a
+    /// whole: the multipliers are then those of least norm, and where the two surfaces' gaps contradict each other by
+    /// the faceting of curved surfaces, rigid contact keeps both from penetrating. They are meant for edges, vertices
+    /// and scattered contacts, and for laws with compliance.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`new`](Self::new) about facets.
+    pub fn two_pass<F: Into<Facet>>(self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
+        let mut contact = self.facing(facets)?;
+        let nodes = contact.surface.nodes().to_vec();
+        contact.passes.push(Pass { nodes, neighborhood: Neighborhood::default() });
+        contact.prepare()?;
+        Ok(contact)
+    }
+
+    /// Index of the facet that a row of the last search stands on, in the list of its pass.
+    pub fn facet(&self, row: usize) -> usize {
+        self.rows.facets[row]
+    }
+
+    /// How often the lists of facets have been built: many times in a run, and a larger [`skin`](Self::skin) may pay.
+    pub fn rebuilds(&self) -> usize {
+        self.rebuilds
+    }
+
+    /// Checks that the bodies share no node, and reserves memory for all rows there can be.
+    fn prepare(&mut self) -> Result<()> {
+        let [one, other] = &self.bodies;
+        if let Some(node) = one.iter().find(|node| other.binary_search(node).is_ok()) {
+            let part = format!("contact node {node}");
+            return Err(Error::Incompatible { part, reason: "it belongs to both surfaces" });
+        }
+        let dofs = self.bodies.iter().flatten().flat_map(|&node| &self.dofs[node][..self.dimension]);
+        self.largest_dof = dofs.copied().max().unwrap_or(0);
+        let (rows, entries) = (self.max_candidates(), self.max_entries());
+        self.rows = Rows::with_capacity(rows, entries);
+        self.found = Rows::with_capacity(rows, entries);
+        self.partners = vec![None; if self.passes.len() > 1 { self.coordinates.len() } else { 0 }];
+        self.built_at.clear();
+        Ok(())
+    }
+
+    /// Shares of a facet below which closeness to a side or a vertex is rounding.
+    fn rounding() -> f64 {
+        T::epsilon().value().sqrt()
+    }
+
+    /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
+    fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
+        let Self { dimension, coordinates, dofs, positions, built_at, bodies, .. } = self;
+        let (mut boxes, mut motions) = ([Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
+        for ((body, bounds), motion) in bodies.iter().zip(&mut boxes).zip(&mut motions) {
+            for &node in body {
+                let mut x = coordinates[node];
+                for (x, &dof) in x.iter_mut().zip(&dofs[node][..*dimension]) {
+                    *x += u[dof].value();
+                    if !x.is_finite() {
+                        let what = "the displacement of a contact surface (by dof)";
+                        return Err(Error::NotFinite { what, index: dof, value: u[dof].value() });
+                    }
+                }
+                positions[node] = x;
+                bounds.include(x);
+                if let Some(&before) = built_at.get(node) {
+                    motion.include(geometry::sub(x, before));
+                }
+            }
+        }
+        Ok((boxes, motions))
+    }
+
+    /// Makes lists of facets valid for the positions now.
+    fn update_lists(&mut self, [one, other]: &[Bounds; 2]) {
+        if !self.built_at.is_empty() && one.spread(other) <= self.skin {
+            return;
+        }
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
+            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.reach + self.skin);
+        }
+        self.built_at.clone_from(&self.positions);
+        self.rebuilds += 1;
+    }
+
+    /// The rows of one pass, in the order of its nodes.
+    fn find_rows(&mut self, pass: usize, near: &Bounds, u: &[T]) {
+        /// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
+        const SAME_SIDE: f64 = 0.5;
+        let Self { coordinates, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let (surface, own) = match (pass, &self.own_surface) {
+            (0, own) => (&self.surface, own.as_ref()),
+            (_, Some(own)) => (own, Some(&self.surface)),
+            _ => return,
+        };
+        let Pass { nodes, neighborhood } = &passes[pass];
+        for (k, &node) in nodes.iter().enumerate() {
+            let p = positions[node];
+            if !near.contains(p) {
+                continue;
+            }
+            let own_normal = own.and_then(|own| own.node_normal(node, positions));
+            let mut best: Option<(usize, (Shape, Foot))> = None;
+            for &index in neighborhood.of(k) {
+                let limit = best.map_or(*reach, |(_, (_, foot))| foot.distance);
+                let [lower, upper] = surface.facets()[index].shape(positions).bounds();
+                let bounds = Bounds { lower, upper };
+                if !bounds.inflated(limit + overhang(&bounds)).contains(p) {
+                    continue;
+                }
+                let Some((shape, foot)) = surface.project(index, p, positions) else { continue };
+                if foot.distance > *reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
+                    continue;
+                }
+                let same_side =
+                    |normal: Point| shape.normal(&foot.weights).is_none_or(|facet| dot(facet, normal) > SAME_SIDE);
+                if own_normal.is_none_or(|normal| !same_side(normal)) {
+                    best = Some((index, (shape, foot)));
+                }
+            }
+            let Some((facet, projected)) = best.filter(|(_, (_, foot))| foot.location != Location::Beyond) else {
+                continue;
+            };
+            let foot = &projected.1;
+            let vertices = surface.facets()[facet].nodes();
+            if !partners.is_empty() {
+                let on = vertices.iter().zip(&foot.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
+                let on = on.map(|(&vertex, _)| vertex);
+                match pass {
+                    0 => partners[node] = on,
+                    _ if on.is_some_and(|vertex| partners[vertex] == Some(node)) => continue,
+                    _ => {}
+                }
+            }
+            let Some((normal, gap)) = surface.direction(facet, p, &projected, Self::rounding(), positions) else {
+                continue;
+            };
+            let entries = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(foot.weights.map(|w| -w)));
+            for (node, share) in entries {
+                for (&dof, &component) in dofs[node][..*dimension].iter().zip(&normal) {
+                    let weight = T::of(share * component);
+                    if weight != T::zero() {
+                        found.jacobian.dofs.push(dof);
+                        found.jacobian.weights.push(weight);
+                        found.displacements.push(u[dof]);
+                    }
+                }
+            }
+            found.jacobian.pointers.push(found.jacobian.dofs.len());
+            found.identities.push((node, pass));
+            found.facets.push(facet);
+            // Touching is touching, whatever rounding the coordinates carry: the tolerances of contact know only that
+            // of u.
+            let reference = coordinates[node];
+            let magnitude = [p, foot.point, reference].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let rounding = 16.0 * T::epsilon().value() * magnitude;
+            found.gaps.push(if gap.abs() <= rounding { T::zero() } else { T::of(gap) });
+        }
+    }
+}
+
+fn component<T: Real>(x: &[T], i: usize) -> f64 {
+    x.get(i).map_or(0.0, |x| x.value())
+}
+
+impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
+    fn max_candidates(&self) -> usize {
+        self.passes.iter().map(|pass| pass.nodes.len()).sum()
+    }
+
+    fn max_entries(&self) -> usize {
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        let entries = |(pass, surface): (&Pass, &Surface)| {
+            let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
+            pass.nodes.len() * self.dimension * (1 + vertices)
+        };
+        self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum()
+    }
+
+    fn check(&self, dofs: usize) -> Result<()> {
+        match self.largest_dof {
+            dof if dof >= dofs => Err(Error::MissingDof { what: "a contact surface", dof, dofs }),
+            _ => Ok(()),
+        }
+    }
+
+    fn search(&mut self, _t: f64, u: &[T], _v: &[T]) -> Result<Candidates> {
+        self.check(u.len())?;
+        let (boxes, motions) = self.move_nodes(u)?;
+        self.found.clear();
+        // Facets go on a little beyond the rim.
+        let range = self.reach + boxes.iter().map(overhang).fold(0.0, f64::max);
+        if boxes[0].inflated(range).intersects(&boxes[1]) {
+            self.update_lists(&motions);
+            self.partners.fill(None);
+            for pass in 0..self.passes.len() {
+                self.find_rows(pass, &boxes[1 - pass].inflated(range), u);
+            }
+        }
+        let (rows, found) = (&self.rows, &self.found);
+        let same = rows.identities == found.identities && rows.jacobian == found.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+    }
+
+    fn candidates(&self) -> usize {
+        self.rows.gaps.len()
+    }
+
+    fn identity(&self, row: usize) -> (usize, usize) {
+        self.rows.identities[row]
+    }
+
+    fn law(&self, _row: usize) -> ContactLaw {
+        self.law
+    }
+
+    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+        out.append(&self.rows.jacobian);
+    }
+
+    fn gap(&mut self, _t: f64, u: &[T], out: &mut [T]) {
+        let Rows { jacobian, gaps, displacements, .. } = &self.rows;
+        for (row, (out, &gap)) in out.iter_mut().zip(gaps).enumerate() {
+            let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];
+            let moved = jacobian.row(row).zip(start).map(|((dof, weight), &start)| weight * (u[dof] - start));
+            *out = gap + moved.sum();
+        }
+    }
+
+    fn dofs(&self, out: &mut Vec<usize>) {
+        let nodes = self.bodies.iter().flatten();
+        out.extend(nodes.flat_map(|&node| &self.dofs[node][..self.dimension]));
+    }
+}

@@ -1,0 +1,375 @@
+//! Facets as shapes: closest points, shape functions and normals of segments, triangles and bilinear quadrilaterals.
+
+/// A point or a vector; in two dimensions the third component is zero.
+pub(super) type Point = [f64; 3];
+
+/// How far outside an open side of a surface a projection still counts as inside, in shares of the facet: nodes at the
+/// rim of matching meshes must not lose their row to rounding or to a little stretch.
+pub(super) const RIM: f64 = 1e-3;
+
+pub(super) fn sub(x: Point, y: Point) -> Point {
+    [x[0] - y[0], x[1] - y[1], x[2] - y[2]]
+}
+
+/// `x + c y`.
+pub(super) fn add_scaled(x: Point, c: f64, y: Point) -> Point {
+    [x[0] + c * y[0], x[1] + c * y[1], x[2] + c * y[2]]
+}
+
+pub(super) fn dot(x: Point, y: Point) -> f64 {
+    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+}
+
+pub(super) fn cross(x: Point, y: Point) -> Point {
+    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+}
+
+pub(super) fn norm(x: Point) -> f64 {
+    dot(x, x).sqrt()
+}
+
+/// `x / |x|`; none for the zero vector.
+pub(super) fn unit(x: Point) -> Option<Point> {
+    let length = norm(x);
+    (length > 0.0 && length.is_finite()).then(|| [x[0] / length, x[1] / length, x[2] / length])
+}
+
+/// What a facet borders on, by side and by vertex: whether the surface ends there.
+///
+/// Side k runs from vertex k to the next; the sides of a segment are its two vertices.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rim {
+    pub(super) sides: [bool; 4],
+    pub(super) vertices: [bool; 4],
+}
+
+/// Where on a facet a closest point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Location {
+    /// Inside: the node stands on the facet along its normal.
+    Inside,
+    /// On a side that a neighbor shares.
+    Side(usize),
+    /// On a vertex around which the surface is closed.
+    Vertex(usize),
+    /// On the rim, and the node stands outside of it.
+    Beyond,
+}
+
+/// The point of a facet closest to a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Foot {
+    /// Shape functions of the vertices there; their sum is one.
+    pub(super) weights: [f64; 4],
+    pub(super) point: Point,
+    pub(super) distance: f64,
+    pub(super) location: Location,
+}
+
+/// A facet where its vertices are now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    corners: [Point; 4],
+    count: usize,
+}
+
+impl Shape {
+    /// The facet with 2, 3 or 4 corners.
+    pub(super) fn new(corners: [Point; 4], count: usize) -> Self {
+        Self { corners, count }
+    }
+
+    fn after(&self, k: usize) -> usize {
+        if k + 1 == self.count { 0 } else { k + 1 }
+    }
+
+    fn before(&self, k: usize) -> usize {
+        if k == 0 { self.count - 1 } else { k - 1 }
+    }
+
+    /// The side that begins at vertex k, as a vector.
+    fn side(&self, k: usize) -> Point {
+        sub(self.corners[self.after(k)], self.corners[k])
+    }
+
+    /// Length of the longest side.
+    pub(super) fn size(&self) -> f64 {
+        (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Lower and upper corner of the bounding box.
+    pub(super) fn bounds(&self) -> [Point; 2] {
+        let [mut lower, mut upper] = [self.corners[0]; 2];
+        for corner in &self.corners[1..self.count] {
+            lower = std::array::from_fn(|i| lower[i].min(corner[i]));
+            upper = std::array::from_fn(|i| upper[i].max(corner[i]));
+        }
+        [lower, upper]
+    }
+
+    /// The point with the given shape functions.
+    fn point(&self, weights: &[f64; 4]) -> Point {
+        // Differences from the first corner: far from the origin the sum of weighted corners would lose digits.
+        let first = self.corners[0];
+        self.corners[1..self.count]
+            .iter()
+            .zip(&weights[1..])
+            .fold(first, |sum, (&corner, &weight)| add_scaled(sum, weight, sub(corner, first)))
+    }
+
+    /// The shape functions at share `s` of side k.
+    pub(super) fn on_side(&self, k: usize, s: f64) -> [f64; 4] {
+        let mut weights = [0.0; 4];
+        weights[k] = 1.0 - s;
+        weights[self.after(k)] = s;
+        weights
+    }
+
+    /// How far inside of side k a point is, in shares of the facet: 0 on the side, 1 opposite of it.
+    pub(super) fn inset(&self, weights: &[f64; 4], k: usize) -> f64 {
+        match self.count {
+            2 => weights[1 - k],
+            3 => weights[self.before(k)],
+            _ => weights[self.before(k)] + weights[(k + 2) % 4],
+        }
+    }
+
+    /// The outward unit normal where the shape functions are `weights`; none if the facet is degenerate there.
+    pub(super) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
+        let [first, second] = match self.count {
+            2 => [self.side(0), [0.0, 0.0, 1.0]],
+            3 => [self.side(0), sub(self.corners[2], self.corners[0])],
+            _ => self.tangents(Self::coordinates(weights)),
+        };
+        unit(cross(first, second))
+    }
+
+    /// Angle between the sides that meet at vertex k; 1 for a segment.
+    pub(super) fn angle(&self, k: usize) -> f64 {
+        if self.count == 2 {
+            return 1.0;
+        }
+        let (next, previous) = (self.side(k), sub(self.corners[self.before(k)], self.corners[k]));
+        norm(cross(next, previous)).atan2(dot(next, previous))
+    }
+
+    /// Whether the facet has a length or an area, and a normal that points to the same side at every vertex.
+    pub(super) fn is_regular(&self) -> bool {
+        const SMALL: f64 = 1e-10;
+        let size = self.size();
+        if self.count == 2 {
+            return size > 0.0;
+        }
+        let corner = |k: usize| cross(self.side(k), sub(self.corners[self.before(k)], self.corners[k]));
+        let mean = (0..self.count).fold([0.0; 3], |sum, k| add_scaled(sum, 1.0, corner(k)));
+        unit(mean).is_some_and(|mean| (0..self.count).all(|k| dot(mean, corner(k)) > SMALL * size * size))
+    }
+
+    fn foot(&self, p: Point, weights: [f64; 4], location: Location) -> Foot {
+        let point = self.point(&weights);
+        Foot { weights, point, distance: norm(sub(p, point)), location }
+    }
+
+    /// The closest point of the facet; none if the facet is degenerate.
+    ///
+    /// Beyond an open side the facet goes on for [`RIM`] of its extent, so that lever arms stay exact there.
+    pub(super) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
+        match self.count {
+            2 => self.project_on_segment(p, rim),
+            3 => self.project_on_triangle(p, rim),
+            _ => self.project_on_quadrilateral(p, rim),
+        }
+    }
+
+    fn project_on_segment(&self, p: Point, rim: Rim) -> Option<Foot> {
+        let side = self.side(0);
+        let square = dot(side, side);
+        if square <= 0.0 {
+            return None;
+        }
+        let s = dot(sub(p, self.corners[0]), side) / square;
+        // (vertex, share of the segment outside of it)
+        let (vertex, outside) = if s < 0.5 { (0, -s) } else { (1, s - 1.0) };
+        let (s, location) = match rim.vertices[vertex] {
+            true if outside <= RIM => (s, Location::Inside),
+            true => (s.clamp(0.0, 1.0), Location::Beyond),
+            false if outside <= 0.0 => (s, Location::Inside),
+            false => (s.clamp(0.0, 1.0), Location::Vertex(vertex)),
+        };
+        Some(self.foot(p, [1.0 - s, s, 0.0, 0.0], location))
+    }
+
+    fn project_on_triangle(&self, p: Point, rim: Rim) -> Option<Foot> {
+        let (first, second) = (self.side(0), sub(self.corners[2], self.corners[0]));
+        let normal = cross(first, second);
+        let square = dot(normal, normal);
+        if square <= 0.0 {
+            return None;
+        }
+        let r = sub(p, self.corners[0]);
+        let (w1, w2) = (dot(cross(r, second), normal) / square, dot(cross(first, r), normal) / square);
+        let weights = [1.0 - w1 - w2, w1, w2, 0.0];
+        let outside = |k: usize| self.inset(&weights, k) < if rim.sides[k] { -RIM } else { 0.0 };
+        let outside = [outside(0), outside(1), outside(2), false];
+        match outside.contains(&true) {
+            false => Some(self.foot(p, weights, Location::Inside)),
+            true => self.nearest_on_sides(p, rim, outside),
+        }
+    }
+
+    /// The closest point of the sides. Open sides count only if the node stands outside of them.
+    fn nearest_on_sides(&self, p: Point, rim: Rim, outside: [bool; 4]) -> Option<Foot> {
+        let mut best: Option<Foot> = None;
+        for k in (0..self.count).filter(|&k| outside[k] || !rim.sides[k]) {
+            let side = self.side(k);
+            let square = dot(side, side);
+            if square <= 0.0 {
+                continue;
+            }
+            let s = dot(sub(p, self.corners[k]), side) / square;
+            let (vertex, excess) = if s < 0.5 { (k, -s) } else { (self.after(k), s - 1.0) };
+            let (s, location) = match (rim.sides[k], rim.vertices[vertex]) {
+                (true, _) => (s.clamp(0.0, 1.0), Location::Beyond),
+                (false, true) if excess > RIM => (s.clamp(0.0, 1.0), Location::Beyond),
+                (false, false) if excess > 0.0 => (s.clamp(0.0, 1.0), Location::Vertex(vertex)),
+                (false, _) => (s, Location::Side(k)),
+            };
+            let foot = self.foot(p, self.on_side(k, s), location);
+            if best.is_none_or(|best| foot.is_better_than(&best)) {
+                best = Some(foot);
+            }
+        }
+        best
+    }
+
+    /// Natural coordinates (ξ, η) ∈ [−1, 1]² of a quadrilateral from its shape functions.
+    fn coordinates(weights: &[f64; 4]) -> [f64; 2] {
+        let [w0, w1, w2, w3] = *weights;
+        [w1 + w2 - w0 - w3, w2 + w3 - w0 - w1]
+    }
+
+    fn bilinear([xi, eta]: [f64; 2]) -> [f64; 4] {
+        let (left, right, bottom, top) = (0.5 * (1.0 - xi), 0.5 * (1.0 + xi), 0.5 * (1.0 - eta), 0.5 * (1.0 + eta));
+        [left * bottom, right * bottom, right * top, left * top]
+    }
+
+    /// ∂x/∂ξ and ∂x/∂η of a quadrilateral.
+    fn tangents(&self, [xi, eta]: [f64; 2]) -> [Point; 2] {
+        let [x0, x1, x2, x3] = self.corners;
+        let blend = |c: f64, lower: Point, upper: Point| {
+            add_scaled(add_scaled([0.0; 3], 0.25 * (1.0 - c), lower), 0.25 * (1.0 + c), upper)
+        };
+        [blend(eta, sub(x1, x0), sub(x2, x3)), blend(xi, sub(x3, x0), sub(x2, x1))]
+    }
+
+    fn project_on_quadrilateral(&self, p: Point, rim: Rim) -> Option<Foot> {
+        let [bottom, right, top, left] = rim.sides.map(|open| if open { 1.0 + 2.0 * RIM } else { 1.0 });
+        let (lower, upper) = ([-left, -bottom], [right, top]);
+        let Some(z) = self.minimize_distance(p, self.start(p), lower, upper) else {
+            return self.nearest_on_sides(p, rim, [true; 4]);
+        };
+        let at_bound = [z[1] <= lower[1], z[0] >= upper[0], z[1] >= upper[1], z[0] <= lower[0]];
+        let sides = self.nearest_on_sides(p, rim, at_bound);
+        if at_bound.contains(&true) {
+            return sides;
+        }
+        let inside = self.foot(p, Self::bilinear(z), Location::Inside);
+        // A warped facet seen from afar may have a second local minimum on a side.
+        match sides {
+            Some(side) if side.distance < inside.distance * (1.0 - 1e-12) => Some(side),
+            _ => Some(inside),
+        }
+    }
+
+    /// Natural coordinates of the closest point of the two triangles that the first diagonal makes.
+    fn start(&self, p: Point) -> [f64; 2] {
+        let [x0, x1, x2, x3] = self.corners;
+        let closed = Rim::default();
+        let halves = [([x0, x1, x2, x2], [0, 1, 2]), ([x0, x2, x3, x3], [0, 2, 3])];
+        let mut best: Option<(f64, [f64; 4])> = None;
+        for (corners, vertices) in halves {
+            let Some(foot) = Self::new(corners, 3).project_on_triangle(p, closed) else { continue };
+            if best.is_none_or(|(distance, _)| foot.distance < distance) {
+                let mut weights = [0.0; 4];
+                for (vertex, weight) in vertices.into_iter().zip(foot.weights) {
+                    weights[vertex] = weight;
+                }
+                best = Some((foot.distance, weights));
+            }
+        }
+        best.map_or([0.0; 2], |(_, weights)| Self::coordinates(&weights).map(|z| z.clamp(-1.0, 1.0)))
+    }
+
+    /// Minimum of ½|p − x(ξ, η)|² in a box by Newton's method, with bounds as an active set and descent enforced; none
+    /// if it does not converge.
+    fn minimize_distance(&self, p: Point, start: [f64; 2], lower: [f64; 2], upper: [f64; 2]) -> Option<[f64; 2]> {
+        const ITERATIONS: usize = 60;
+        const TINY: f64 = 1e-7;
+        // Steps made after convergence is in sight: one squares the error, one more settles the last digits.
+        const POLISH: usize = 3;
+        let [x0, x1, x2, x3] = self.corners;
+        // ∂²x/∂ξ∂η.
+        let twist = add_scaled(add_scaled([0.0; 3], 0.25, sub(x0, x1)), 0.25, sub(x2, x3));
+        let (mut z, mut polished) = (start, 0);
+        let residual = |z: [f64; 2]| sub(self.point(&Self::bilinear(z)), p);
+        for _ in 0..ITERATIONS {
+            let r = residual(z);
+            let value = dot(r, r);
+            let [a, b] = self.tangents(z);
+            let gradient = [dot(r, a), dot(r, b)];
+            let (aa, bb, mut ab) = (dot(a, a), dot(b, b), dot(a, b) + dot(r, twist));
+            if aa * bb - ab * ab <= 1e-3 * aa * bb {
+                // Not convex here: without the curvature the matrix is positive definite.
+                ab = dot(a, b);
+            }
+            let held = |i: usize| (z[i] <= lower[i] && gradient[i] > 0.0) || (z[i] >= upper[i] && gradient[i] < 0.0);
+            let step = match (held(0), held(1)) {
+                (true, true) => [0.0; 2],
+                (true, false) => [0.0, -gradient[1] / bb],
+                (false, true) => [-gradient[0] / aa, 0.0],
+                (false, false) => {
+                    let determinant = aa * bb - ab * ab;
+                    [
+                        (ab * gradient[1] - bb * gradient[0]) / determinant,
+                        (ab * gradient[0] - aa * gradient[1]) / determinant,
+                    ]
+                }
+            };
+            if !(step[0].is_finite() && step[1].is_finite()) {
+                return None;
+            }
+            let moved = |share: f64| {
+                [(z[0] + share * step[0]).clamp(lower[0], upper[0]), (z[1] + share * step[1]).clamp(lower[1], upper[1])]
+            };
+            let mut share = 1.0;
+            let mut next = moved(share);
+            let length = |next: [f64; 2]| (next[0] - z[0]).abs().max((next[1] - z[1]).abs());
+            // Rounding hides the descent of the last steps, which are the best ones.
+            while length(next) > TINY && {
+                let r = residual(next);
+                dot(r, r) > value
+            } {
+                share *= 0.5;
+                next = moved(share);
+            }
+            let change = length(next);
+            z = next;
+            polished += usize::from(change <= TINY);
+            if change <= f64::EPSILON || polished == POLISH {
+                return Some(z);
+            }
+        }
+        None
+    }
+}
+
+impl Foot {
+    /// Closer, or as close and not outside of the rim.
+    #[allow(clippy::float_cmp)] // a tie between two facets that share the point
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        self.distance < other.distance
+            || (self.distance == other.distance
+                && other.location == Location::Beyond
+                && self.location != Location::Beyond)
+    }
+}

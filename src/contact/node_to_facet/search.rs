@@ -1,0 +1,104 @@
+//! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
+
+use super::geometry::{Point, RIM};
+use super::surface::Surface;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+use std::ops::ControlFlow;
+
+/// An axis-parallel box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) lower: Point,
+    pub(super) upper: Point,
+}
+
+impl Bounds {
+    /// Holds nothing.
+    pub(super) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
+
+    pub(super) fn include(&mut self, x: Point) {
+        self.lower = std::array::from_fn(|i| self.lower[i].min(x[i]));
+        self.upper = std::array::from_fn(|i| self.upper[i].max(x[i]));
+    }
+
+    pub(super) fn of_points(points: impl IntoIterator<Item = Point>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |mut bounds, x| {
+            bounds.include(x);
+            bounds
+        })
+    }
+
+    pub(super) fn inflated(&self, by: f64) -> Self {
+        Self { lower: self.lower.map(|x| x - by), upper: self.upper.map(|x| x + by) }
+    }
+
+    pub(super) fn intersects(&self, other: &Self) -> bool {
+        (0..3).all(|i| self.lower[i] <= other.upper[i] && other.lower[i] <= self.upper[i])
+    }
+
+    pub(super) fn contains(&self, x: Point) -> bool {
+        (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
+    }
+
+    /// Largest absolute coordinate: the scale of rounding.
+    fn magnitude(&self) -> f64 {
+        self.lower.iter().chain(&self.upper).fold(0.0, |largest, x| x.abs().max(largest))
+    }
+
+    /// Largest component of x − y over x in one box and y in the other, in either direction.
+    pub(super) fn spread(&self, other: &Self) -> f64 {
+        let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
+        one(0).max(one(1)).max(one(2))
+    }
+}
+
+/// How far around a facet a foot can lie beyond its box: the facet goes on a little beyond the rim.
+pub(super) fn overhang(bounds: &Bounds) -> f64 {
+    let extent = (0..3).map(|i| bounds.upper[i] - bounds.lower[i]).fold(0.0, f64::max);
+    8.0 * RIM * extent
+}
+
+/// The facets near each node: those whose boxes, widened, held the node when the list was built.
+#[derive(Debug, Default)]
+pub(super) struct Neighborhood {
+    starts: Vec<usize>,
+    facets: Vec<usize>,
+}
+
+impl Neighborhood {
+    /// Facets to look at for the k-th node, in ascending order: the result does not depend on the age of the list.
+    pub(super) fn of(&self, k: usize) -> &[usize] {
+        match self.starts.get(k..k + 2) {
+            Some(range) => &self.facets[range[0]..range[1]],
+            None => &[],
+        }
+    }
+
+    /// Lists anew, for each node, the facets whose boxes are within `range` of it.
+    pub(super) fn build(&mut self, nodes: &[usize], surface: &Surface, positions: &[Point], range: f64) {
+        let all = Bounds::of_points(nodes.iter().map(|&node| positions[node]));
+        let leaves = surface.facets().iter().enumerate().filter_map(|(index, facet)| {
+            let [lower, upper] = facet.shape(positions).bounds();
+            let bounds = Bounds { lower, upper };
+            let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
+            let near = bounds.inflated(range + overhang(&bounds) + rounding);
+            let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);
+            near.intersects(&all).then(leaf)
+        });
+        let tree = RTree::bulk_load(leaves.collect());
+        self.starts.clear();
+        self.facets.clear();
+        self.starts.push(0);
+        for &node in nodes {
+            let start = self.facets.len();
+            let found = AABB::from_point(positions[node]);
+            let _: ControlFlow<()> = tree.locate_in_envelope_intersecting_int(&found, |leaf| {
+                self.facets.push(leaf.data);
+                ControlFlow::Continue(())
+            });
+            self.facets[start..].sort_unstable();
+            self.starts.push(self.facets.len());
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
+
+use super::Facet;
+use super::geometry::{Foot, Location, Point, Rim, Shape, add_scaled, dot, sub, unit};
+use crate::error::{Error, Result};
+
+/// Facets that share sides, with their neighbors.
+#[derive(Debug)]
+pub(super) struct Surface {
+    facets: Vec<Facet>,
+    rims: Vec<Rim>,
+    /// The facet across each side, and which of its sides that is.
+    neighbors: Vec<[Option<(usize, usize)>; 4]>,
+    /// Nodes of the facets, sorted.
+    nodes: Vec<usize>,
+    /// (node, facet, vertex of the facet), sorted: the facets around a node are a range.
+    around: Vec<(usize, usize, usize)>,
+}
+
+fn refuse(facet: usize, reason: &'static str) -> Error {
+    Error::Incompatible { part: format!("facet {facet} of a contact surface"), reason }
+}
+
+impl Surface {
+    /// Finds the neighbors, and refuses facets that are degenerate, turned against each other or that branch.
+    pub(super) fn new(facets: Vec<Facet>, dimension: usize, coordinates: &[Point]) -> Result<Self> {
+        if facets.is_empty() {
+            let what = "the list of facets of a contact surface";
+            return Err(Error::Empty { what, remedy: "give at least one facet" });
+        }
+        for (index, facet) in facets.iter().enumerate() {
+            let nodes = facet.nodes();
+            if (nodes.len() == 2) != (dimension == 2) {
+                let expected = if dimension == 2 { 2 } else { 3 };
+                return Err(Error::Dimension { what: "a facet of a contact surface", expected, found: nodes.len() });
+            }
+            super::check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            if !facet.shape(coordinates).is_regular() {
+                return Err(refuse(index, "it has no length or area, or its normals point to both sides"));
+            }
+        }
+        let mut around: Vec<_> = facets
+            .iter()
+            .enumerate()
+            .flat_map(|(index, facet)| facet.nodes().iter().enumerate().map(move |(k, &node)| (node, index, k)))
+            .collect();
+        around.sort_unstable();
+        let mut nodes: Vec<_> = around.iter().map(|&(node, ..)| node).collect();
+        nodes.dedup();
+        let mut surface = Self {
+            rims: vec![Rim { sides: [true; 4], vertices: [false; 4] }; facets.len()],
+            neighbors: vec![[None; 4]; facets.len()],
+            facets,
+            nodes,
+            around,
+        };
+        surface.connect(dimension)?;
+        surface.find_rim();
+        Ok(surface)
+    }
+
+    /// Finds the neighbor across each side.
+    fn connect(&mut self, dimension: usize) -> Result<()> {
+        // (smaller node, larger node, facet, side, whether the side runs from the smaller to the larger node)
+        let mut sides = Vec::new();
+        for (index, facet) in self.facets.iter().enumerate() {
+            let nodes = facet.nodes();
+            for (k, &node) in nodes.iter().enumerate() {
+                let other = if dimension == 2 { node } else { nodes[(k + 1) % nodes.len()] };
+                let forward = if dimension == 2 { k == 0 } else { node < other };
+                sides.push((node.min(other), node.max(other), index, k, forward));
+            }
+        }
+        sides.sort_unstable();
+        for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+            match *group {
+                [] | [_] => {}
+                [(.., i, k, one), (.., j, l, other)] if one != other => {
+                    self.neighbors[i][k] = Some((j, l));
+                    self.neighbors[j][l] = Some((i, k));
+                    self.rims[i].sides[k] = false;
+                    self.rims[j].sides[l] = false;
+                }
+                [_, (_, _, facet, ..)] => {
+                    return Err(refuse(facet, "its normal points to the other side than that of a neighbor; turn it"));
+                }
+                [_, _, (_, _, facet, ..), ..] => {
+                    return Err(refuse(
+                        facet,
+                        "it shares a side with two facets or more, and a surface must not branch",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A vertex is on the rim if a side that ends there is.
+    fn find_rim(&mut self) {
+        let Self { facets, rims, nodes, .. } = self;
+        let mut open = vec![false; nodes.len()];
+        let place = |node: &usize| nodes.binary_search(node).unwrap_or(0);
+        for (facet, rim) in facets.iter().zip(&*rims) {
+            let vertices = facet.nodes();
+            for (k, node) in vertices.iter().enumerate().filter(|&(k, _)| rim.sides[k]) {
+                open[place(node)] = true;
+                if vertices.len() > 2 {
+                    open[place(&vertices[(k + 1) % vertices.len()])] = true;
+                }
+            }
+        }
+        for (facet, rim) in facets.iter().zip(rims) {
+            for (vertex, node) in rim.vertices.iter_mut().zip(facet.nodes()) {
+                *vertex = open[place(node)];
+            }
+        }
+    }
+
+    pub(super) fn facets(&self) -> &[Facet] {
+        &self.facets
+    }
+
+    /// Nodes of the facets, sorted.
+    pub(super) fn nodes(&self) -> &[usize] {
+        &self.nodes
+    }
+
+    /// The closest point of a facet, with the shape of the facet.
+    pub(super) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
+        let shape = self.facets[facet].shape(positions);
+        shape.project(p, self.rims[facet]).map(|foot| (shape, foot))
+    }
+
+    /// Sum of the normals on both sides of a side, at its share `s`.
+    fn side_normal(&self, facet: usize, k: usize, s: f64, positions: &[Point]) -> Option<Point> {
+        let shape = self.facets[facet].shape(positions);
+        let own = shape.normal(&shape.on_side(k, s))?;
+        let Some((neighbor, l)) = self.neighbors[facet][k] else { return Some(own) };
+        let shape = self.facets[neighbor].shape(positions);
+        let across = shape.normal(&shape.on_side(l, 1.0 - s))?;
+        unit(add_scaled(own, 1.0, across)).or(Some(own))
+    }
+
+    /// Mean of the normals of the facets around a node, weighted by their angles there; none if the node has no facet.
+    pub(super) fn node_normal(&self, node: usize, positions: &[Point]) -> Option<Point> {
+        let start = self.around.partition_point(|&(other, ..)| other < node);
+        let around = self.around[start..].iter().take_while(|&&(other, ..)| other == node);
+        let sum = around.fold([0.0; 3], |sum, &(_, facet, k)| {
+            let shape = self.facets[facet].shape(positions);
+            let mut weights = [0.0; 4];
+            weights[k] = 1.0;
+            match shape.normal(&weights) {
+                Some(normal) => add_scaled(sum, shape.angle(k), normal),
+                None => sum,
+            }
+        });
+        unit(sum)
+    }
+
+    /// The side or vertex that a point of a facet lies on, up to `share` of the facet.
+    fn near(&self, facet: usize, shape: &Shape, foot: &Foot, share: f64) -> Location {
+        let (count, rim) = (self.facets[facet].nodes().len(), &self.rims[facet]);
+        let close = |k: usize| shape.inset(&foot.weights, k) <= share;
+        let mut found = Location::Inside;
+        for k in (0..count).filter(|&k| !rim.sides[k] && close(k)) {
+            let vertex = if count == 2 || close((k + count - 1) % count) {
+                Some(k)
+            } else if close((k + 1) % count) {
+                Some((k + 1) % count)
+            } else {
+                None
+            };
+            found = match vertex {
+                Some(vertex) if !rim.vertices[vertex] => return Location::Vertex(vertex),
+                _ => Location::Side(k),
+            };
+        }
+        found
+    }
+
+    /// The normal along which a node at p stands on a facet, and its signed distance along it.
+    ///
+    /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
+    /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
+    /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
+    /// facet, where that direction is lost in rounding, the mean normal itself.
+    pub(super) fn direction(
+        &self,
+        facet: usize,
+        p: Point,
+        (shape, foot): &(Shape, Foot),
+        share: f64,
+        positions: &[Point],
+    ) -> Option<(Point, f64)> {
+        let arm = sub(p, foot.point);
+        let touching = foot.distance <= share * shape.size();
+        let location = match foot.location {
+            Location::Inside if touching => self.near(facet, shape, foot, share),
+            location => location,
+        };
+        let nodes = self.facets[facet].nodes();
+        let mean = match location {
+            Location::Inside | Location::Beyond => shape.normal(&foot.weights),
+            Location::Vertex(k) => self.node_normal(nodes[k], positions),
+            Location::Side(k) => {
+                let next = foot.weights[(k + 1) % nodes.len()];
+                let total = foot.weights[k] + next;
+                self.side_normal(facet, k, if total > 0.0 { next / total } else { 0.5 }, positions)
+            }
+        }?;
+        if touching || foot.location == Location::Inside {
+            return Some((mean, dot(mean, arm)));
+        }
+        let side = if dot(mean, arm) < 0.0 { -1.0 } else { 1.0 };
+        Some((unit(arm)?.map(|x| side * x), side * foot.distance))
+    }
+}

@@ -1,0 +1,809 @@
+//! Contact of nodes with facets: gaps against brute force and differences, sides, rims, kept lists, balance of forces.
+#![cfg(feature = "search")]
+#![allow(clippy::float_cmp)] // unchanged values are meant exactly
+
+use contact_dynamics::contact::{Candidates, ContactJacobian, ContactLaw, Facet, NodeToFacet};
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{Composite, ContactConstraint, Error, LinearSystem, PersistencyCorrection, Simulation};
+
+/// Uniform numbers in [−1, 1), the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self, length: usize, size: f64) -> Vec<f64> {
+        (0..length).map(|_| size * self.next()).collect()
+    }
+}
+
+/// Nodes with dofs in their order, and facets.
+#[derive(Clone, Debug, Default)]
+struct Mesh<const D: usize> {
+    coordinates: Vec<[f64; D]>,
+    facets: Vec<Facet>,
+}
+
+impl<const D: usize> Mesh<D> {
+    fn dofs(&self) -> Vec<[usize; D]> {
+        (0..self.coordinates.len()).map(|node| std::array::from_fn(|i| D * node + i)).collect()
+    }
+
+    fn size(&self) -> usize {
+        D * self.coordinates.len()
+    }
+
+    /// Appends nodes and returns their numbers.
+    fn nodes(&mut self, coordinates: impl IntoIterator<Item = [f64; D]>) -> Vec<usize> {
+        let start = self.coordinates.len();
+        self.coordinates.extend(coordinates);
+        (start..self.coordinates.len()).collect()
+    }
+
+    fn contact(&self, nodes: &[usize], reach: f64) -> NodeToFacet<f64> {
+        NodeToFacet::new(&self.coordinates, &self.dofs(), nodes, self.facets.iter().copied(), reach).unwrap()
+    }
+
+    fn positions(&self, u: &[f64]) -> Vec<[f64; D]> {
+        let node = |(node, x): (usize, &[f64; D])| std::array::from_fn(|i| x[i] + u[D * node + i]);
+        self.coordinates.iter().enumerate().map(node).collect()
+    }
+}
+
+/// What a grid is made of.
+#[derive(Clone, Copy, PartialEq)]
+enum Cells {
+    Quadrilaterals,
+    Triangles,
+    Mixed,
+}
+
+/// A grid over [0, n]² at the height z(x, y), normals upward.
+fn grid(n: usize, cells: Cells, z: impl Fn(f64, f64) -> f64) -> Mesh<3> {
+    let mut mesh = Mesh::default();
+    for j in 0..=n {
+        for i in 0..=n {
+            let (x, y) = (i as f64, j as f64);
+            mesh.coordinates.push([x, y, z(x, y)]);
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            let a = j * (n + 1) + i;
+            let (b, c, d) = (a + 1, a + n + 2, a + n + 1);
+            if cells == Cells::Quadrilaterals || (cells == Cells::Mixed && (i + j) % 2 == 0) {
+                mesh.facets.push([a, b, c, d].into());
+            } else {
+                mesh.facets.extend([Facet::from([a, b, c]), [a, c, d].into()]);
+            }
+        }
+    }
+    mesh
+}
+
+/// The surface of a cube [−1, 1]³ of quadrilaterals with displaced corners: warped and closed.
+fn box_of_quadrilaterals(random: &mut Random, warp: f64) -> Mesh<3> {
+    let mut mesh = Mesh::default();
+    mesh.nodes(
+        (0..8).map(|k| std::array::from_fn(|i| if k >> i & 1 == 0 { -1.0 } else { 1.0 } + warp * random.next())),
+    );
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    mesh.facets.extend(sides.map(Facet::from));
+    mesh
+}
+
+/// A regular polygon, counter-clockwise.
+fn polygon(corners: usize) -> Mesh<2> {
+    let mut mesh = Mesh::default();
+    mesh.nodes((0..corners).map(|k| {
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / corners as f64).sin_cos();
+        [cos, sin]
+    }));
+    mesh.facets.extend((0..corners).map(|k| Facet::from([k, (k + 1) % corners])));
+    mesh
+}
+
+/// Gaps by identity of the row, after a search.
+fn gaps(contact: &mut NodeToFacet<f64>, u: &[f64]) -> Vec<((usize, usize), f64)> {
+    contact.search(0.0, u, u).unwrap();
+    let mut gaps = vec![0.0; contact.candidates()];
+    contact.gap(0.0, u, &mut gaps);
+    (0..gaps.len()).map(|row| contact.identity(row)).zip(gaps).collect()
+}
+
+fn rows(contact: &NodeToFacet<f64>) -> ContactJacobian<f64> {
+    let mut g = ContactJacobian::default();
+    contact.jacobian(&mut g);
+    assert_eq!(g.rows(), contact.candidates());
+    g
+}
+
+/// The only gap there is.
+fn single_gap(contact: &mut NodeToFacet<f64>, u: &[f64]) -> Option<f64> {
+    let found = gaps(contact, u);
+    assert!(found.len() <= 1);
+    found.first().map(|&(_, gap)| gap)
+}
+
+/// Force of every row, and its moment about the origin, relative to the row's size.
+fn imbalance<const D: usize>(contact: &NodeToFacet<f64>, positions: &[[f64; D]]) -> f64 {
+    let (g, mut worst) = (rows(contact), 0.0_f64);
+    for row in 0..g.rows() {
+        let (mut force, mut moment, mut scale) = ([0.0; 3], [0.0; 3], 1.0_f64);
+        for (dof, weight) in g.row(row) {
+            let x: [f64; 3] = std::array::from_fn(|i| positions[dof / D].get(i).copied().unwrap_or(0.0));
+            scale = x.iter().fold(scale, |scale, x| scale.max(x.abs()));
+            let (i, mut f) = (dof % D, [0.0; 3]);
+            f[i] = weight;
+            force[i] += weight;
+            for (k, moment) in moment.iter_mut().enumerate() {
+                let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+                *moment += x[l] * f[m] - x[m] * f[l];
+            }
+        }
+        worst = force.iter().fold(worst, |worst, f| worst.max(f.abs()));
+        worst = moment.iter().fold(worst, |worst, m| worst.max(m.abs() / scale));
+    }
+    worst
+}
+
+fn check_derivative<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Random) {
+    let (step, reach) = (1e-6, 0.8);
+    let mut contact = mesh.contact(nodes, reach);
+    let u = random.vector(mesh.size(), 0.05);
+    contact.search(0.0, &u, &u).unwrap();
+    let g = rows(&contact);
+    assert!(g.rows() * 2 > nodes.len(), "{} rows", g.rows());
+    let facets: Vec<_> = (0..g.rows()).map(|row| contact.facet(row)).collect();
+    let here = gaps(&mut contact, &u);
+    let direction = random.vector(mesh.size(), 1.0);
+    let mut at = |c: f64| {
+        let moved: Vec<_> = u.iter().zip(&direction).map(|(u, d)| u + c * step * d).collect();
+        let found = gaps(&mut contact, &moved);
+        let facets: Vec<_> = (0..found.len()).map(|row| contact.facet(row)).collect();
+        (found, facets)
+    };
+    let [(ahead, facets_ahead), (behind, facets_behind)] = [at(1.0), at(-1.0)];
+    let mut compared = 0;
+    for (row, &(identity, _)) in here.iter().enumerate() {
+        let value = |found: &[((usize, usize), f64)], on: &[usize]| {
+            let place = found.iter().position(|&(other, _)| other == identity)?;
+            (on[place] == facets[row]).then_some(found[place].1)
+        };
+        if let (Some(ahead), Some(behind)) = (value(&ahead, &facets_ahead), value(&behind, &facets_behind)) {
+            let difference = (ahead - behind) / (2.0 * step);
+            let derivative = g.product(row, &direction);
+            assert!((difference - derivative).abs() < 1e-6, "row {row}: {difference} and {derivative}");
+            compared += 1;
+        }
+    }
+    assert!(compared * 10 >= here.len() * 9, "{compared} of {}", here.len());
+}
+
+#[test]
+fn rows_are_derivatives_of_the_gap() {
+    let mut random = Random(1);
+    for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
+        // Flat, then curved; facets move as well.
+        for height in [0.0, 0.3] {
+            let mut mesh = grid(4, cells, |x, y| height * (x * 1.3).sin() * (y * 0.9).cos());
+            let nodes: Vec<_> =
+                (0..60).map(|_| [2.0 + 1.9 * random.next(), 2.0 + 1.9 * random.next(), 0.5 * random.next()]).collect();
+            let nodes = mesh.nodes(nodes);
+            check_derivative(&mesh, &nodes, &mut random);
+        }
+    }
+    let mut mesh = polygon(9);
+    let nodes: Vec<_> = (0..60).map(|_| [random.next(), random.next()]).map(|x: [f64; 2]| x.map(|x| 1.1 * x)).collect();
+    let nodes = mesh.nodes(nodes);
+    check_derivative(&mesh, &nodes, &mut random);
+}
+
+#[test]
+fn translations_leave_gaps_and_rows_balance() {
+    let mut random = Random(2);
+    for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
+        let mut mesh = grid(5, cells, |x, y| 0.2 * (x * 1.7).sin() + 0.1 * (y * y * 0.3).cos());
+        let cloud: Vec<_> =
+            (0..200).map(|_| [2.5 + 2.6 * random.next(), 2.5 + 2.6 * random.next(), 0.8 * random.next()]).collect();
+        let nodes = mesh.nodes(cloud);
+        let mut contact = mesh.contact(&nodes, 0.7);
+        let u = random.vector(mesh.size(), 0.1);
+        let here = gaps(&mut contact, &u);
+        assert!(here.len() > 100);
+        assert!(here.iter().any(|&(_, gap)| gap < -0.2) && here.iter().any(|&(_, gap)| gap > 0.2));
+        let imbalance = imbalance(&contact, &mesh.positions(&u));
+        assert!(imbalance < 1e-14, "{imbalance:e}");
+        let translation: Vec<f64> = (0..mesh.size()).map(|dof| [0.3, -0.7, 0.4][dof % 3]).collect();
+        let g = rows(&contact);
+        for row in 0..g.rows() {
+            assert!(g.product(row, &translation).abs() < 1e-14);
+        }
+        let moved: Vec<_> = u.iter().zip(&translation).map(|(u, c)| u + c).collect();
+        for (one, other) in here.iter().zip(gaps(&mut contact, &moved)) {
+            assert!(one.0 == other.0 && (one.1 - other.1).abs() < 1e-13, "{one:?} {other:?}");
+        }
+    }
+}
+
+/// Distance from the nearest of many points of the bilinear facets, refined around the nearest.
+fn sampled_distance(mesh: &Mesh<3>, p: [f64; 3]) -> f64 {
+    const SAMPLES: usize = 40;
+    let mut least = f64::INFINITY;
+    for facet in &mesh.facets {
+        let corners: Vec<_> = facet.nodes().iter().map(|&node| mesh.coordinates[node]).collect();
+        let distance = |x: f64, y: f64| {
+            let weights = [(1.0 - x) * (1.0 - y), x * (1.0 - y), x * y, (1.0 - x) * y];
+            let component = |i: usize| corners.iter().zip(weights).map(|(c, w)| w * c[i]).sum::<f64>() - p[i];
+            component(0).hypot(component(1)).hypot(component(2))
+        };
+        let (mut center, mut width) = ([0.5, 0.5], 0.5);
+        for _ in 0..6 {
+            let mut best = (f64::INFINITY, center);
+            for i in 0..=SAMPLES {
+                for j in 0..=SAMPLES {
+                    let at = |c: f64, k: usize| (c + width * (2.0 * k as f64 / SAMPLES as f64 - 1.0)).clamp(0.0, 1.0);
+                    let (x, y) = (at(center[0], i), at(center[1], j));
+                    if distance(x, y) < best.0 {
+                        best = (distance(x, y), [x, y]);
+                    }
+                }
+            }
+            (center, width) = (best.1, width * 0.15);
+            least = least.min(best.0);
+        }
+    }
+    least
+}
+
+#[test]
+fn closest_points_of_warped_quadrilaterals_are_those_of_brute_force() {
+    let mut random = Random(3);
+    for warp in [0.0, 0.2, 0.35] {
+        let mut mesh = box_of_quadrilaterals(&mut random, warp);
+        let cloud: Vec<[f64; 3]> = (0..40).map(|_| std::array::from_fn(|_| 1.8 * random.next())).collect();
+        let shell = mesh.clone();
+        let nodes = mesh.nodes(cloud);
+        let mut contact = mesh.contact(&nodes, 3.0);
+        let u = vec![0.0; mesh.size()];
+        let found = gaps(&mut contact, &u);
+        assert_eq!(found.len(), nodes.len());
+        for ((node, _), gap) in found {
+            let x = mesh.coordinates[node];
+            let sampled = sampled_distance(&shell, x);
+            assert!((gap.abs() - sampled).abs() < 1e-6, "warp {warp}, {x:?}: {gap} and {sampled}");
+            let farthest = x.iter().fold(0.0_f64, |far, x| far.max(x.abs()));
+            if farthest > 1.0 + warp || farthest < 1.0 - warp {
+                assert_eq!(gap > 0.0, farthest > 1.0, "warp {warp}, {x:?}: {gap}");
+            }
+        }
+    }
+}
+
+/// The surface of an octahedron, its triangles halved in both directions, with corners at random distances from the
+/// origin.
+fn star(random: &mut Random) -> Mesh<3> {
+    let mut mesh = Mesh::<3>::default();
+    let mut node = |x: [f64; 3]| match mesh.coordinates.iter().position(|y| *y == x) {
+        Some(node) => node,
+        None => mesh.nodes([x])[0],
+    };
+    let mut facets = Vec::new();
+    for signs in 0..8 {
+        let sign = |i: usize| if signs >> i & 1 == 0 { 1.0 } else { -1.0 };
+        let [mut a, b, mut c] = [[sign(0), 0.0, 0.0], [0.0, sign(1), 0.0], [0.0, 0.0, sign(2)]];
+        if sign(0) * sign(1) * sign(2) < 0.0 {
+            std::mem::swap(&mut a, &mut c);
+        }
+        let middle = |x: [f64; 3], y: [f64; 3]| std::array::from_fn(|i| 0.5 * (x[i] + y[i]));
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+            facets.push(Facet::from(corners.map(&mut node)));
+        }
+    }
+    mesh.facets = facets;
+    for x in &mut mesh.coordinates {
+        let stretch = (1.0 + 0.6 * random.next()) / x[0].hypot(x[1]).hypot(x[2]);
+        *x = x.map(|x| stretch * x);
+    }
+    mesh
+}
+
+/// Whether a point is inside of a star-shaped body: on the near side of the facet that its ray from the origin meets.
+fn is_inside(mesh: &Mesh<3>, p: [f64; 3]) -> bool {
+    let determinant = |x: [f64; 3], y: [f64; 3], z: [f64; 3]| {
+        x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0])
+    };
+    mesh.facets.iter().any(|facet| {
+        let [a, b, c] = std::array::from_fn(|k| mesh.coordinates[facet.nodes()[k]]);
+        let volume = determinant(a, b, c);
+        let shares = [determinant(p, b, c), determinant(a, p, c), determinant(a, b, p)].map(|share| share / volume);
+        assert!(volume > 0.0);
+        shares.iter().all(|&share| share >= 0.0) && shares.iter().sum::<f64>() < 1.0
+    })
+}
+
+#[test]
+fn signs_on_jagged_bodies_are_right() {
+    let mut random = Random(6);
+    let (mut inside, mut outside) = (0, 0);
+    for _ in 0..30 {
+        let mut mesh = star(&mut random);
+        let shell = mesh.clone();
+        let cloud: Vec<[f64; 3]> = (0..100).map(|_| std::array::from_fn(|_| 1.1 * random.next())).collect();
+        let nodes = mesh.nodes(cloud);
+        let mut contact = mesh.contact(&nodes, 4.0);
+        let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
+        assert_eq!(found.len(), nodes.len());
+        for ((node, _), gap) in found {
+            let expected = is_inside(&shell, mesh.coordinates[node]);
+            assert_eq!(gap < 0.0, expected, "{:?}: {gap}", mesh.coordinates[node]);
+            *(if expected { &mut inside } else { &mut outside }) += 1;
+        }
+        let imbalance = imbalance(&contact, &mesh.coordinates);
+        assert!(imbalance < 1e-14, "{imbalance:e}");
+    }
+    assert!(inside > 500 && outside > 500);
+}
+
+/// The signed distance changes by no more than the node moves: along any path, over any side or vertex.
+fn check_continuity<const D: usize>(mesh: &Mesh<D>, path: &[[f64; D]], samples: usize) -> [f64; 2] {
+    let mut mesh = mesh.clone();
+    let node = mesh.nodes([path[0]]);
+    let mut contact = mesh.contact(&node, 0.5);
+    let mut u = vec![0.0; mesh.size()];
+    let (mut last, mut extremes): (Option<f64>, _) = (None, [f64::INFINITY, f64::NEG_INFINITY]);
+    for piece in path.windows(2) {
+        let length = (0..D).map(|i| (piece[1][i] - piece[0][i]).powi(2)).sum::<f64>().sqrt();
+        for k in 0..=samples {
+            for i in 0..D {
+                let x = piece[0][i] + (piece[1][i] - piece[0][i]) * k as f64 / samples as f64;
+                u[D * node[0] + i] = x - path[0][i];
+            }
+            let gap = single_gap(&mut contact, &u).expect("the node never leaves the surface");
+            if let Some(last) = last {
+                assert!((gap - last).abs() <= length / samples as f64 * (1.0 + 1e-9) + 1e-7, "{last} to {gap}");
+            }
+            last = Some(gap);
+            extremes = [extremes[0].min(gap), extremes[1].max(gap)];
+        }
+    }
+    extremes
+}
+
+#[test]
+fn gaps_are_continuous_over_sides_and_vertices() {
+    // A roof and a valley of two quadrilaterals, of four triangles, and of two segments.
+    for slope in [-1.5, -0.4, -1e-4, 1e-4, 0.4, 1.5] {
+        let fold = |x: f64| slope * (x - 2.0_f64).abs();
+        for cells in [Cells::Quadrilaterals, Cells::Triangles] {
+            let mesh = grid(4, cells, |x, _| fold(x));
+            for offset in [-0.15, 0.0, 1e-9, 0.15] {
+                let at = |x: f64, y: f64| [x, y, fold(x) + offset];
+                let path = [at(1.0, 1.2), at(2.0, 1.8), at(3.0, 2.3), at(2.0, 2.0), at(1.0, 2.0)];
+                let [least, most] = check_continuity(&mesh, &path, 157);
+                assert!(least >= offset.min(0.0) - 1e-12 && most <= offset.max(0.0) + 1e-12, "{least} {most}");
+                // Straight through the fold, from one side to the other.
+                let path = [[1.6, 1.5, fold(1.6)], [2.4, 1.6, fold(2.4)]];
+                check_continuity(&mesh, &path, 400);
+                // Up through a vertex, slightly off it.
+                let path = [[2.0 + 1e-9, 2.0, -0.2], [2.0, 2.0 - 1e-9, 0.2]];
+                let [least, most] = check_continuity(&mesh, &path, 400);
+                assert!(least < -0.1 && most > 0.1, "{least} {most}");
+            }
+        }
+        let mut mesh = Mesh::<2>::default();
+        let nodes = mesh.nodes([4.0, 3.0, 2.0, 1.0, 0.0].map(|x| [x, fold(x)]));
+        mesh.facets.extend(nodes.windows(2).map(|pair| Facet::from([pair[0], pair[1]])));
+        for offset in [-0.15, 0.0, 0.15] {
+            check_continuity(&mesh, &[[1.0, fold(1.0) + offset], [2.0, offset], [3.0, fold(3.0) + offset]], 211);
+        }
+    }
+    // A pyramid: four triangles around its top.
+    let pyramid = grid(2, Cells::Mixed, |x, y| 1.0 - (x - 1.0).abs().max((y - 1.0).abs()));
+    for height in [0.95, 1.0, 1.05] {
+        check_continuity(&pyramid, &[[0.8, 0.9, height], [1.3, 1.15, height], [1.0, 0.8, height]], 400);
+    }
+}
+
+#[test]
+fn normals_at_a_side_do_not_flip() {
+    let mut mesh = grid(2, Cells::Quadrilaterals, |x, _| -(x - 1.0).abs());
+    let node = mesh.nodes([[1.0, 0.5, 0.0]]);
+    let mut contact = mesh.contact(&node, 0.5);
+    let mut normals = Vec::new();
+    for k in 0..20 {
+        let mut u = vec![0.0; mesh.size()];
+        u[3 * node[0]] = 1e-12 * f64::from(k - 10);
+        u[3 * node[0] + 2] = -1e-12 * f64::from(k % 3);
+        contact.search(0.0, &u, &u).unwrap();
+        let g = rows(&contact);
+        let normal: Vec<_> = g.row(0).filter(|(dof, _)| dof / 3 == node[0]).collect();
+        normals.push(normal);
+    }
+    for normal in normals {
+        let upward = normal.iter().find(|(dof, _)| dof % 3 == 2).unwrap().1;
+        let across = normal.iter().find(|(dof, _)| dof % 3 == 0).map_or(0.0, |entry| entry.1);
+        assert!((upward - 1.0).abs() < 1e-14 && across.abs() < 1e-14, "{normal:?}");
+    }
+}
+
+#[test]
+fn beyond_the_rim_there_is_no_row() {
+    for cells in [Cells::Quadrilaterals, Cells::Triangles] {
+        let mut mesh = grid(3, cells, |_, _| 0.0);
+        let node = mesh.nodes([[1.5, 1.5, 0.1]]);
+        // The reach is beyond the next side of the facet, too.
+        let mut contact = mesh.contact(&node, 2.0);
+        let mut at = |x: f64, y: f64, z: f64| {
+            let mut u = vec![0.0; mesh.size()];
+            u[3 * node[0]..].copy_from_slice(&[x - 1.5, y - 1.5, z - 0.1]);
+            single_gap(&mut contact, &u)
+        };
+        for z in [0.1, -0.2] {
+            for (x, y) in
+                [(0.0, 0.0), (3.0, 1.5), (1.2, 3.0), (3.0, 3.0), (-5e-4, 1.5), (3.0 + 5e-4, 3.0), (1.0, -5e-4)]
+            {
+                let gap = at(x, y, z).expect("on the rim");
+                assert!((gap - z).abs() < 1e-12, "{x} {y}: {gap}");
+            }
+            for (x, y) in [(-0.01, 1.5), (3.01, 1.0), (3.01, 3.01), (1.0, 3.2), (1.5, -0.3), (4.2, 2.0), (-0.01, 3.0)] {
+                assert_eq!(at(x, y, z), None, "{x} {y}");
+            }
+        }
+    }
+    let mut mesh = Mesh::<2>::default();
+    let nodes = mesh.nodes([[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.5, 0.1]]);
+    mesh.facets.extend([Facet::from([0, 1]), [1, 2].into()]);
+    let mut contact = mesh.contact(&nodes[3..], 1.5);
+    for (x, expected) in [(-0.4, None), (-5e-4, Some(0.1)), (0.0, Some(0.1)), (1.0, Some(0.1)), (2.1, None)] {
+        let gap = single_gap(&mut contact, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, x - 0.5, 0.0]);
+        assert_eq!(gap.is_some(), expected.is_some(), "{x}");
+        assert!(gap.zip(expected).is_none_or(|(gap, expected)| (gap - expected).abs() < 1e-15));
+    }
+}
+
+#[test]
+fn kept_lists_find_what_all_facets_give() {
+    let mut random = Random(4);
+    for cells in [Cells::Quadrilaterals, Cells::Mixed] {
+        let mut mesh = grid(8, cells, |x, y| 0.3 * (x + 0.5 * y).sin());
+        let surface = mesh.coordinates.len();
+        let cloud: Vec<_> =
+            (0..150).map(|_| [4.0 + 4.0 * random.next(), 4.0 + 4.0 * random.next(), 0.6 * random.next()]).collect();
+        let nodes = mesh.nodes(cloud);
+        let mut kept = mesh.contact(&nodes, 0.4).skin(0.2).unwrap();
+        // A skin that is never used up: every node looks at every facet.
+        let mut all = mesh.contact(&nodes, 0.4).skin(1e6).unwrap();
+        let velocity = random.vector(mesh.size(), 0.03);
+        let mut u = vec![0.0; mesh.size()];
+        let mut changes = 0;
+        for step in 0..60 {
+            for (dof, (u, v)) in u.iter_mut().zip(&velocity).enumerate() {
+                // The cloud drifts over the surface, and both fly.
+                let drift = if dof / 3 >= surface && dof % 3 == 0 { 0.02 } else { 0.0 };
+                *u += 0.3 * v + drift + 0.5;
+            }
+            let found = kept.search(0.0, &u, &u).unwrap();
+            assert_eq!(found, all.search(0.0, &u, &u).unwrap());
+            changes += usize::from(found == Candidates::Changed);
+            assert_eq!(rows(&kept), rows(&all), "step {step}");
+            let mut fresh = mesh.contact(&nodes, 0.4);
+            assert_eq!(gaps(&mut kept, &u), gaps(&mut fresh, &u));
+            assert!((0..kept.candidates()).all(|row| kept.facet(row) == all.facet(row)));
+            assert!(kept.candidates() > 30);
+        }
+        assert_eq!(changes, 60);
+        assert_eq!(all.rebuilds(), 1);
+        assert!((4..30).contains(&kept.rebuilds()), "{}", kept.rebuilds());
+    }
+}
+
+#[test]
+fn far_bodies_have_no_candidates_and_flying_bodies_keep_their_lists() {
+    let mut mesh = grid(3, Cells::Quadrilaterals, |_, _| 0.0);
+    let surface = mesh.size();
+    let nodes = mesh.nodes([[1.2, 1.3, 5.0], [1.7, 2.3, 5.0]]);
+    let mut contact = mesh.contact(&nodes, 0.5);
+    let mut u = vec![0.0; mesh.size()];
+    assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Unchanged);
+    assert_eq!((contact.candidates(), contact.rebuilds()), (0, 0));
+    u[surface + 2] = -4.6;
+    u[surface + 5] = -4.4;
+    assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Changed);
+    assert_eq!(contact.candidates(), 1);
+    assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Unchanged);
+    for _ in 0..100 {
+        for u in &mut u {
+            *u += 0.25;
+        }
+        assert_eq!(gaps(&mut contact, &u).len(), 1);
+    }
+    assert_eq!(contact.rebuilds(), 1);
+    u[surface..].fill(9.0);
+    assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Changed);
+    assert_eq!(contact.candidates(), 0);
+    assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Unchanged);
+}
+
+#[test]
+fn searches_between_rebuilds_do_not_allocate() {
+    let mut random = Random(7);
+    let mut mesh = grid(6, Cells::Mixed, |x, y| 0.2 * (x * y).sin());
+    let cloud: Vec<_> =
+        (0..60).map(|_| [3.0 + 3.0 * random.next(), 3.0 + 3.0 * random.next(), 0.3 * random.next()]).collect();
+    let nodes = mesh.nodes(cloud);
+    let mut contact = mesh.contact(&nodes, 0.4);
+    let mut u = vec![0.0; mesh.size()];
+    contact.search(0.0, &u, &u).unwrap();
+    let (mut candidates, mut changes) = (0, 0);
+    let counted = allocation_counter::measure(|| {
+        for _ in 0..50 {
+            for u in &mut u {
+                *u += 0.001 * random.next();
+            }
+            changes += usize::from(contact.search(0.0, &u, &u).unwrap() == Candidates::Changed);
+            candidates += contact.candidates();
+        }
+    });
+    assert!(candidates > 1000 && changes == 50 && contact.rebuilds() == 1);
+    assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn two_passes_treat_both_surfaces_alike() {
+    let mut random = Random(5);
+    // Two wavy surfaces that face each other; the upper one looks down.
+    let mut mesh = grid(5, Cells::Mixed, |x, y| 0.1 * (2.0 * x).sin() * y.cos());
+    let lower: Vec<_> = (0..mesh.coordinates.len()).collect();
+    let lower_facets = std::mem::take(&mut mesh.facets);
+    let other = grid(4, Cells::Quadrilaterals, |x, y| 0.15 + 0.1 * x.cos() * (1.5 * y).sin());
+    let upper = mesh.nodes(other.coordinates.iter().map(|x| [0.45 + x[0], 0.37 + x[1], x[2]]));
+    let turned = |facet: &Facet| match *facet.nodes() {
+        [a, b, c, d] => Facet::from([d, c, b, a].map(|node| upper[node])),
+        _ => unreachable!(),
+    };
+    let upper_facets: Vec<_> = other.facets.iter().map(turned).collect();
+    let dofs = mesh.dofs();
+    let make = |nodes: &[usize], own: &[Facet], facets: &[Facet]| {
+        let contact = NodeToFacet::new(&mesh.coordinates, &dofs, nodes, facets.iter().copied(), 0.6).unwrap();
+        contact.two_pass(own.iter().copied()).unwrap()
+    };
+    let mut one = make(&upper, &upper_facets, &lower_facets);
+    let mut two = make(&lower, &lower_facets, &upper_facets);
+    let u = random.vector(mesh.size(), 0.05);
+    let (mut a, b) = (gaps(&mut one, &u), gaps(&mut two, &u));
+    let count = |pass: usize| a.iter().filter(|row| row.0.1 == pass).count();
+    assert!(count(0) > 20 && count(1) > 12, "{} {}", count(0), count(1));
+    assert!(a.iter().any(|row| row.1 < 0.0) && a.iter().any(|row| row.1 > 0.0));
+    for row in &mut a {
+        row.0.1 = 1 - row.0.1;
+    }
+    a.sort_by_key(|row| (row.0.1, row.0.0));
+    assert_eq!(a, b);
+    assert_eq!(one.max_candidates(), mesh.coordinates.len());
+    assert!(imbalance(&one, &mesh.positions(&u)) < 1e-14);
+}
+
+#[test]
+fn pressure_on_matching_meshes_is_passed_on() {
+    let (n, height) = (4, 0.0);
+    for cells in [Cells::Quadrilaterals, Cells::Triangles] {
+        let mut mesh = grid(n, cells, |_, _| height);
+        let lower = mesh.coordinates.clone();
+        let upper = mesh.nodes(lower.clone());
+        let turned = mesh.facets.iter().map(|facet| {
+            let nodes: Vec<_> = facet.nodes().iter().rev().map(|&node| upper[node]).collect();
+            match nodes[..] {
+                [a, b, c] => Facet::from([a, b, c]),
+                _ => Facet::from([nodes[0], nodes[1], nodes[2], nodes[3]]),
+            }
+        });
+        // Nodes stand on each other, so that the second pass adds nothing.
+        let mut contact = mesh.contact(&upper, 0.2).two_pass(turned.collect::<Vec<_>>()).unwrap();
+        let u = vec![0.0; mesh.size()];
+        let found = gaps(&mut contact, &u);
+        assert_eq!(
+            found.iter().map(|row| row.0).collect::<Vec<_>>(),
+            upper.iter().map(|&node| (node, 0)).collect::<Vec<_>>()
+        );
+        assert!(found.iter().all(|row| row.1 == 0.0));
+        assert!(imbalance(&contact, &mesh.positions(&u)) < 1e-14);
+        // A pressure of one on the upper surface: its nodal forces are the multipliers.
+        let edge = |k: usize| if k == 0 || k == n { 0.5 } else { 1.0 };
+        let g = rows(&contact);
+        let mut force = vec![0.0; mesh.size()];
+        for (row, ((node, _), _)) in found.iter().enumerate() {
+            let k = node - lower.len();
+            let area = edge(k % (n + 1)) * edge(k / (n + 1));
+            g.row(row).for_each(|(dof, weight)| force[dof] += weight * area);
+        }
+        for (k, node) in upper.iter().enumerate() {
+            assert_eq!(force[3 * k..3 * k + 3], [0.0, 0.0, -force[3 * node + 2]]);
+        }
+        assert!((force[2..3 * lower.len()].iter().sum::<f64>() + (n * n) as f64).abs() < 1e-13);
+    }
+}
+
+#[test]
+fn touching_is_a_gap_of_zero() {
+    let mut random = Random(8);
+    // A tilted plane, and nodes on it: coordinates carry rounding of either sign.
+    let mut mesh = grid(4, Cells::Mixed, |_, _| 0.0);
+    let tilt = |[x, y, _]: [f64; 3]| [0.6 * x - 0.3 * y + 7.0, 0.7 * y, 0.8 * x + 0.1 * y - 3.0];
+    for x in &mut mesh.coordinates {
+        *x = tilt(*x);
+    }
+    let touching: Vec<_> = (0..50).map(|_| tilt([2.0 + 1.9 * random.next(), 2.0 + 1.9 * random.next(), 0.0])).collect();
+    let nodes = mesh.nodes(touching);
+    let mut contact = mesh.contact(&nodes, 0.3);
+    let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
+    assert_eq!(found.len(), 50);
+    assert!(found.iter().all(|row| row.1 == 0.0), "{found:?}");
+    // A run may start there, and rests.
+    let masses = vec![1.0; mesh.size()];
+    let stiffness = SparseColMat::try_new_from_triplets(mesh.size(), mesh.size(), &[]).unwrap();
+    let system = LinearSystem::lumped(masses, stiffness).unwrap();
+    let mut run = Simulation::builder(system, Composite, 1e-3).constraint(contact).build().unwrap();
+    run.step().unwrap();
+    assert!(run.gaps().len() == 50 && run.gaps().iter().all(|&gap| gap == 0.0));
+}
+
+#[test]
+fn facing_keeps_nodes_from_the_far_side_of_a_thin_body() {
+    // A plate 0.2 thick; a block above it with one facet that looks down, 0.15 deep in the plate.
+    let mut mesh = Mesh::<2>::default();
+    mesh.nodes([[0.0, -0.2], [3.0, -0.2], [3.0, 0.0], [0.0, 0.0]]);
+    mesh.facets.extend((0..4).map(|k| Facet::from([k, (k + 1) % 4])));
+    let nodes = mesh.nodes([[1.0, -0.15], [2.0, -0.15]]);
+    let u = vec![0.0; mesh.size()];
+    let mut blind = mesh.contact(&nodes, 0.5);
+    assert!(gaps(&mut blind, &u).iter().all(|row| (row.1 + 0.05).abs() < 1e-15));
+    let mut facing = mesh.contact(&nodes, 0.5).facing([[nodes[0], nodes[1]]]).unwrap();
+    assert!(gaps(&mut facing, &u).iter().all(|row| (row.1 + 0.15).abs() < 1e-15));
+    assert_eq!(facing.candidates(), 2);
+    assert_eq!(facing.facet(0), 2);
+    // Deeper than the reach.
+    let mut short = mesh.contact(&nodes, 0.1).facing([[nodes[0], nodes[1]]]).unwrap();
+    assert!(gaps(&mut short, &u).is_empty());
+}
+
+#[test]
+fn the_parts_of_the_interface() {
+    let mut mesh = grid(2, Cells::Quadrilaterals, |_, _| 0.0);
+    let nodes = mesh.nodes([[0.9, 0.6, 0.1], [5.0, 5.0, 0.1]]);
+    // Dofs that are not in the order of nodes.
+    let dofs: Vec<[usize; 3]> = mesh.dofs().iter().map(|dofs| dofs.map(|dof| 100 - dof)).collect();
+    let make = || NodeToFacet::new(&mesh.coordinates, &dofs, &nodes, mesh.facets.iter().copied(), 0.5).unwrap();
+    let mut contact: Box<dyn ContactConstraint<f64>> = Box::new(make().with_law(ContactLaw::Equality));
+    let mut named = Vec::new();
+    contact.dofs(&mut named);
+    named.sort_unstable();
+    assert_eq!(named, (100 - 32..=100).collect::<Vec<_>>());
+    assert!(matches!(contact.check(100), Err(Error::MissingDof { dof: 100, dofs: 100, .. })));
+    contact.check(101).unwrap();
+    assert!(matches!(contact.search(0.0, &[0.0; 4], &[0.0; 4]), Err(Error::MissingDof { .. })));
+    let mut u = vec![0.0; 101];
+    u[80] = f64::NAN;
+    assert!(matches!(contact.search(0.0, &u, &u), Err(Error::NotFinite { index: 80, .. })));
+    u[80] = 0.0;
+    contact.search(0.0, &u, &u).unwrap();
+    assert_eq!((contact.candidates(), contact.law(0), contact.identity(0)), (1, ContactLaw::Equality, (nodes[0], 0)));
+    // Slides to the next facet under the same name.
+    let (facet, mut contact) = (0, make());
+    contact.search(0.0, &u, &u).unwrap();
+    assert_eq!(contact.facet(0), facet);
+    u[dofs[nodes[0]][0]] = 0.3;
+    contact.search(0.0, &u, &u).unwrap();
+    assert_eq!((contact.identity(0), contact.facet(0)), ((nodes[0], 0), facet + 1));
+    // Affine between searches.
+    let mut gap = [0.0];
+    u[dofs[nodes[0]][2]] = -0.4;
+    contact.gap(0.0, &u, &mut gap);
+    assert!((gap[0] + 0.3).abs() < 1e-15);
+    // Both bounds of the memory promised.
+    assert!(rows(&contact).row(0).count() <= contact.max_entries() && contact.max_candidates() == 2);
+}
+
+#[test]
+fn single_precision_keeps_the_signs() {
+    let coordinates = [[2.0_f32, 0.0], [1.0, 0.3], [0.0, 0.0], [0.4, 0.5], [1.0, 0.299_99]];
+    let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
+    let mut contact = NodeToFacet::new(&coordinates, &dofs, &[3, 4], [[0, 1], [1, 2]], 1.0).unwrap();
+    contact.search(0.0, &[0.0; 10], &[0.0; 10]).unwrap();
+    let mut gaps = [0.0_f32; 2];
+    contact.gap(0.0, &[0.0; 10], &mut gaps);
+    assert!((gaps[0] - 0.364_0).abs() < 1e-3 && gaps[1] < 0.0 && gaps[1] > -2e-5, "{gaps:?}");
+    let mut g = ContactJacobian::default();
+    contact.jacobian(&mut g);
+    assert!(g.row(1).any(|(dof, weight)| dof == 9 && (weight - 1.0).abs() < 1e-6));
+}
+
+#[test]
+fn wrong_input_is_refused() {
+    let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.1], [2.0, 0.0, 0.0]];
+    let dofs: Vec<[usize; 3]> = (0..6).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let make = |nodes: &[usize], facets: &[Facet], reach: f64| {
+        NodeToFacet::new(&flat, &dofs, nodes, facets.iter().copied(), reach).map(|_| ())
+    };
+    let triangle = Facet::from([0, 1, 2]);
+    make(&[4], &[triangle], 1.0).unwrap();
+    for reach in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(make(&[4], &[triangle], reach), Err(Error::Parameter { .. })));
+    }
+    assert!(matches!(make(&[], &[triangle], 1.0), Err(Error::Empty { .. })));
+    assert!(matches!(make(&[4], &[], 1.0), Err(Error::Empty { .. })));
+    assert!(matches!(make(&[6], &[triangle], 1.0), Err(Error::Dimension { found: 6, .. })));
+    assert!(matches!(make(&[4], &[[0, 1, 9].into()], 1.0), Err(Error::Dimension { found: 9, .. })));
+    assert!(matches!(make(&[4], &[[0, 1].into()], 1.0), Err(Error::Dimension { found: 2, .. })));
+    let incompatible = [
+        (vec![4, 4], vec![triangle]),
+        (vec![2], vec![triangle]),
+        (vec![4], vec![[0, 1, 5].into()]),
+        (vec![4], vec![[0, 1, 1].into()]),
+        (vec![4], vec![[0, 2, 1, 3].into()]),
+        // Turned, and branched.
+        (vec![4], vec![triangle, [0, 2, 3].into(), [0, 3, 2].into()]),
+        (vec![4], vec![triangle, [0, 3, 2].into()]),
+        (vec![3], vec![triangle, [1, 0, 4].into(), [1, 0, 5].into()]),
+    ];
+    for (nodes, facets) in incompatible {
+        assert!(matches!(make(&nodes, &facets, 1.0), Err(Error::Incompatible { .. })), "{facets:?}");
+    }
+    let mut infinite = flat;
+    infinite[2][1] = f64::INFINITY;
+    let refused = NodeToFacet::new(&infinite, &dofs, &[4], [[0, 1, 2]], 1.0);
+    assert!(matches!(refused, Err(Error::NotFinite { index: 2, .. })));
+    let refused = NodeToFacet::new(&flat, &dofs[1..], &[4], [[0, 1, 2]], 1.0);
+    assert!(matches!(refused, Err(Error::Dimension { expected: 6, found: 5, .. })));
+    let refused = NodeToFacet::new(&[[0.0], [1.0]], &[[0], [1]], &[1], [[0, 0]], 1.0);
+    assert!(matches!(refused, Err(Error::Dimension { found: 1, .. })));
+    let contact = NodeToFacet::new(&flat, &dofs, &[4], [[0, 1, 2]], 1.0).unwrap();
+    assert!(matches!(contact.skin(0.0), Err(Error::Parameter { .. })));
+    let contact = NodeToFacet::new(&flat, &dofs, &[4], [[0, 1, 2]], 1.0).unwrap();
+    assert!(matches!(contact.two_pass([[3, 4, 2]]), Err(Error::Incompatible { .. })));
+}
+
+/// A node flies obliquely onto two segments of elastically joined masses: it is stopped there, slides on over the
+/// vertex, and momentum is kept in both directions.
+#[test]
+fn a_run_with_candidates_that_change() {
+    let coordinates = [[2.0, 0.0], [1.0, 0.05], [0.0, 0.0], [0.4, 0.2]];
+    let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    let contact = NodeToFacet::new(&coordinates, &dofs, &[3], [[0, 1], [1, 2]], 0.1).unwrap();
+    let mut triplets = Vec::new();
+    for (i, j) in [(0, 2), (1, 3), (2, 4), (3, 5), (0, 4), (1, 5)] {
+        for (row, column, k) in [(i, i, 50.0), (j, j, 50.0), (i, j, -50.0), (j, i, -50.0)] {
+            triplets.push(Triplet::new(row, column, k));
+        }
+    }
+    let stiffness = SparseColMat::try_new_from_triplets(8, 8, &triplets).unwrap();
+    let mass = vec![2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.0];
+    let start = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0];
+    let system = LinearSystem::lumped(mass, stiffness).unwrap();
+    let mut run = Simulation::builder(system, Composite, 2e-3)
+        .velocity(start.to_vec())
+        .constraint(contact)
+        .corrector(PersistencyCorrection::with_history_projection())
+        .build()
+        .unwrap();
+    let momentum = |run: &Simulation<'_, f64>, i: usize| {
+        let direction: Vec<f64> = (0..8).map(|dof| f64::from(u8::from(dof % 2 == i))).collect();
+        run.momentum(&direction).unwrap()
+    };
+    let before = [momentum(&run, 0), momentum(&run, 1)];
+    let (mut closed, mut deepest) = (0, 0.0_f64);
+    for _ in 0..600 {
+        run.step().unwrap();
+        deepest = run.gaps().iter().fold(deepest, |deepest, &gap| deepest.min(gap));
+        closed += usize::from(run.gaps().iter().any(|gap| gap.abs() < 1e-10));
+    }
+    for (i, before) in before.into_iter().enumerate() {
+        assert!((momentum(&run, i) - before).abs() < 1e-12, "{} {before}", momentum(&run, i));
+    }
+    assert!(closed > 10, "{closed} steps in contact");
+    assert!(deepest > -1e-4, "{deepest}");
+}
