@@ -91,6 +91,13 @@ pub trait ContactConstraint<T: Real>: Send {
     /// The law of a row.
     fn law(&self, row: usize) -> ContactLaw;
 
+    /// The size of what is summed to the gap of a row besides G u and the gap itself, for instance coordinates (length):
+    /// contact takes gaps for zero within the rounding of it. Default: nothing.
+    fn magnitude(&self, row: usize) -> T {
+        let _ = row;
+        T::zero()
+    }
+
     /// Appends the rows of G, one [`ContactJacobian::push`] a candidate.
     fn jacobian(&self, out: &mut ContactJacobian<T>);
 
@@ -128,6 +135,9 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     }
     fn law(&self, row: usize) -> ContactLaw {
         (**self).law(row)
+    }
+    fn magnitude(&self, row: usize) -> T {
+        (**self).magnitude(row)
     }
     fn jacobian(&self, out: &mut ContactJacobian<T>) {
         (**self).jacobian(out);

@@ -118,9 +118,12 @@ pub trait Condensation<T: Real> {
     /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.
     fn expand(&mut self, interface: &[T], solution: &mut [T]);
 
-    /// `f ← S⁻¹ f` for one or more columns of forces on the interface. Does not allocate for a single column.
+    /// `f ← S⁻¹ f` for one or more columns of forces on the interface. Does not allocate for up to 16 columns.
     fn solve(&mut self, forces: &mut [T]);
 }
+
+/// Columns of forces on the interface that are solved for at once without allocating.
+pub(crate) const COLUMNS: usize = 16;
 
 /// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, else [`Cholesky`].
 #[derive(Clone, Copy, Debug, Default)]

@@ -151,10 +151,17 @@ impl<T: Real> ContactState<T> {
     /// Copies what belongs to the same contacts from another state; contacts it does not know are open.
     pub(crate) fn carry_over(&mut self, old: &Self, ids: &[ContactId]) {
         self.reset(ids);
+        // Candidates that come and go shift the others: the place behind the last one found is tried first.
+        let sorted = old.ids.is_sorted();
+        let mut next = 0;
         for (i, id) in ids.iter().enumerate() {
-            // Candidates rarely move far in the list: the same place first.
-            let same = (old.ids.get(i) == Some(id)).then_some(i);
-            if let Some(j) = same.or_else(|| old.ids.iter().position(|other| other == id)) {
+            let follows = (old.ids.get(next) == Some(id)).then_some(next);
+            let elsewhere = || match sorted {
+                true => old.ids.binary_search(id).ok(),
+                false => old.ids.iter().position(|other| other == id),
+            };
+            if let Some(j) = follows.or_else(elsewhere) {
+                next = j + 1;
                 self.lambda[i] = old.lambda[j];
                 self.lambda_raw[i] = old.lambda_raw[j];
                 self.closed[i] = old.closed[j];

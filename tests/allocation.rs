@@ -1,11 +1,51 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
-use contact_dynamics::{Corrector, PersistencyCorrection, Simulation};
+use contact_dynamics::contact::{ContactLaw, Side, Sphere};
+use contact_dynamics::{Composite, Corrector, NodesOnObstacle, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 #[test]
 fn steps_do_not_allocate() {
+    bars();
+    solids();
+}
+
+/// A block that a ball rolls over: candidates come and go, normals turn, a supernodal factor.
+fn solids() {
+    for law in [ContactLaw::Rigid, ContactLaw::hertz(1.0, 1.0)] {
+        let block = Solid::block([1.0; 3], [6; 3], Material { young: 100.0, poisson: 0.3, density: 1.0 });
+        let top: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][2] > 0.99).collect();
+        let ball = Sphere::new([-0.2, 0.5, 1.5], 0.52, Side::Outside).unwrap();
+        let contact = NodesOnObstacle::new(ball, &block.nodes, &block.node_dofs(), &top)
+            .unwrap()
+            .with_law(law)
+            .reach(0.3)
+            .unwrap()
+            .moving(|t| [[t, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]);
+        let mut run = Simulation::builder(block.system(), Composite, 5e-3)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        for _ in 0..20 {
+            run.step().unwrap();
+        }
+        let (mut changes, mut most) = (0, 0);
+        let counted = allocation_counter::measure(|| {
+            for _ in 0..200 {
+                run.step().unwrap();
+                most = most.max(run.gaps().len());
+            }
+            changes = run.statistics().contact_changes;
+        });
+        assert!(changes >= 8 && most > 10, "{changes} changes, {most} candidates");
+        assert_eq!(counted.count_total, 0, "{law:?}");
+    }
+}
+
+fn bars() {
     for scheme in all().into_iter().filter(Listed::takes_multipliers) {
         for mass in [MassKind::Lumped, MassKind::Consistent] {
             let bars = Bars::paper(50).delayed(0.3, 1e-3).with_mass(mass);

@@ -99,6 +99,32 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self.row(ContactLaw::Equality, entries, offset)
     }
 
+    /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) + g0.
+    ///
+    /// The normal has length one; where the pair is free to slide nothing else acts on it.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, LinearRows};
+    /// let (lower, upper) = ([0, 1], [2, 3]); // x and y dofs
+    /// let mut contact = LinearRows::new().pair(ContactLaw::Rigid, lower, upper, [0.6, 0.8], 0.1);
+    /// let mut gap = [0.0_f64];
+    /// contact.gap(0.0, &[0.0, 0.0, 0.0, -0.1], &mut gap);
+    /// assert!((gap[0] - 0.02).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn pair<const D: usize>(
+        self,
+        law: ContactLaw,
+        first: [usize; D],
+        second: [usize; D],
+        normal: [T; D],
+        offset: impl Into<GapOffset<'a, T>>,
+    ) -> Self {
+        let from = first.into_iter().zip(normal.map(|n| -n));
+        let entries: Vec<_> = from.chain(second.into_iter().zip(normal)).collect();
+        self.row(law, &entries, offset)
+    }
+
     /// Adds a row under any law.
     #[must_use]
     pub fn row(mut self, law: ContactLaw, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {

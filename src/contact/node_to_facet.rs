@@ -112,8 +112,7 @@ struct Pass {
 /// normals and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in
 /// a step: what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is
 /// the derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step
-/// is left out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run; a gap
-/// within the rounding of coordinates (16 ε of the largest) is zero.
+/// is left out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run.
 ///
 /// # Which facet, which normal
 ///
@@ -328,10 +327,10 @@ impl<T: Real> NodeToFacet<T> {
     /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only
     /// the first pass makes a row.
     ///
-    /// Two passes treat both surfaces alike, but have more rows than independent gaps where a flat interface closes as a
-    /// whole: the multipliers are then those of least norm, and where the two surfaces' gaps contradict each other by
-    /// the faceting of curved surfaces, rigid contact keeps both from penetrating. They are meant for edges, vertices
-    /// and scattered contacts, and for laws with compliance.
+    /// Two passes treat both surfaces alike, and pass the patch test on meshes that do not match, which one pass fails
+    /// where the nodes are coarser than the facets. They have more rows than independent gaps where a flat interface
+    /// closes as a whole: the multipliers are then those of least norm. On curved surfaces the gaps of both passes
+    /// cannot all be zero; neither penetrates.
     ///
     /// # Errors
     ///
@@ -417,7 +416,7 @@ impl<T: Real> NodeToFacet<T> {
     fn find_rows(&mut self, pass: usize, near: &Bounds, u: &[T]) {
         /// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
         const SAME_SIDE: f64 = 0.5;
-        let Self { coordinates, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let Self { positions, passes, reach, partners, found, dimension, dofs, .. } = self;
         let (surface, own) = match (pass, &self.own_surface) {
             (0, own) => (&self.surface, own.as_ref()),
             (_, Some(own)) => (own, Some(&self.surface)),
@@ -479,12 +478,7 @@ impl<T: Real> NodeToFacet<T> {
             found.jacobian.pointers.push(found.jacobian.dofs.len());
             found.identities.push((node, pass));
             found.facets.push(facet);
-            // Touching is touching, whatever rounding the coordinates carry: the tolerances of contact know only that
-            // of u.
-            let reference = coordinates[node];
-            let magnitude = [p, foot.point, reference].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
-            let rounding = 16.0 * T::epsilon().value() * magnitude;
-            found.gaps.push(if gap.abs() <= rounding { T::zero() } else { T::of(gap) });
+            found.gaps.push(T::of(gap));
         }
     }
 }
@@ -543,6 +537,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn law(&self, _row: usize) -> ContactLaw {
         self.law
+    }
+
+    fn magnitude(&self, row: usize) -> T {
+        let (node, _) = self.rows.identities[row];
+        T::of(self.positions[node].iter().fold(0.0, |most, x| most.max(x.abs())))
     }
 
     fn jacobian(&self, out: &mut ContactJacobian<T>) {

@@ -224,6 +224,10 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         self.law
     }
 
+    fn magnitude(&self, row: usize) -> T {
+        self.rows[row].place.iter().fold(T::zero(), |most, x| most.max(x.abs()))
+    }
+
     fn jacobian(&self, out: &mut ContactJacobian<T>) {
         for row in &self.rows {
             let mut entries = [(0, T::zero()); D];

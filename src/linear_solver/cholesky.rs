@@ -1,7 +1,7 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
 use super::ordering;
-use super::{Condensation, Factorization, LinearSolver};
+use super::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::real::kernels::{Columns, Factorization as Kind, Simplicial, Supernodal};
@@ -34,9 +34,9 @@ struct Factor<T: Real> {
     sweep: Vec<T>,
     /// For each dof of the interface, its place among those eliminated last.
     interface: Vec<usize>,
-    /// Columns on the interface in the order of elimination.
+    /// Columns on the interface in the order of elimination; room for `COLUMNS`, or as many as were ever asked for.
     trailing: Vec<T>,
-    /// Room for the rows below any supernode, for as many columns as were ever swept at once.
+    /// Room for the rows below any supernode, for as many columns.
     below: Vec<T>,
 }
 
@@ -69,8 +69,8 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
         let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
         let zero = |size: usize| vec![T::zero(); size];
-        let (values, pivots, sweep, trailing) = (zero(symbolic.len_val()), zero(n), zero(n), zero(last.len()));
-        let below = zero(below);
+        let (values, pivots, sweep) = (zero(symbolic.len_val()), zero(n), zero(n));
+        let (trailing, below) = (zero(COLUMNS * last.len()), zero(if last.is_empty() { 0 } else { COLUMNS * below }));
         Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, pivots, sweep, interface, trailing, below }))
     }
 }
@@ -205,7 +205,7 @@ impl<T: Real> Condensation<T> for Factor<T> {
         let Self { symbolic, values, sweep: x, below, trailing: on_interface, interface: places, .. } = self;
         permute(symbolic, rhs, x);
         sweep(Sweep::Forward, (symbolic, values), interior, x, 0, below);
-        on_interface.truncate(places.len());
+        let on_interface = &mut on_interface[..places.len()];
         on_interface.copy_from_slice(&x[trailing.clone()]);
         sweep(Sweep::Forward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
         sweep(Sweep::Backward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);

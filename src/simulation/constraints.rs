@@ -1,7 +1,7 @@
 //! All constraints of a simulation as one list of rows.
 
 use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE};
-use crate::corrector::Gaps;
+use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -11,6 +11,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
+    magnitudes: Vec<T>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
     /// For each dof of the system its place on the interface.
@@ -88,8 +89,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
-        let (ids, laws) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
-        let mut constraints = Self { parts, ids, laws, interface, places, admitted, stale: true };
+        let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let mut constraints = Self { parts, ids, laws, magnitudes, interface, places, admitted, stale: true };
         constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
@@ -113,11 +114,12 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, laws, places, admitted, stale, .. } = self;
+        let Self { parts, ids, laws, magnitudes, places, admitted, stale, .. } = self;
         let dofs = places.len();
         jacobian.clear();
         ids.clear();
         laws.clear();
+        magnitudes.clear();
         *stale = true;
         for (constraint, part) in parts.iter().enumerate() {
             let candidates = part.candidates();
@@ -138,6 +140,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 law.check()?;
                 admitted.check(law)?;
                 laws.push(law);
+                magnitudes.push(part.magnitude(row));
                 for (dof, weight) in jacobian.row(before + row) {
                     if dof >= dofs {
                         return Err(Error::MissingDof { what: "a contact row", dof, dofs });
@@ -166,6 +169,11 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// The laws of all rows.
     pub(crate) fn laws(&self) -> &[ContactLaw] {
         &self.laws
+    }
+
+    /// What of a gap is rounding, if the terms of G u have this magnitude.
+    pub(crate) fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
+        rounding(magnitude + gap.abs() + self.magnitudes[row])
     }
 
     /// Whether any row is compliant.

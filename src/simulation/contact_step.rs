@@ -98,7 +98,10 @@ impl<T: Real> ContactRowsWork<T> {
             constraints.finite_gaps(t, values, y)?;
         }
         for row in 0..constraints.len() {
-            tolerance[row] = rounding(g.magnitude(row, values) + y[row].abs());
+            tolerance[row] = match level.is_velocity() {
+                true => rounding(g.magnitude(row, values) + y[row].abs()),
+                false => constraints.gap_rounding(row, g.magnitude(row, values), y[row]),
+            };
         }
         if approach > 0.0 {
             constraints.rates(new.t, &new.u, &new.v, rates);
@@ -521,7 +524,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in 0..constraints.len() {
             // A sliver of one step's approach counts as touching, as at position level.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
-            let touching = rounding(g.magnitude(row, forecast) + y[row].abs()) + T::of(1e-10) * approach;
+            let touching = constraints.gap_rounding(row, g.magnitude(row, forecast), y[row]) + T::of(1e-10) * approach;
             let law = constraints.law(row);
             enabled[row] = y[row] <= touching || law.is_equality() || law.is_compliant();
         }

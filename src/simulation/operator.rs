@@ -2,7 +2,7 @@
 
 use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
-use crate::linear_solver::{Factorization, LinearSolver};
+use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
@@ -39,9 +39,6 @@ struct Delassus<T> {
     diagonal: Vec<T>,
     version: u64,
 }
-
-/// Responses computed at once, at most.
-const BATCH: usize = 16;
 
 /// Whether K and C have a part in an effective matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,7 +157,7 @@ impl<T: Real> Operator<T> {
         let mut rest = rows;
         while let Some(&first) = rest.first() {
             // Rows that follow one another go together.
-            let count = (0..rest.len().min(BATCH)).take_while(|&k| rest[k] == first + k && !self.computed[first + k]);
+            let count = (0..rest.len().min(COLUMNS)).take_while(|&k| rest[k] == first + k && !self.computed[first + k]);
             let end = first + count.count();
             let size = self.interface.len();
             for row in first..end {

@@ -281,8 +281,12 @@ impl<T: Real> StartProblem<T> {
             }
         };
         let scale = T::of(factor).recip();
+        let rounded = |row: usize, magnitude: T, y: T| match contact {
+            ContactLevel::Position { .. } => constraints.gap_rounding(row, magnitude, y),
+            ContactLevel::Velocity { .. } => rounding(magnitude + y.abs()),
+        };
         let tolerance: Vec<T> =
-            y.iter().enumerate().map(|(row, y)| scale * rounding(g.magnitude(row, &target) + y.abs())).collect();
+            y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
         let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
         let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
         let rigid = |row: &usize| open[*row] && !constraints.law(*row).is_compliant();
@@ -361,7 +365,8 @@ fn touching_contacts<T: Real>(
     for (row, rates) in rates.iter().enumerate() {
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];
-        let tolerance = rounding(g.magnitude(row, &motion.u) + gap.abs()) + T::of(1e-10 * h) * rate.abs();
+        let rounded = constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
+        let tolerance = rounded + T::of(1e-10 * h) * rate.abs();
         let law = constraints.law(row);
         let violated = !law.is_compliant() && gap < -tolerance || law.is_equality() && gap > tolerance;
         if violated && violation == Violation::Refused {

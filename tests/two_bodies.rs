@@ -1,0 +1,213 @@
+//! Two deformable bodies in contact through node to facet: patch test, impacts of blocks and rings, one pass and two.
+
+use contact_dynamics::contact::{ContactLaw, NodeToFacet};
+use contact_dynamics::{Composite, Newmark, PersistencyCorrection, Simulation, verify};
+use contact_dynamics_scenes::solids::{Material, Solid};
+
+const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
+
+/// Facets of the boundary all of whose nodes are `inside`, and their nodes.
+fn side<const D: usize>(solid: &Solid<D>, inside: impl Fn(usize, [f64; D]) -> bool) -> (Vec<Vec<usize>>, Vec<usize>) {
+    let facets: Vec<_> =
+        solid.boundary().into_iter().filter(|f| f.iter().all(|&n| inside(n, solid.nodes[n]))).collect();
+    let mut nodes: Vec<usize> = facets.iter().flatten().copied().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    (facets, nodes)
+}
+
+fn quads(facets: &[Vec<usize>]) -> Vec<[usize; 4]> {
+    facets.iter().map(|f| [f[0], f[1], f[2], f[3]]).collect()
+}
+
+fn segments(facets: &[Vec<usize>]) -> Vec<[usize; 2]> {
+    facets.iter().map(|f| [f[0], f[1]]).collect()
+}
+
+/// A block of height 1 on one of height 1, `cells` elements along the sides of each; the second one from z = 1 + gap.
+struct Stack {
+    solid: Solid<3>,
+    /// Number of nodes of the lower block.
+    split: usize,
+    gap: f64,
+}
+
+impl Stack {
+    fn new(lower: [usize; 3], upper: [usize; 3], gap: f64) -> Self {
+        let below = Solid::block([1.0; 3], lower, MATERIAL);
+        let split = below.nodes.len();
+        let solid = below.with(Solid::block([1.0; 3], upper, MATERIAL).moved([0.0, 0.0, 1.0 + gap]));
+        Self { solid, split, gap }
+    }
+
+    /// Nodes of the upper block on facets of the lower one.
+    fn contact(&self, passes: usize) -> NodeToFacet<f64> {
+        let Self { solid, split, gap } = self;
+        let (below, _) = side(solid, |n, p| n < *split && p[2] == 1.0);
+        let (above, nodes) = side(solid, |n, p| n >= *split && p[2] == 1.0 + gap);
+        let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), &nodes, quads(&below), 0.3).unwrap();
+        match passes {
+            1 => contact,
+            _ => contact.two_pass(quads(&above)).unwrap(),
+        }
+    }
+}
+
+/// Two blocks under uniform pressure, supported so that the exact solution is uniaxial: largest deviation of the
+/// displacements from it, relative to the largest of them.
+fn patch(lower: [usize; 3], upper: [usize; 3], passes: usize) -> f64 {
+    let stack = Stack::new(lower, upper, 0.0);
+    let (solid, pressure) = (&stack.solid, 1.0);
+    let mut load = vec![0.0; solid.dofs()];
+    for facet in solid.boundary().iter().filter(|f| f.iter().all(|&n| solid.nodes[n][2] == 2.0)) {
+        let [a, b] = [solid.nodes[facet[0]], solid.nodes[facet[2]]];
+        let area = ((a[0] - b[0]) * (a[1] - b[1])).abs();
+        facet.iter().for_each(|&n| load[3 * n + 2] -= 0.25 * pressure * area);
+    }
+    let mut system = solid.system::<f64>().load(move |t, f| {
+        f.iter_mut().zip(&load).for_each(|(f, load)| *f = load * (t / 10.0).min(1.0));
+    });
+    for (node, place) in solid.nodes.iter().enumerate() {
+        for axis in (0..3).filter(|&axis| place[axis] == 0.0) {
+            system = system.fix(3 * node + axis).unwrap();
+        }
+    }
+    // A strongly damped scheme: the static solution after a while.
+    let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0).unwrap(), 0.1)
+        .constraint(stack.contact(passes))
+        .build()
+        .unwrap();
+    run.run_until(50.0, &mut ()).unwrap();
+    let u = run.state().displacement();
+    let strain = pressure / MATERIAL.young;
+    let exact = |p: [f64; 3]| [0.3 * strain * p[0], 0.3 * strain * p[1], -strain * p[2]];
+    let deviations = solid.nodes.iter().enumerate().flat_map(|(n, &p)| {
+        let exact = exact(p);
+        (0..3).map(move |axis| (u[3 * n + axis] - exact[axis]).abs())
+    });
+    deviations.fold(0.0, f64::max) / (2.0 * strain)
+}
+
+#[test]
+fn the_patch_test_and_where_one_pass_fails_it() {
+    let (coarse, fine, other) = ([2, 2, 2], [4, 4, 2], [3, 3, 2]);
+    // Exact on matching meshes, and where every facet's nodes are met by nodes of the finer surface.
+    for passes in [1, 2] {
+        assert!(patch(other, other, passes) < 1e-12);
+        assert!(patch(coarse, fine, passes) < 1e-12);
+    }
+    // On others one pass is not: facets between the nodes of the coarser surface sink into it. Two passes are.
+    let nodes_between = patch(other, fine, 1);
+    assert!(nodes_between < 0.05 && nodes_between > 1e-3, "{nodes_between:e}");
+    assert!(patch(fine, coarse, 1) > 0.1);
+    assert!(patch(other, fine, 2) < 1e-12);
+    assert!(patch(fine, coarse, 2) < 1e-12);
+}
+
+#[test]
+fn impacts_of_blocks_keep_momentum_with_one_pass_and_with_two() {
+    let h = 0.25 / MATERIAL.wave_speed();
+    for (lower, upper, passes) in [([3, 3, 3], [3, 3, 3], 1), ([3, 3, 3], [4, 4, 3], 1), ([3, 3, 3], [4, 4, 3], 2)] {
+        let stack = Stack::new(lower, upper, 0.003);
+        let solid = &stack.solid;
+        // The upper block falls and slides.
+        let speed = [0.02, 0.01, -0.1];
+        let v: Vec<f64> =
+            (0..solid.dofs()).map(|dof| if dof >= 3 * stack.split { speed[dof % 3] } else { 0.0 }).collect();
+        let mut run = Simulation::builder(solid.system(), Composite, h)
+            .velocity(v)
+            .constraint(stack.contact(passes))
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        let direction =
+            |axis: usize| -> Vec<f64> { (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == axis))).collect() };
+        let momentum = |run: &Simulation<'_, f64>| [0, 1, 2].map(|axis| run.momentum(&direction(axis)).unwrap());
+        let (start, energy) = (momentum(&run), run.energy().total());
+        let (mut before, mut most, mut parted) = (energy, 0, false);
+        while run.time() < 1.5 {
+            run.step().unwrap();
+            for (now, start) in momentum(&run).iter().zip(start) {
+                assert!((now - start).abs() < 1e-12, "{passes} passes: {now} {start}");
+            }
+            let total = run.energy().total();
+            assert!(
+                total < before + 2e-3 * energy,
+                "{passes} passes, t = {}: {:e}",
+                run.time(),
+                (total - before) / energy
+            );
+            before = total;
+            let contacts = run.state().contacts();
+            let pressed = contacts.raw_forces().iter().filter(|f| **f > 0.0).count();
+            most = most.max(pressed);
+            parted = most > 0 && pressed == 0;
+            assert!(contacts.gaps().iter().all(|gap| *gap > -1e-6), "{:?}", contacts.gaps());
+        }
+        assert!(most >= 9 && parted, "{passes} passes: {most} pressed");
+        assert!(before > 0.7 * energy, "{}", before / energy);
+    }
+}
+
+#[test]
+fn rings_collide_without_gaining_energy() {
+    // Outer radius 40, inner 30, 8 apart; E = 1, ρ = 0.001 (in these units the wave crosses the wall in 0.25).
+    let material = Material { young: 1.0, poisson: 0.4, density: 1e-3 };
+    let ring = |x: f64, angle: f64| Solid::ring([30.0, 40.0], [3, 64], material).rotated(angle).moved([x, 0.0]);
+    let left = ring(0.0, 0.02);
+    let split = left.nodes.len();
+    let solid = left.with(ring(80.5, 0.031));
+    let outer = |n: usize, [x, y]: [f64; 2]| {
+        let center = if n < split { 0.0 } else { 80.5 };
+        ((x - center).hypot(y) - 40.0).abs() < 1e-9
+    };
+    let (facets, _) = side(&solid, |n, p| n < split && outer(n, p));
+    let (own, nodes) = side(&solid, |n, p| n >= split && outer(n, p));
+    for law in [ContactLaw::Rigid, ContactLaw::Penalty { stiffness: 10.0 }] {
+        let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), &nodes, segments(&facets), 5.0)
+            .unwrap()
+            .facing(segments(&own))
+            .unwrap()
+            .with_law(law);
+        let v: Vec<f64> = (0..solid.dofs())
+            .map(|dof| if dof % 2 == 0 { if dof < 2 * split { 0.3 } else { -0.3 } } else { 0.0 })
+            .collect();
+        let mut run = Simulation::builder(solid.system(), Composite, 0.05)
+            .velocity(v)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        let energy = run.energy().total();
+        let mass = solid.lumped_mass::<f64>();
+        let (mut highest, mut contact_time) = (energy, 0.0);
+        while run.time() < 120.0 {
+            run.step().unwrap();
+            highest = f64::max(highest, run.energy().total());
+            if run.state().contacts().forces().iter().any(|f| *f > 0.0) {
+                contact_time = run.time();
+            }
+        }
+        let v = run.state().velocity();
+        let momentum: f64 = mass.iter().zip(v).step_by(2).map(|(m, v)| m * v).sum();
+        let (mass_left, left): (f64, f64) = (0..2 * split)
+            .step_by(2)
+            .map(|dof| (mass[dof], mass[dof] * v[dof]))
+            .fold((0.0, 0.0), |sum, x| (sum.0 + x.0, sum.1 + x.1));
+        assert!(momentum.abs() < 1e-10 * mass_left, "{momentum:e}");
+        // The rings leave each other, ringing: slower than they came.
+        let restitution = -left / mass_left / 0.3;
+        assert!(contact_time < 110.0 && (0.3..1.0).contains(&restitution), "{law:?}: {contact_time} {restitution}");
+        assert!(highest < 1.01 * energy, "{law:?}: {}", highest / energy);
+    }
+}
+
+#[test]
+fn facets_pass_the_check_that_hosts_run_on_their_own_constraints() {
+    let stack = Stack::new([3, 3, 1], [4, 4, 1], 0.02);
+    // Both surfaces warped.
+    let solid = &stack.solid;
+    let u: Vec<f64> = (0..solid.dofs()).map(|dof| 0.01 * (dof as f64 * 1.7).sin()).collect();
+    let error = verify::gap_jacobian(&mut stack.contact(1), 0.0, &u, &vec![0.0; solid.dofs()], 1e-6).unwrap();
+    assert!(error.rows >= 9 && error.jacobian < 1e-6, "{error:?}");
+}
