@@ -14,8 +14,39 @@ pub use node_to_facet::{Facet, NodeToFacet};
 pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Plane, Side, Sphere};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
+
+/// Refuses lengths, stiffnesses and the like that are not positive and finite.
+fn positive(name: &'static str, value: f64) -> Result<f64> {
+    match value > 0.0 && value.is_finite() {
+        true => Ok(value),
+        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
+    }
+}
+
+/// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not have.
+fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D]], nodes: &[usize]) -> Result<()> {
+    let count = coordinates.len();
+    if dofs.len() != count {
+        return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
+    }
+    for (index, x) in coordinates.iter().enumerate() {
+        if let Some(x) = x.iter().find(|x| !x.is_finite()) {
+            let what = "the list of coordinates (by node)";
+            return Err(Error::NotFinite { what, index, value: x.value() });
+        }
+    }
+    check_nodes("a contact node (at most)", nodes, count)
+}
+
+/// Refuses nodes that a mesh of `count` nodes does not have.
+fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> {
+    match nodes.iter().find(|&&node| node >= count) {
+        Some(&found) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found }),
+        None => Ok(()),
+    }
+}
 
 /// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

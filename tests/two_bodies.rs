@@ -43,8 +43,8 @@ impl Stack {
     /// Nodes of the upper block on facets of the lower one.
     fn contact(&self, passes: usize) -> NodeToFacet<f64> {
         let Self { solid, split, gap } = self;
-        let (below, _) = side(solid, |n, p| n < *split && p[2] == 1.0);
-        let (above, nodes) = side(solid, |n, p| n >= *split && p[2] == 1.0 + gap);
+        let (below, _) = side(solid, |n, p| n < *split && p[2] > 1.0 - 1e-9);
+        let (above, nodes) = side(solid, |n, p| n >= *split && p[2] < 1.0 + gap + 1e-9);
         let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), &nodes, quads(&below), 0.3).unwrap();
         match passes {
             1 => contact,
@@ -59,16 +59,18 @@ fn patch(lower: [usize; 3], upper: [usize; 3], passes: usize) -> f64 {
     let stack = Stack::new(lower, upper, 0.0);
     let (solid, pressure) = (&stack.solid, 1.0);
     let mut load = vec![0.0; solid.dofs()];
-    for facet in solid.boundary().iter().filter(|f| f.iter().all(|&n| solid.nodes[n][2] == 2.0)) {
+    for facet in solid.boundary().iter().filter(|f| f.iter().all(|&n| solid.nodes[n][2] > 2.0 - 1e-9)) {
         let [a, b] = [solid.nodes[facet[0]], solid.nodes[facet[2]]];
         let area = ((a[0] - b[0]) * (a[1] - b[1])).abs();
-        facet.iter().for_each(|&n| load[3 * n + 2] -= 0.25 * pressure * area);
+        for &n in facet {
+            load[3 * n + 2] -= 0.25 * pressure * area;
+        }
     }
     let mut system = solid.system::<f64>().load(move |t, f| {
         f.iter_mut().zip(&load).for_each(|(f, load)| *f = load * (t / 10.0).min(1.0));
     });
     for (node, place) in solid.nodes.iter().enumerate() {
-        for axis in (0..3).filter(|&axis| place[axis] == 0.0) {
+        for axis in (0..3).filter(|&axis| place[axis].abs() < 1e-9) {
             system = system.fix(3 * node + axis).unwrap();
         }
     }

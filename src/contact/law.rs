@@ -1,5 +1,6 @@
 //! Contact laws: how force and gap of one row belong together.
 
+use super::positive;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -95,22 +96,20 @@ impl ContactLaw {
             true => Ok(()),
             false => Err(Error::Parameter { name, value, range }),
         };
-        let positive = |name, value: f64| inside(name, value, value > 0.0 && value.is_finite(), "positive and finite");
+        let stiff = |stiffness| positive("the contact stiffness", stiffness).map(|_| ());
         match *self {
             Self::Rigid | Self::Equality => Ok(()),
             Self::Restitution { coefficient: e } => {
                 inside("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
             }
-            Self::Penalty { stiffness } | Self::AugmentedLagrangian { stiffness, .. } => {
-                positive("the contact stiffness", stiffness)
-            }
+            Self::Penalty { stiffness } | Self::AugmentedLagrangian { stiffness, .. } => stiff(stiffness),
             Self::PowerLaw { stiffness, exponent } => {
-                positive("the contact stiffness", stiffness)?;
+                stiff(stiffness)?;
                 let ok = exponent >= 1.0 && exponent.is_finite();
                 inside("the exponent of the contact law", exponent, ok, "at least 1 and finite")
             }
             Self::Bipenalty { stiffness, mass } => {
-                positive("the contact stiffness", stiffness)?;
+                stiff(stiffness)?;
                 inside("the contact mass", mass, mass >= 0.0 && mass.is_finite(), "not negative and finite")
             }
         }

@@ -4,7 +4,7 @@ mod geometry;
 mod search;
 mod surface;
 
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw};
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, check_mesh, positive};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use geometry::{Foot, Location, Point, Shape, dot};
@@ -193,21 +193,6 @@ pub struct NodeToFacet<T: Real> {
     found: Rows<T>,
 }
 
-fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> {
-    match nodes.iter().find(|&&node| node >= count) {
-        Some(&node) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found: node }),
-        None => Ok(()),
-    }
-}
-
-fn positive(name: &'static str, value: f64) -> Result<f64> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(Error::Parameter { name, value, range: "positive and finite" })
-    }
-}
-
 impl<T: Real> NodeToFacet<T> {
     /// Contact of `nodes` with `facets`, found within the distance `reach` (length) outside and inside of the facets.
     ///
@@ -232,22 +217,12 @@ impl<T: Real> NodeToFacet<T> {
         if D != 2 && D != 3 {
             return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
         }
-        let count = coordinates.len();
-        if dofs.len() != count {
-            return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
-        }
-        for (index, x) in coordinates.iter().enumerate() {
-            if let Some(x) = x.iter().find(|x| !x.is_finite()) {
-                let what = "the list of coordinates (by node)";
-                return Err(Error::NotFinite { what, index, value: x.value() });
-            }
-        }
+        check_mesh(coordinates, dofs, nodes)?;
         let reach = positive("the reach of a contact search", reach.value())?;
         if nodes.is_empty() {
             let what = "the list of contact nodes";
             return Err(Error::Empty { what, remedy: "give at least one node" });
         }
-        check_nodes("a contact node (at most)", nodes, count)?;
         let coordinates: Vec<_> = coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect();
         let dofs: Vec<[usize; 3]> =
             dofs.iter().map(|dofs| std::array::from_fn(|i| dofs.get(i).copied().unwrap_or(0))).collect();

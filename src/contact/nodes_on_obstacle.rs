@@ -1,7 +1,7 @@
 //! Nodes of a deformable body against a rigid obstacle, which may move.
 
-use super::obstacle::{dot, minus, positive};
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, Obstacle};
+use super::obstacle::{dot, minus};
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, Obstacle, check_mesh, positive};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -96,20 +96,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         dofs: &[[usize; D]],
         nodes: &[usize],
     ) -> Result<Self> {
-        let count = coordinates.len();
-        if dofs.len() != count {
-            return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
-        }
-        if let Some(&found) = nodes.iter().find(|&&node| node >= count) {
-            let (what, expected) = ("a contact node (at most)", count.saturating_sub(1));
-            return Err(Error::Dimension { what, expected, found });
-        }
-        for &index in nodes {
-            if let Some(x) = coordinates[index].iter().find(|x| !x.is_finite()) {
-                let what = "the list of coordinates (by node)";
-                return Err(Error::NotFinite { what, index, value: x.value() });
-            }
-        }
+        check_mesh(coordinates, dofs, nodes)?;
         let node = |&number: &usize| Node { number, place: coordinates[number], dofs: dofs[number] };
         let nodes: Vec<_> = nodes.iter().map(node).collect();
         let capacity = nodes.len();
@@ -131,7 +118,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     ///
     /// [`Error::Parameter`] unless it is positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        positive("the reach of the contact", reach)?;
+        positive("the reach of the contact", reach.value())?;
         self.reach = reach;
         Ok(self)
     }

@@ -1,5 +1,6 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
+use super::positive;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -120,7 +121,7 @@ impl<T: Real, const D: usize> Sphere<T, D> {
     /// [`Error::Parameter`] unless the radius is positive and finite, [`Error::NotFinite`].
     pub fn new(center: [T; D], radius: T, side: Side) -> Result<Self> {
         finite("the center of the sphere", &center)?;
-        positive("the radius of the sphere", radius)?;
+        positive("the radius of the sphere", radius.value())?;
         Ok(Self { center, radius, side })
     }
 }
@@ -159,7 +160,7 @@ impl<T: Real> Cylinder<T> {
     /// [`Error::Parameter`] if the axis is zero or unless the radius is positive and finite, [`Error::NotFinite`].
     pub fn new(point: [T; 3], axis: [T; 3], radius: T, side: Side) -> Result<Self> {
         finite("a point of the cylinder's axis", &point)?;
-        positive("the radius of the cylinder", radius)?;
+        positive("the radius of the cylinder", radius.value())?;
         Ok(Self { point, axis: unit("the axis of the cylinder", axis)?, radius, side })
     }
 
@@ -224,13 +225,6 @@ fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     match x.iter().position(|x| !x.is_finite()) {
         Some(index) => Err(Error::NotFinite { what, index, value: x[index].value() }),
         None => Ok(()),
-    }
-}
-
-pub(super) fn positive<T: Real>(name: &'static str, x: T) -> Result<()> {
-    match x > T::zero() && x.is_finite() {
-        true => Ok(()),
-        false => Err(Error::Parameter { name, value: x.value(), range: "positive and finite" }),
     }
 }
 

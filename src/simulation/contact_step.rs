@@ -251,6 +251,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             self.compliant_gaps(new, work)?;
             if self.press_without_coupling(operator, work) {
                 self.place(new, work);
+                self.compliant_gaps(new, work)?;
             }
         }
         let Self { stage, clock, constraints, g, .. } = self;
@@ -263,6 +264,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let law = constraints.law(row);
             if law.is_compliant() {
                 rows.y[row] = rows.balance_gap[row];
+                rows.tolerance[row] = constraints.gap_rounding(row, self.g.magnitude(row, &new.u), rows.y[row]);
                 let depth = (-rows.y[row]).max(rows.tolerance[row]);
                 (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {
@@ -294,7 +296,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Workspace { interface, rows, balance, .. } = work;
         let t = clock.at(stage.load);
         let reads_past = stage.balance.as_ref().unwrap_or(&stage.recovery).reads_past(2);
-        // In the balance ū is needed once: it may be overwritten.
+        // The ū of a balance is not read again: it may be overwritten. (If this is called again ū does not depend on d.)
         let motion = match (&stage.balance, balance.as_mut()) {
             (Some(_), Some(balance)) => {
                 for (&dof, &d) in constraints.interface().iter().zip(&interface.increment) {

@@ -34,7 +34,7 @@ impl Surface {
                 let expected = if dimension == 2 { 2 } else { 3 };
                 return Err(Error::Dimension { what: "a facet of a contact surface", expected, found: nodes.len() });
             }
-            super::check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            super::super::check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
             if !facet.shape(coordinates).is_regular() {
                 return Err(refuse(index, "it has no length or area, or its normals point to both sides"));
             }
