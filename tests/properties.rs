@@ -1,7 +1,7 @@
 //! Random systems and contacts: what must hold whatever the numbers are.
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
-use contact_dynamics::contact::ContactJacobian;
+use contact_dynamics::contact::{ContactJacobian, ContactLaw};
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
@@ -230,6 +230,69 @@ proptest! {
                 let rate = g.product(row, v) + lead * g.product(row, a);
                 let speed = largest(v) + h * largest(a) + largest(u) / h;
                 prop_assert!(which < 2 || raw == 0.0 || rate.abs() < 1e-11 * speed, "pressed with rate {rate}");
+            }
+            for push in scene.pushes(&run) {
+                impulse += push;
+                size += push.abs();
+            }
+        }
+        let after = run.momentum(&direction).unwrap();
+        let scale = size + largest(&scene.velocity);
+        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+    }
+
+    #[test]
+    fn mixed_laws_are_met_together_and_push_what_they_say(
+        scene in scenes(),
+        laws in prop::collection::vec((0_usize..5, 10.0_f64..1e5, 1.0..2.5), 8),
+    ) {
+        // Rows of all kinds, and each row once more under another law: they must share or ignore one another.
+        let law = |(kind, stiffness, exponent): (usize, f64, f64)| match kind {
+            0 => ContactLaw::Rigid,
+            1 => ContactLaw::Penalty { stiffness },
+            2 => ContactLaw::PowerLaw { stiffness, exponent },
+            3 => ContactLaw::AugmentedLagrangian { stiffness, augmentations: 2 },
+            _ => ContactLaw::Bipenalty { stiffness, mass: 1e-6 * stiffness },
+        };
+        let springs = scene.springs.iter().copied().filter(|(i, j, _)| i != j).collect();
+        let mut scene = Scene { springs, damping: (0.0, scene.damping.1), ..scene };
+        let twice: Vec<_> = scene.rows.iter().take(2).map(|(row, gap)| (row.clone(), 0.9 * gap)).collect();
+        scene.rows.extend(twice);
+        let laws: Vec<_> = (0..scene.rows.len()).map(|i| law(laws[i % laws.len()])).collect();
+        let contact =
+            scene.rows.iter().zip(&laws).fold(LinearRows::new(), |rows, ((row, gap), &law)| rows.row(law, row, *gap));
+        let mut run = Simulation::builder(scene.system(), scheme(scene.scheme), scene.h)
+            .velocity(scene.velocity.clone())
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        let direction = vec![1.0; scene.masses.len()];
+        let before = run.momentum(&direction).unwrap();
+        let (mut impulse, mut size) = (0.0, before.abs());
+        // Schemes whose balance holds at the state: there the force of a spring is that of the gap shown.
+        let collocated = matches!(scene.scheme, 0 | 1 | 4 | 5 | 6);
+        for step in 0..80 {
+            run.step().unwrap();
+            let contacts = run.state().contacts();
+            let length = largest(run.state().displacement()) + scene.h * largest(run.state().velocity()) + 0.2;
+            for ((law, &gap), &force) in laws.iter().zip(run.gaps()).zip(contacts.raw_forces()) {
+                prop_assert!(force >= 0.0);
+                // While a multistep scheme is started another one makes the steps, collocated too.
+                match *law {
+                    ContactLaw::Rigid => {
+                        prop_assert!(gap > -1e-11 * length && (force == 0.0 || gap < 1e-11 * length), "{gap} {force}");
+                    }
+                    ContactLaw::Penalty { stiffness: k } if collocated => {
+                        let spring = k * (-gap).max(0.0);
+                        prop_assert!((force - spring).abs() < 1e-9 * k * length, "step {step}: {force} {spring}");
+                    }
+                    ContactLaw::PowerLaw { stiffness: k, exponent: p } if collocated => {
+                        let spring = k * (-gap).max(0.0).powf(p);
+                        prop_assert!((force - spring).abs() < 1e-9 * k * length.powf(p), "step {step}: {force} {spring}");
+                    }
+                    _ => {}
+                }
             }
             for push in scene.pushes(&run) {
                 impulse += push;
