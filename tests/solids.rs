@@ -5,8 +5,8 @@ use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::{
-    Automatic, Composite, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection, Result,
-    Simulation, TimeIntegrator,
+    Automatic, Composite, ContactLaw, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection,
+    Result, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::drops::{Drop, DropFigures, LANDINGS, Landing};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -132,6 +132,40 @@ fn several_zones_and_solvers_that_cannot_condense() {
     }
     assert!(most.iter().all(|most| *most >= 4), "{most:?}");
     assert_eq!(condensed.statistics().factorizations, 1, "moving contact does not factorize");
+}
+
+#[test]
+fn bodies_that_leave_the_reach_fly_on() {
+    // Bounced off by a spring and out of reach: no force may be left behind, whatever the linear solver.
+    let block = Solid::block([1.0; 3], [2; 3], SOFT).lifted(0.01);
+    let bottom: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][2] < 0.02).collect();
+    let solvers: [Box<dyn LinearSolver<f64>>; 2] = [Box::new(Automatic), Box::new(Plain)];
+    for solver in solvers {
+        let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+        let contact = NodesOnObstacle::new(floor, &block.nodes, &block.node_dofs(), &bottom)
+            .unwrap()
+            .with_law(ContactLaw::Penalty { stiffness: 100.0 })
+            .reach(0.02)
+            .unwrap();
+        let mut run = Simulation::builder(block.system(), Composite, 0.002)
+            .velocity(block.uniform([0.0, 0.0, -1.0]))
+            .constraint(contact)
+            .linear_solver(solver)
+            .build()
+            .unwrap();
+        let up: Vec<f64> = (0..block.dofs()).map(|dof| f64::from(u8::from(dof % 3 == 2))).collect();
+        let (mut pressed, mut free) = (false, None);
+        while run.time() < 2.0 {
+            run.step().unwrap();
+            pressed |= run.state().contacts().forces().iter().any(|f| *f > 0.0);
+            if pressed && run.gaps().is_empty() {
+                let momentum = run.momentum(&up).unwrap();
+                let at_first = *free.get_or_insert(momentum);
+                assert!((momentum - at_first).abs() < 1e-12, "{momentum} {at_first}");
+            }
+        }
+        assert!(free.is_some_and(|momentum| momentum > 0.5), "{free:?}");
+    }
 }
 
 #[test]

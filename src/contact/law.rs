@@ -148,7 +148,8 @@ impl ContactLaw {
             }
             Self::PowerLaw { stiffness, exponent } => {
                 let slope = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0));
-                (slope.recip(), depth * (T::one() - T::of(exponent).recip()))
+                // At a depth that is next to nothing the spring is next to none, but not infinitely soft.
+                (slope.max(T::min_positive_value()).recip(), depth * (T::one() - T::of(exponent).recip()))
             }
         }
     }

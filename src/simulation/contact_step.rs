@@ -182,8 +182,8 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
 const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Finds the multipliers of the stage from d on the interface, and adds their response to it. `new.u` is left as
-    /// predicted.
+    /// Finds the multipliers of the stage from d on the interface, adds their response to it, and leaves their forces there.
+    /// `new.u` is left as predicted.
     pub(super) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -194,7 +194,6 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         let dofs = self.constraints.interface();
         keep(dofs, &new.u, &mut work.interface.displacement);
-        work.interface.forces.fill(T::zero());
         self.aim(system, new, past, work)?;
         let result = match self.condition(operator, new, past, work) {
             Ok(true) => self.press(operator, new.t, work),

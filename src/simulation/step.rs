@@ -111,6 +111,7 @@ impl<T: Real> Simulation<'_, T> {
             let operator = &mut program.operators[stage.operator];
             residual(stage, clock.at(stage.load), &mut **system, new, past, work)?;
             operator.begin(&mut work.increment, &mut work.interface.increment);
+            work.interface.forces.fill(T::zero());
             statistics.linear_solves += 1;
             if constraints.len() > 0 && T::all_finite(&work.interface.increment) {
                 ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.solve(
