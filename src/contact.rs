@@ -89,7 +89,7 @@ pub trait ContactConstraint<T: Real>: Send {
     ///
     /// # Errors
     ///
-    /// Whatever is wrong with it, for instance [`Error::MissingDof`](crate::Error::MissingDof).
+    /// Whatever is wrong with it, for instance [`Error::MissingDof`].
     fn check(&self, dofs: usize) -> Result<()>;
 
     /// Appends every dof that a row may ever act on or a gap depend on (repetitions allowed), whatever later searches find:
@@ -107,7 +107,7 @@ pub trait ContactConstraint<T: Real>: Send {
     ///
     /// # Errors
     ///
-    /// The host's own, as [`Error::Host`](crate::Error::Host).
+    /// The host's own, as [`Error::Host`].
     fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
         let _ = (t, u, v);
         Ok(Candidates::Unchanged)
