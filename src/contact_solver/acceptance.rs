@@ -106,6 +106,11 @@ impl<T: Real> Acceptance<'_, T> {
         failing.is_none()
     }
 
+    /// Whether what every row misses is rounding.
+    pub(super) fn is_exact(&self, multipliers: &[T]) -> bool {
+        (0..self.problem.size()).all(|i| self.problem.miss(i, multipliers) <= self.problem.rounding(i, multipliers))
+    }
+
     /// The failure that names the worst row.
     pub(super) fn failure(&self, iterations: usize, multipliers: &[T]) -> ContactFailure<T> {
         let misses = (0..self.problem.size()).map(|i| (i, self.problem.miss(i, multipliers)));

@@ -1,6 +1,6 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
-use super::acceptance::Settings;
+use super::acceptance::{Acceptance, Settings};
 use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
@@ -39,6 +39,8 @@ pub struct ActiveSet<T = f64> {
 const BLOCK_TRIES: usize = 3;
 /// Proximal steps, each of which shrinks what is left to do by orders of magnitude.
 const PROXIMAL_STEPS: usize = 60;
+/// Exchanges tried on a semidefinite W, for which they may not end.
+const SEMIDEFINITE_TRIES: usize = 30;
 
 /// How a sequence of exchanges ended.
 enum Exchanges {
@@ -165,7 +167,7 @@ impl<T: Real> ActiveSet<T> {
                 }
                 return Ok(Exchanges::Solved(iteration));
             }
-            if factor.is_singular() && iteration > 30 {
+            if factor.is_singular() && iteration > SEMIDEFINITE_TRIES {
                 return Ok(Exchanges::Stuck(iteration));
             }
             if count < fewest {
@@ -191,6 +193,7 @@ impl<T: Real> ActiveSet<T> {
         &mut self,
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
+        mut acceptance: Acceptance<'_, T>,
         mut iterations: usize,
     ) -> Result<usize, ContactFailure<T>> {
         let size = problem.size();
@@ -213,12 +216,15 @@ impl<T: Real> ActiveSet<T> {
             match self.exchange(problem, multipliers, Form::Proximal)? {
                 Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
             }
-            let (row, residual) = problem.residual(multipliers);
-            if residual <= problem.rounding(row, multipliers) {
+            if acceptance.is_exact(multipliers) {
                 return Ok(iterations);
             }
-            // What the multipliers gain no longer lowers the residual: there is no solution.
+            let (row, residual) = problem.residual(multipliers);
+            // What the multipliers gain no longer lowers the residual: it is rounding, or there is no solution.
             if step >= 3 && residual > T::of(0.5) * before {
+                if acceptance.accepts(multipliers) {
+                    return Ok(iterations);
+                }
                 let push = |i: usize| (problem.delassus(row, i) * multipliers[i]).abs();
                 let other = (0..size).filter(|&i| i != row).fold(row, |o, i| match o != row && push(o) >= push(i) {
                     true => o,
@@ -256,10 +262,10 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         if problem.size() == 0 {
             return Ok(0);
         }
-        Settings::default().begin(problem, multipliers)?;
+        let acceptance = Settings::default().begin(problem, multipliers)?;
         match self.exchange(problem, multipliers, Form::Given)? {
             Exchanges::Solved(iterations) => Ok(iterations),
-            Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, iterations),
+            Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, acceptance, iterations),
         }
     }
 }
@@ -399,6 +405,21 @@ mod tests {
         }
         let tied = solve(&[1.0; 4], &[-1.0, 1.0], &[Bound::Free; 2], &[0.0; 2]);
         assert!(matches!(tied, Err(ContactFailure::Contradictory { .. })), "{tied:?}");
+    }
+
+    #[test]
+    fn rounding_is_no_contradiction() {
+        // The same tie twice, its offsets rounded differently, and tolerances that know nothing of it.
+        let problem = ContactProblem {
+            delassus: &[1.0; 4],
+            offset: &[-1e-2, -1e-2 - 4e-15],
+            bounds: &[Bound::Free; 2],
+            tolerance: &[1e-19; 2],
+            version: 0,
+        };
+        let mut lambda = [0.0; 2];
+        ActiveSet::default().solve(&problem, &mut lambda).unwrap();
+        assert!((lambda[0] + lambda[1] - 1e-2_f64).abs() < 1e-14, "{lambda:?}");
     }
 
     #[test]
