@@ -123,7 +123,7 @@ pub(super) struct InterfaceWork<T> {
     /// Values at d = 0 of the displacements and of what contact constrains.
     displacement: Vec<T>,
     target: Vec<T>,
-    /// A response.
+    /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
     response: Vec<T>,
 }
 
@@ -376,10 +376,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                 let law = self.constraints.law(row);
-                let pushed = |(&j, &lambda): (&usize, &T)| lambda * self.g.interface_product(row, operator.response(j));
                 match law {
                     ContactLaw::PowerLaw { .. } => {
-                        let gap = y[row] + weight[row] * problem.iter().zip(&*multipliers).map(pushed).sum::<T>();
+                        let gap = y[row] + weight[row] * self.g.interface_product(row, &interface.response);
                         let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
                         let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
                         let miss = (lambda - law.force(gap)).abs() * slope;
@@ -410,11 +409,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         let (contact, value) = (self.constraints.ids[row], lambda.value());
                         return Err(Error::ContactNotFinite { t, what: "the multiplier", contact, value });
                     }
-                    if lambda != T::zero() {
-                        T::axpy(lambda, operator.response(row), &mut interface.increment);
-                        self.g.interface_scatter(row, lambda, &mut interface.forces);
-                    }
+                    self.g.interface_scatter(row, lambda, &mut interface.forces);
                 }
+                T::axpy(T::one(), &interface.response, &mut interface.increment);
                 return Ok(());
             }
             if pass + 1 == limit {
@@ -425,10 +422,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Solves on the rows that may be active; whoever is pushed in by that joins. The set only grows: this ends.
+    /// Solves on the rows that may be active, and leaves the response in `interface.response`; whoever is pushed in by that
+    /// joins. The set only grows: this ends.
     fn press_linearized(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
         let Self { constraints, g, solver, statistics, .. } = self;
-        let Workspace { rows, trial, .. } = work;
+        let Workspace { rows, trial, interface, .. } = work;
         let ContactRowsWork {
             y,
             tolerance,
@@ -466,11 +464,16 @@ impl<T: Real> ContactStep<'_, '_, T> {
             statistics.contact_solves += 1;
             statistics.contact_iterations +=
                 solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))? as u64;
+            interface.response.fill(T::zero());
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                if lambda != T::zero() {
+                    T::axpy(lambda, operator.response(row), &mut interface.response);
+                }
+            }
             let mut grown = false;
             for row in 0..count {
                 if enabled[row] && !in_problem[row] && weight[row] > T::zero() {
-                    let push = |(&j, &lambda): (&usize, &T)| lambda * g.interface_product(row, operator.response(j));
-                    let pushed = y[row] + weight[row] * problem.iter().zip(multipliers.iter()).map(push).sum::<T>();
+                    let pushed = y[row] + weight[row] * g.interface_product(row, &interface.response);
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);
                         let depth = (-pushed).max(tolerance[row]);
