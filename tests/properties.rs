@@ -142,6 +142,38 @@ impl Scene {
     }
 }
 
+/// The total momentum at the start of a run, and what contact has added to it since.
+struct Books {
+    direction: Vec<f64>,
+    before: f64,
+    impulse: f64,
+    size: f64,
+}
+
+impl Books {
+    fn open(scene: &Scene, run: &Simulation<'_, f64>) -> Self {
+        let direction = vec![1.0; scene.masses.len()];
+        let before = run.momentum(&direction).unwrap();
+        Self { direction, before, impulse: 0.0, size: before.abs() }
+    }
+
+    fn add(&mut self, scene: &Scene, run: &Simulation<'_, f64>) {
+        for push in scene.pushes(run) {
+            self.impulse += push;
+            self.size += push.abs();
+        }
+    }
+
+    /// Momentum must have changed by the impulses.
+    fn check(&self, scene: &Scene, run: &Simulation<'_, f64>) -> Result<(), TestCaseError> {
+        let Self { direction, before, impulse, size } = self;
+        let after = run.momentum(direction).unwrap();
+        let scale = size + largest(&scene.velocity);
+        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+        Ok(())
+    }
+}
+
 fn largest(x: &[f64]) -> f64 {
     x.iter().fold(0.0_f64, |a, b| a.max(b.abs()))
 }
@@ -213,9 +245,7 @@ proptest! {
             .build()
             .unwrap();
         let g = scene.jacobian();
-        let direction = vec![1.0; scene.masses.len()];
-        let before = run.momentum(&direction).unwrap();
-        let (mut impulse, mut size) = (0.0, before.abs());
+        let mut books = Books::open(&scene, &run);
         for _ in 0..400 {
             run.step().unwrap();
             let state = run.state();
@@ -231,14 +261,9 @@ proptest! {
                 let speed = largest(v) + h * largest(a) + largest(u) / h;
                 prop_assert!(which < 2 || raw == 0.0 || rate.abs() < 1e-11 * speed, "pressed with rate {rate}");
             }
-            for push in scene.pushes(&run) {
-                impulse += push;
-                size += push.abs();
-            }
+            books.add(&scene, &run);
         }
-        let after = run.momentum(&direction).unwrap();
-        let scale = size + largest(&scene.velocity);
-        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+        books.check(&scene, &run)?;
     }
 
     #[test]
@@ -267,9 +292,7 @@ proptest! {
             .corrector(PersistencyCorrection::with_history_projection())
             .build()
             .unwrap();
-        let direction = vec![1.0; scene.masses.len()];
-        let before = run.momentum(&direction).unwrap();
-        let (mut impulse, mut size) = (0.0, before.abs());
+        let mut books = Books::open(&scene, &run);
         // Schemes whose balance holds at the state: there the force of a spring is that of the gap shown.
         let collocated = matches!(scene.scheme, 0 | 1 | 4 | 5 | 6);
         for step in 0..80 {
@@ -294,14 +317,9 @@ proptest! {
                     _ => {}
                 }
             }
-            for push in scene.pushes(&run) {
-                impulse += push;
-                size += push.abs();
-            }
+            books.add(&scene, &run);
         }
-        let after = run.momentum(&direction).unwrap();
-        let scale = size + largest(&scene.velocity);
-        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+        books.check(&scene, &run)?;
     }
 
     #[test]
@@ -331,19 +349,12 @@ proptest! {
         let scene = Scene { springs, damping: (0.0, scene.damping.1), ..scene };
         let mut run = scene.start();
         // Each connected body has its own momentum; the total is enough here.
-        let direction = vec![1.0; scene.masses.len()];
-        let before = run.momentum(&direction).unwrap();
-        let (mut impulse, mut size) = (0.0, before.abs());
+        let mut books = Books::open(&scene, &run);
         for _ in 0..80 {
             run.step().unwrap();
-            for push in scene.pushes(&run) {
-                impulse += push;
-                size += push.abs();
-            }
+            books.add(&scene, &run);
         }
-        let after = run.momentum(&direction).unwrap();
-        let scale = size + largest(&scene.velocity);
-        prop_assert!((after - before - impulse).abs() < 1e-9 * scale, "{before} + {impulse} is not {after}");
+        books.check(&scene, &run)?;
     }
 
     #[test]

@@ -178,8 +178,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// # Errors
     ///
     /// Any [`Error`] that names a wrong input: sizes, NaN, parameters, masses, supports, contact rows on missing or
-    /// prescribed dofs, initial penetration, a singular effective matrix, parts that do not fit
-    /// together.
+    /// prescribed dofs, initial penetration, a singular effective matrix, parts that do not fit together.
     pub fn build(self) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         if !(h > 0.0 && h.is_finite()) {

@@ -272,6 +272,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let coupled = rows.weight[row] > T::zero();
             let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || law.is_equality();
             rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
+            if coupled && !rows.in_problem[row] {
+                trial.lambda_raw[row] = T::zero();
+            }
             needed |= coupled && violated;
         }
         Ok(needed)
@@ -364,14 +367,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
 
     /// Solves for the multipliers, laws linearized again until they are met.
     fn press(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
-        let count = self.constraints.len();
         let augmentations = self.constraints.laws().iter().map(ContactLaw::augmentations).max().unwrap_or(0);
         let limit = LINEARIZATIONS + augmentations;
         for pass in 0..limit {
             self.press_linearized(operator, t, work)?;
             let Workspace { rows, trial, interface, .. } = &mut *work;
-            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, in_problem, .. } =
-                rows;
+            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, .. } = rows;
             // The laws at the solution.
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
@@ -401,9 +402,6 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 trial.lambda_raw[row] = lambda;
             }
             if !again {
-                for row in (0..count).filter(|&row| !in_problem[row] && weight[row] > T::zero()) {
-                    trial.lambda_raw[row] = T::zero();
-                }
                 for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                     if !lambda.is_finite() {
                         let (contact, value) = (self.constraints.ids[row], lambda.value());
