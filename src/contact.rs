@@ -76,8 +76,10 @@ pub struct GapRates<T> {
 
 /// A constraint `g(t, u) ≥ 0` (or = 0) on the displacements, with as many rows as it has candidates.
 ///
-/// In this version gaps are affine in u: `g = G u + g0(t)`, with G fixed between two calls of [`search`](Self::search).
-/// Evaluations are pure. Signs: g > 0 is open; the contact force on the system is Gᵀ λ, λ > 0 in compression.
+/// Between two calls of [`search`](Self::search) or [`follow`](Self::follow) gaps are affine in u, `g = G u + g0(t)`. With
+/// a linear system they are linearized once, by the search where a step begins; with a nonlinear one Newton's method
+/// follows them to where the step ends. Evaluations are pure. Signs: g > 0 is open; the contact force on the system is
+/// Gᵀ λ, λ > 0 in compression.
 pub trait ContactConstraint<T: Real>: Send {
     /// The largest number of candidates there can ever be: memory is reserved for it.
     fn max_candidates(&self) -> usize;
@@ -110,6 +112,21 @@ pub trait ContactConstraint<T: Real>: Send {
     /// The host's own, as [`Error::Host`].
     fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
         let _ = (t, u, v);
+        Ok(Candidates::Unchanged)
+    }
+
+    /// Moves the linearization of the candidates there are to u: G, gaps and rates are then those of the gap functions at
+    /// u. Called within a step, between two searches, for nonlinear gaps; candidates and their order stay as they are.
+    /// Default: gaps are affine, nothing moves.
+    ///
+    /// Returns whether G changed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ContactLost`] if a candidate has left what the last search knows of its surroundings (the constraint's index
+    /// in the contact's name is filled in by the caller), or the host's own.
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        let _ = (t, u);
         Ok(Candidates::Unchanged)
     }
 
@@ -157,6 +174,9 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     }
     fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
         (**self).search(t, u, v)
+    }
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        (**self).follow(t, u)
     }
     fn candidates(&self) -> usize {
         (**self).candidates()

@@ -240,6 +240,26 @@ pub enum Error {
         /// The value (displacement, velocity or acceleration).
         value: f64,
     },
+    /// A node has left the facets that the last search found for it.
+    #[error(
+        "t = {t:e}: contact {contact} has left what the search at the start of the step found; take smaller steps or give \
+         the contact a larger reach"
+    )]
+    ContactLost {
+        /// Time of the stage.
+        t: f64,
+        /// The contact.
+        contact: ContactId,
+    },
+    /// The host cannot evaluate a trial state; a smaller step may help.
+    #[error("the host's {callback} does not admit the state of a step")]
+    Inadmissible {
+        /// Which callback.
+        callback: &'static str,
+        /// The host's own error.
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// A callback of the host failed.
     #[error("the host's {callback} failed")]
     Host {
@@ -257,12 +277,15 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Error {
     /// Whether a smaller step may help (a failed step, not a wrong input).
     ///
-    /// Errors of the host's own callbacks are never recoverable: the library cannot know.
+    /// [`Host`](Self::Host) never is: a host whose callback may succeed with a smaller step says
+    /// [`Inadmissible`](Self::Inadmissible).
     pub fn is_recoverable(&self) -> bool {
         matches!(
             self,
             Self::Contact { .. }
                 | Self::ContradictoryContacts { .. }
+                | Self::ContactLost { .. }
+                | Self::Inadmissible { .. }
                 | Self::StepNotFinite { .. }
                 | Self::ContactNotFinite { .. }
                 | Self::SupportNotFinite { .. }

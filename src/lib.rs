@@ -38,5 +38,5 @@ pub use observer::{Control, Observer, StepView};
 pub use real::Real;
 pub use simulation::{Energy, Outcome, Simulation, SimulationBuilder, Statistics, Works};
 pub use state::{ContactState, History, State};
-pub use system::{Damping, LinearSystem, System, TangentWeights};
+pub use system::{Damping, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
 pub use tableau::StartUp;

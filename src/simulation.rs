@@ -118,6 +118,8 @@ struct Workspace<T: Real> {
     rows: ContactRowsWork<T>,
     buffers: Buffers<T>,
     projection: Option<JumpProjection<T>>,
+    /// Version of the rows that the projection knows.
+    projected_rows: u64,
     backup: Backup<T>,
     /// Change of kinetic energy by corrections in this step.
     correction_energy: T,

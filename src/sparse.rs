@@ -28,6 +28,15 @@ pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatR
 
 /// Refuses NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
 pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    check_symmetric_in(matrix, a, &mut Vec::new())
+}
+
+/// As [`check_symmetric`], with memory that is kept from one check to the next.
+pub(crate) fn check_symmetric_in<T: Real>(
+    matrix: &'static str,
+    a: SparseColMatRef<'_, usize, T>,
+    cursor: &mut Vec<usize>,
+) -> Result<()> {
     let n = square(matrix, a)?;
     check_pattern(matrix, a.symbolic())?;
     let mut largest = T::zero();
@@ -51,7 +60,8 @@ pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<
     // Entries below the diagonal meet those of the upper triangle in ascending order: one cursor a column finds the
     // partners.
     let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
-    let mut cursor: Vec<usize> = pointers[..n].to_vec();
+    cursor.clear();
+    cursor.extend_from_slice(&pointers[..n]);
     for column in 0..n {
         for at in pointers[column]..pointers[column + 1] {
             let (row, value) = (rows[at], values[at]);

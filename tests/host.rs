@@ -9,8 +9,8 @@ use contact_dynamics::faer::sparse::{
 use contact_dynamics::observer::{ContactRecorder, DofRecorder};
 use contact_dynamics::{
     ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, Damping, Error, Factorization,
-    LinearSolver, LinearSystem, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation,
-    StepView, System, TangentWeights, TimeIntegrator,
+    LinearSolver, LinearSystem, Linearity, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result,
+    Simulation, StepView, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use std::sync::Arc;
@@ -51,11 +51,14 @@ impl<T: Real> System<T> for Oscillator<T> {
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
         self.pattern.as_ref()
     }
-    fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
+    fn linearity(&self) -> Linearity {
+        Linearity::Linear
+    }
+    fn tangent(&mut self, _: f64, _: &[T], _: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
         out[0] = weights.stiffness * self.stiffness + weights.damping * self.damping;
         Ok(())
     }
-    fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping {
+    fn damping_force(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Damping {
         out[0] = self.damping * v[0];
         Damping::Present
     }

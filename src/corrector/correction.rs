@@ -7,7 +7,7 @@ use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
-use crate::system::{Damping, System};
+use crate::system::{Damping, Linearity, System};
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
 ///
@@ -153,9 +153,10 @@ pub(crate) struct Buffers<T> {
     /// One a candidate.
     rates: Vec<GapRates<T>>,
     gaps: Vec<T>,
-    /// Change of v and the damping force it makes, one a dof; empty without damping.
+    /// Change of v and the damping force it makes (and that of before), one a dof; empty without damping.
     change: Vec<T>,
     damping: Vec<T>,
+    before: Vec<T>,
 }
 
 impl<T: Real> Buffers<T> {
@@ -175,6 +176,7 @@ impl<T: Real> Buffers<T> {
             gaps: vec![T::zero(); rows],
             change: vec![T::zero(); damped],
             damping: vec![T::zero(); damped],
+            before: vec![T::zero(); damped],
         }
     }
 }
@@ -278,7 +280,7 @@ impl<T: Real> Correction<'_, T> {
     /// forces to a.
     pub fn push_velocity(&mut self) {
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
-        let Buffers { closed, impulses, jump, rates, change, damping, .. } = &mut **buffers;
+        let Buffers { closed, impulses, jump, rates, change, damping, before, .. } = &mut **buffers;
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return;
         }
@@ -298,7 +300,21 @@ impl<T: Real> Correction<'_, T> {
             for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
                 projection.push(g, row, impulse, change);
             }
-            if system.0.damping_force(change, damping) == Damping::Present {
+            // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
+            let present = match system.0.linearity() {
+                Linearity::Linear => system.0.damping_force(&new.u, change, damping),
+                Linearity::Nonlinear => {
+                    let present = system.0.damping_force(&new.u, &new.v, damping);
+                    for (change, &v) in change.iter_mut().zip(&new.v) {
+                        *change = v - *change;
+                    }
+                    if system.0.damping_force(&new.u, change, before) == Damping::Present {
+                        T::axpy(-T::one(), before, damping);
+                    }
+                    present
+                }
+            };
+            if present == Damping::Present {
                 projection.apply_inverse(damping);
                 T::axpy(-T::one(), damping, &mut new.a);
             }

@@ -38,6 +38,8 @@ struct Factor<T: Real> {
     trailing: Vec<T>,
     /// Room for the rows below any supernode, for as many columns.
     below: Vec<T>,
+    /// Memory of the check of symmetry.
+    cursor: Vec<usize>,
 }
 
 /// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of zero.
@@ -71,7 +73,19 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let zero = |size: usize| vec![T::zero(); size];
         let (values, pivots, sweep) = (zero(symbolic.len_val()), zero(n), zero(n));
         let (trailing, below) = (zero(COLUMNS * last.len()), zero(if last.is_empty() { 0 } else { COLUMNS * below }));
-        Ok(Box::new(Factor { symbolic, kind, values, memory, columns: 1, pivots, sweep, interface, trailing, below }))
+        Ok(Box::new(Factor {
+            symbolic,
+            kind,
+            values,
+            memory,
+            columns: 1,
+            pivots,
+            sweep,
+            interface,
+            trailing,
+            below,
+            cursor: Vec::new(),
+        }))
     }
 }
 
@@ -141,8 +155,8 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        sparse::check_symmetric("effective", a)?;
-        let Self { symbolic, kind, values, pivots, memory, .. } = self;
+        let Self { symbolic, kind, values, pivots, memory, cursor, .. } = self;
+        sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
         T::cholesky(*kind, symbolic, a, values, pivots, memory).map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());

@@ -2,6 +2,7 @@
 
 use super::contact_step::{ContactRowsWork, InterfaceWork};
 use super::energy::Ledger;
+use super::operator::At;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation};
@@ -217,7 +218,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         contact_solver.reserve(rows);
 
         let contact = (rows, constraints.interface());
-        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, contact };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v };
+        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, contact };
         let program = compiler.compile(&scheme.tableau)?;
         let startup = match history.known < scheme.depth {
             true => Some(compiler.start(&scheme.starter, &scheme.tableau)?),
@@ -285,7 +287,7 @@ fn workspace<T: Real>(
 ) -> Workspace<T> {
     let dofs = system.dofs();
     let (still, mut force) = (vec![T::zero(); dofs], vec![T::zero(); dofs]);
-    let damped = match system.damping_force(&still, &mut force) {
+    let damped = match system.damping_force(&still, &still, &mut force) {
         Damping::Present if !correctors.is_empty() => dofs,
         _ => 0,
     };
@@ -311,6 +313,7 @@ fn workspace<T: Real>(
         rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
+        projected_rows: 0,
         backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         correction_energy: T::zero(),
     }
@@ -378,7 +381,7 @@ fn check_lagged_damping<T: Real>(
     let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
     if lags && grows() {
         let zero = vec![T::zero(); system.dofs()];
-        if system.damping_force(&zero, &mut zero.clone()) == Damping::Present {
+        if system.damping_force(&zero, &zero, &mut zero.clone()) == Damping::Present {
             return Err(Error::Incompatible {
                 part: integrator.name(),
                 reason: "it takes damping forces from the start of the step, which makes it unstable for every step \

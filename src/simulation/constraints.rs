@@ -19,6 +19,8 @@ pub(crate) struct Constraints<'a, T: Real> {
     admitted: Admitted,
     /// Whether candidates have changed since the rows were last read.
     stale: bool,
+    /// Counts how often the rows have been read.
+    version: u64,
 }
 
 /// Which laws a scheme can serve.
@@ -90,7 +92,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
-        let mut constraints = Self { parts, ids, laws, magnitudes, interface, places, admitted, stale: true };
+        let mut constraints =
+            Self { parts, ids, laws, magnitudes, interface, places, admitted, stale: true, version: 0 };
         constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
@@ -110,6 +113,34 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         self.read_rows(jacobian)?;
         Ok(Candidates::Changed)
+    }
+
+    /// Moves the linearization of the rows to u.
+    pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+        for (constraint, part) in self.parts.iter_mut().enumerate() {
+            let moved = part.follow(t, u).map_err(|error| match error {
+                Error::ContactLost { t, contact } => {
+                    Error::ContactLost { t, contact: ContactId { constraint, ..contact } }
+                }
+                other => other,
+            });
+            // Remembered beyond an error, as by a search.
+            self.stale |= match &moved {
+                Ok(candidates) => *candidates == Candidates::Changed,
+                Err(_) => true,
+            };
+            moved?;
+        }
+        if !self.stale {
+            return Ok(Candidates::Unchanged);
+        }
+        self.read_rows(jacobian)?;
+        Ok(Candidates::Changed)
+    }
+
+    /// The version of the rows: responses to those of another one are not theirs.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
     }
 
     /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.
@@ -158,6 +189,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         jacobian.locate(places);
         *stale = false;
+        self.version += 1;
         Ok(())
     }
 

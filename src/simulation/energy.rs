@@ -11,7 +11,7 @@ use crate::system::{Damping, System};
 pub struct Energy<T> {
     /// ½ vᵀ M v.
     pub kinetic: T,
-    /// ½ uᵀ K u, if the system has a potential.
+    /// Elastic energy (½ uᵀ K u of a linear system), if the system has a potential.
     pub potential: Option<T>,
     /// Where energy came from and went since the start, if the builder asked for the balance.
     pub works: Option<Works<T>>,
@@ -99,13 +99,13 @@ impl<T: Real> Ledger<T> {
         g: &ContactJacobian<T>,
     ) -> Result<()> {
         self.reactions = reactions(system, state, g)?;
-        self.power = self.damping_power(system, state.velocity());
+        self.power = self.damping_power(system, state.displacement(), state.velocity());
         system.external_load(state.time(), &mut self.load);
         Ok(())
     }
 
-    fn damping_power(&mut self, system: &mut dyn System<T>, v: &[T]) -> T {
-        match system.damping_force(v, &mut self.residual) {
+    fn damping_power(&mut self, system: &mut dyn System<T>, u: &[T], v: &[T]) -> T {
+        match system.damping_force(u, v, &mut self.residual) {
             Damping::None => T::zero(),
             Damping::Present => -dot(&self.residual, v),
         }
@@ -148,7 +148,7 @@ impl<T: Real> Ledger<T> {
         }
         works.corrections += books.corrections;
         let old_power = self.power;
-        self.power = self.damping_power(system, v);
+        self.power = self.damping_power(system, u, v);
         self.works.damping += half * (old_power + self.power) * T::of(books.h);
     }
 

@@ -7,7 +7,7 @@ use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
-use crate::system::{Damping, System, TangentWeights};
+use crate::system::{Damping, Linearity, System, TangentWeights};
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -18,12 +18,18 @@ pub(crate) struct Operator<T> {
     /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
     weights: [f64; 3],
     tangent: Tangent,
+    linearity: Linearity,
     combination: Combination,
+    /// Values of the system's tangent and of the effective matrix, kept where the tangent changes.
+    part: Vec<T>,
+    values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
     /// For each contact row the interface part of A⁻¹ G_rowᵀ, if it has been computed.
     columns: Vec<T>,
     computed: Vec<bool>,
+    /// Version of the rows that these are responses to.
+    rows: u64,
     delassus: Delassus<T>,
     /// One vector of the system, for factorizations that cannot condense.
     full: Vec<T>,
@@ -38,6 +44,14 @@ struct Delassus<T> {
     /// The diagonal without them.
     diagonal: Vec<T>,
     version: u64,
+}
+
+/// Where a tangent is taken.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct At<'m, T> {
+    pub(crate) t: f64,
+    pub(crate) u: &'m [T],
+    pub(crate) v: &'m [T],
 }
 
 /// Whether K and C have a part in an effective matrix.
@@ -56,6 +70,7 @@ impl<T: Real> Operator<T> {
         solver: &dyn LinearSolver<T>,
         weights: [f64; 3],
         h: f64,
+        at: At<'_, T>,
         (rows, interface): (usize, &[usize]),
     ) -> Result<Self> {
         let (tangent, combination) = pattern(system, weights)?;
@@ -72,8 +87,22 @@ impl<T: Real> Operator<T> {
             diagonal: Vec::with_capacity(rows),
             version: 0,
         };
-        let mut operator = Self { weights, tangent, combination, factor, interface, columns, computed, delassus, full };
-        operator.factorize(system, h)?;
+        let mut operator = Self {
+            weights,
+            tangent,
+            linearity: system.linearity(),
+            combination,
+            part: Vec::new(),
+            values: Vec::new(),
+            factor,
+            interface,
+            columns,
+            computed,
+            rows: 0,
+            delassus,
+            full,
+        };
+        operator.factorize(system, h, at)?;
         Ok(operator)
     }
 
@@ -82,36 +111,40 @@ impl<T: Real> Operator<T> {
         self.weights.map(f64::to_bits) == weights.map(f64::to_bits)
     }
 
-    /// Factorizes for the step size h; responses are forgotten.
+    /// Whether the matrix changes with u and v.
+    pub(crate) fn varies(&self) -> bool {
+        self.tangent == Tangent::Present && self.linearity == Linearity::Nonlinear
+    }
+
+    /// Factorizes for the step size h with the tangent at a motion; responses are forgotten. Where the matrix varies this
+    /// does not allocate but for the first time.
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
-    pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64) -> Result<()> {
-        let Self { weights, tangent, combination, factor, .. } = self;
-        let mut values = vec![T::zero(); combination.len()];
-        let mut part = Vec::new();
+    pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
+        let Self { weights, tangent, combination, factor, part, values, .. } = self;
+        values.resize(combination.len(), T::zero());
         if *tangent == Tangent::Present {
             part.resize(system.pattern().row_idx().len(), T::zero());
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
-            system.tangent(weights, &mut part)?;
+            system.tangent(at.t, at.u, at.v, weights, part)?;
         }
         let inertia = T::of(weights[2] / (h * h));
-        let part = (*tangent == Tangent::Present).then_some((T::one(), &part[..]));
-        match system.mass() {
-            Mass::Lumped(mass) => {
-                let sources: Vec<_> = part.into_iter().collect();
-                combination.fill(&sources, Some((inertia, mass)), &mut values);
-            }
-            Mass::Consistent(mass) => {
-                let sources: Vec<_> = part.into_iter().chain([(inertia, mass.val())]).collect();
-                combination.fill(&sources, None, &mut values);
-            }
+        let own = (T::one(), &part[..]);
+        match (system.mass(), *tangent) {
+            (Mass::Lumped(mass), Tangent::Present) => combination.fill(&[own], Some((inertia, mass)), values),
+            (Mass::Lumped(mass), Tangent::Absent) => combination.fill(&[], Some((inertia, mass)), values),
+            (Mass::Consistent(mass), Tangent::Present) => combination.fill(&[own, (inertia, mass.val())], None, values),
+            (Mass::Consistent(mass), Tangent::Absent) => combination.fill(&[(inertia, mass.val())], None, values),
         }
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             let column = combination.pattern().col_ptr().partition_point(|&p| p <= at) - 1;
             let (row, value) = (combination.pattern().row_idx()[at], values[at].value());
             return Err(Error::MatrixNotFinite { matrix: "effective", row, column, value });
         }
-        factor.factorize(combination.view(&values))?;
+        factor.factorize(combination.view(values))?;
+        if !self.varies() {
+            (self.part, self.values) = (Vec::new(), Vec::new());
+        }
         self.reset();
         Ok(())
     }
@@ -216,8 +249,15 @@ impl<T: Real> Operator<T> {
         (values, *version)
     }
 
-    /// Forgets responses to rows that have changed.
-    pub(crate) fn reset(&mut self) {
+    /// Forgets responses to other rows than those of this version.
+    pub(crate) fn follow(&mut self, rows: u64) {
+        if self.rows != rows {
+            self.rows = rows;
+            self.reset();
+        }
+    }
+
+    fn reset(&mut self) {
         self.computed.fill(false);
         self.delassus.version = 0;
     }
@@ -250,14 +290,18 @@ fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Ta
     let dofs = system.dofs();
     let damped = weights[1] != 0.0 && {
         let mut force = vec![T::zero(); dofs];
-        system.damping_force(&vec![T::zero(); dofs], &mut force) == Damping::Present
+        let still = vec![T::zero(); dofs];
+        system.damping_force(&still, &still, &mut force) == Damping::Present
     };
     let tangent = match weights[0] != 0.0 || damped {
         true => Tangent::Present,
         false => Tangent::Absent,
     };
     // Damping proportional to a lumped mass leaves an explicit scheme its diagonal.
-    let diagonal = tangent == Tangent::Present && weights[0] == 0.0 && has_diagonal_damping(system)?;
+    let diagonal = tangent == Tangent::Present
+        && weights[0] == 0.0
+        && system.linearity() == Linearity::Linear
+        && has_diagonal_damping(system)?;
     let own = (tangent == Tangent::Present).then_some(system.pattern());
     let combination = match system.mass() {
         Mass::Lumped(_) if diagonal => Combination::diagonal(dofs, system.prescribed(), &[system.pattern()])?,
@@ -273,7 +317,8 @@ fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Ta
 /// Whether C has no entry off the diagonal.
 fn has_diagonal_damping<T: Real>(system: &mut dyn System<T>) -> Result<bool> {
     let mut values = vec![T::zero(); system.pattern().row_idx().len()];
-    system.tangent(TangentWeights { stiffness: T::zero(), damping: T::one() }, &mut values)?;
+    let still = vec![T::zero(); system.dofs()];
+    system.tangent(0.0, &still, &still, TangentWeights { stiffness: T::zero(), damping: T::one() }, &mut values)?;
     let pattern = system.pattern();
     let on_diagonal = |column: usize| {
         let rows = pattern.row_idx_of_col_raw(column).iter().zip(&values[pattern.col_range(column)]);

@@ -1,6 +1,6 @@
 //! A tableau compiled for one system and one step size: scaled coefficients, and which operator each stage solves with.
 
-use super::operator::Operator;
+use super::operator::{At, Operator};
 use crate::error::Result;
 use crate::linear_solver::LinearSolver;
 use crate::real::Real;
@@ -186,18 +186,24 @@ pub(crate) struct Program<T> {
 }
 
 impl<T: Real> Program<T> {
-    /// Recompiles the same stages for another step size; after an error the program is as it was.
+    /// Recompiles the same stages for another step size; after an error the program is as it was. Matrices that vary are
+    /// left to the iterations of the step.
     pub(crate) fn set_step_size(
         &mut self,
         stages: &[Stage],
         system: &mut dyn System<T>,
         old: f64,
         h: f64,
+        at: At<'_, T>,
     ) -> Result<()> {
         for i in 0..self.operators.len() {
-            if let Err(error) = self.operators[i].factorize(system, h) {
+            if self.operators[i].varies() {
+                continue;
+            }
+            if let Err(error) = self.operators[i].factorize(system, h, at) {
                 // They could be factorized before; should the host's tangent fail now, its first error is the one to tell.
-                self.operators[..=i].iter_mut().try_for_each(|operator| operator.factorize(system, old)).ok();
+                let constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
+                constant.map(|operator| operator.factorize(system, old, at)).collect::<Result<()>>().ok();
                 return Err(error);
             }
         }
@@ -216,6 +222,8 @@ pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) system: &'c mut dyn System<T>,
     pub(crate) solver: &'c dyn LinearSolver<T>,
     pub(crate) h: f64,
+    /// Where tangents are first taken.
+    pub(crate) at: At<'c, T>,
     /// Contact rows to reserve responses for, and the dofs they act on.
     pub(crate) contact: (usize, &'c [usize]),
 }
@@ -244,7 +252,14 @@ impl<T: Real> Compiler<'_, T> {
             let weights = stage.balance.each().map(|row| row.z);
             let shared = program.operators.iter().position(|operator| operator.serves(weights));
             if shared.is_none() {
-                program.operators.push(Operator::new(self.system, self.solver, weights, self.h, self.contact)?);
+                program.operators.push(Operator::new(
+                    self.system,
+                    self.solver,
+                    weights,
+                    self.h,
+                    self.at,
+                    self.contact,
+                )?);
             }
             let increment = stage.increment();
             let (covector, read) = books(s);

@@ -1,5 +1,6 @@
 //! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
 
+use super::operator::At;
 use super::program::Compiler;
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation, taylor};
@@ -55,15 +56,17 @@ impl<T: Real> Simulation<'_, T> {
         }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
-        program.set_step_size(&scheme.tableau.stages, &mut **system, old, h)?;
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v };
+        program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
         if let Some(startup) = startup
-            && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h)
+            && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h, at)
         {
-            program.set_step_size(&scheme.tableau.stages, &mut **system, h, old)?;
+            program.set_step_size(&scheme.tableau.stages, &mut **system, h, old, at)?;
             return Err(error);
         }
-        statistics.factorizations +=
-            (program.operators.len() + startup.as_ref().map_or(0, |startup| startup.operators.len())) as u64;
+        let programs = std::iter::once(&*program).chain(&*startup);
+        let constant = programs.flat_map(|program| &program.operators).filter(|operator| !operator.varies());
+        statistics.factorizations += constant.count() as u64;
         keep_trail(scheme, state, history);
         move_shifted(scheme, state, history, h);
         for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
@@ -130,14 +133,8 @@ impl<T: Real> Simulation<'_, T> {
     /// Those of building a simulation from this state. The simulation is then as it was.
     pub fn restart(&mut self) -> Result<()> {
         let (h, t) = (self.history.clock.h, self.time());
-        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
+        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, .. } = self;
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        // The search of the start may replace rows of G: responses to the old ones go first.
-        let programs = std::iter::once(&mut self.program).chain(&mut *startup);
-        programs.flat_map(|program| &mut program.operators).for_each(super::Operator::reset);
-        if let Some(projection) = &mut work.projection {
-            projection.reset();
-        }
         let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
         let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t };
         let begun = start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
@@ -146,7 +143,8 @@ impl<T: Real> Simulation<'_, T> {
         let depth = scheme.depth;
         if begun.1.known < depth && startup.is_none() {
             let contact = (rows, constraints.interface());
-            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, contact };
+            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v };
+            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, contact };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);

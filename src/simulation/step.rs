@@ -2,10 +2,8 @@
 
 use super::contact_step::ContactStep;
 use super::energy::StepBooks;
-use super::operator::Operator;
 use super::program::CompiledStage;
 use super::{Simulation, Workspace};
-use crate::contact::Candidates;
 use crate::corrector::{Correction, Erased, ErasedGaps, Scheme};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -24,14 +22,7 @@ impl<T: Real> Simulation<'_, T> {
             ledger.begin(&self.state);
         }
         let Self { constraints, g, state, history, work, .. } = self;
-        let found = constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
-        if found == Candidates::Changed {
-            let programs = std::iter::once(&mut self.program).chain(&mut self.startup);
-            programs.flat_map(|program| &mut program.operators).for_each(Operator::reset);
-            if let Some(projection) = &mut work.projection {
-                projection.reset();
-            }
-        }
+        constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
         work.trial.carry_over(&state.contacts, &constraints.ids);
         work.closed_at_start.clone_from(&work.trial.closed);
         work.backup.begin();
@@ -109,6 +100,7 @@ impl<T: Real> Simulation<'_, T> {
             };
             new.t = clock.at(stage.end);
             let operator = &mut program.operators[stage.operator];
+            operator.follow(constraints.version());
             residual(stage, clock.at(stage.load), &mut **system, new, past, work)?;
             operator.begin(&mut work.increment, &mut work.interface.increment);
             work.interface.forces.fill(T::zero());
@@ -146,6 +138,10 @@ impl<T: Real> Simulation<'_, T> {
                     work,
                 )?;
                 if let Some(projection) = work.projection.as_mut().filter(|_| !work.buffers.closed.is_empty()) {
+                    if work.projected_rows != constraints.version() {
+                        work.projected_rows = constraints.version();
+                        projection.reset();
+                    }
                     let mut correction = Correction {
                         h: clock.h,
                         t: new.t,

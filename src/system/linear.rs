@@ -1,6 +1,6 @@
 //! Linear systems: constant M, C and K, a load of time, fixed and driven degrees of freedom.
 
-use super::{Damping, System, TangentWeights};
+use super::{Damping, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
@@ -239,6 +239,10 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         self.stiffness.nrows()
     }
 
+    fn linearity(&self) -> Linearity {
+        Linearity::Linear
+    }
+
     fn mass(&self) -> Mass<'_, T> {
         self.mass.view()
     }
@@ -269,7 +273,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         self.union.as_ref().map_or(self.stiffness.symbolic(), Combination::pattern)
     }
 
-    fn tangent(&mut self, weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
+    fn tangent(&mut self, _: f64, _: &[T], _: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
         let TangentWeights { stiffness: ku, damping: kv } = weights;
         let k = self.stiffness.val();
         match (&self.union, &self.damping) {
@@ -286,7 +290,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         Ok(())
     }
 
-    fn damping_force(&mut self, v: &[T], out: &mut [T]) -> Damping {
+    fn damping_force(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Damping {
         match &self.damping {
             StoredDamping::None => return Damping::None,
             StoredDamping::General(c) => {
