@@ -3,12 +3,14 @@
 //! All figures are computed from the rows of a [`Tableau`] alone, for the scalar equation `a + 2 ξ ω v + ω² u = 0` with
 //! Ω = ω h, so they hold for a scheme of one's own as well.
 
+mod local_error;
 mod order;
 mod overshoot;
 mod report;
 mod series;
 mod stability;
 
+pub use local_error::{LocalError, local_error};
 pub use order::{Order, order};
 pub use overshoot::{Overshoot, overshoot, overshoot_growth};
 pub use report::{Report, report};

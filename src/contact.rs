@@ -307,6 +307,11 @@ impl<T: Real> ContactJacobian<T> {
         self.located(row).map(|(place, weight)| weight * x[place]).sum()
     }
 
+    /// `Σ_j |G_row,j| |x_j|` for x on the interface.
+    pub(crate) fn interface_magnitude(&self, row: usize, x: &[T]) -> T {
+        self.located(row).map(|(place, weight)| (weight * x[place]).abs()).sum()
+    }
+
     /// `x += c G_rowᵀ` for x on the interface.
     pub(crate) fn interface_scatter(&self, row: usize, c: T, x: &mut [T]) {
         for (place, weight) in self.located(row) {

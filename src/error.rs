@@ -218,6 +218,54 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
+    /// Newton's method did not converge.
+    #[error(
+        "step from t = {t:e} with h = {h:e}: Newton's method not converged after {iterations} iterations; relative residual \
+         {residual:e}, relative increment {increment:e}, worst dof {dof}; take smaller steps, check the tangent with \
+         `verify::tangent`, or try a line search"
+    )]
+    NewtonNotConverged {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// Iterations spent.
+        iterations: usize,
+        /// Residual over the forces.
+        residual: f64,
+        /// Last increment over the whole one.
+        increment: f64,
+        /// The dof with the largest residual.
+        dof: usize,
+    },
+    /// A step was refused at its size and at halves of it, down to the smallest allowed.
+    #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}")]
+    StepRefused {
+        /// Time at the start of the step.
+        t: f64,
+        /// The last step size tried.
+        h: f64,
+        /// Attempts.
+        attempts: u32,
+        /// Why the last attempt failed.
+        #[source]
+        source: Box<Error>,
+    },
+    /// The effective matrix of an iteration is not positive definite.
+    #[error(
+        "step from t = {t:e} with h = {h:e}: the effective matrix of iteration {iteration} is not positive definite at dof \
+         {dof}: the stiffness there is too negative for this step; take smaller steps"
+    )]
+    IndefiniteTangent {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// The iteration, from 1.
+        iteration: usize,
+        /// Degree of freedom of the failing pivot.
+        dof: usize,
+    },
     /// A gap or a multiplier is NaN or infinite.
     #[error("t = {t:e}: {what} of contact {contact} is {value}")]
     ContactNotFinite {
@@ -285,6 +333,8 @@ impl Error {
             Self::Contact { .. }
                 | Self::ContradictoryContacts { .. }
                 | Self::ContactLost { .. }
+                | Self::NewtonNotConverged { .. }
+                | Self::IndefiniteTangent { .. }
                 | Self::Inadmissible { .. }
                 | Self::StepNotFinite { .. }
                 | Self::ContactNotFinite { .. }

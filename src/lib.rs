@@ -36,7 +36,9 @@ pub use linear_solver::{Automatic, Cholesky, Condensation, Diagonal, Factorizati
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};
 pub use real::Real;
-pub use simulation::{Energy, Outcome, Simulation, SimulationBuilder, Statistics, Works};
+pub use simulation::{
+    Energy, Iteration, Newton, Outcome, Simulation, SimulationBuilder, Statistics, StepControl, Works,
+};
 pub use state::{ContactState, History, State};
 pub use system::{Damping, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
 pub use tableau::StartUp;

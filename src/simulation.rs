@@ -3,8 +3,12 @@
 mod builder;
 mod constraints;
 mod contact_step;
+mod control;
 mod energy;
+mod newton;
+mod newton_step;
 mod operator;
+mod path;
 mod program;
 mod resample;
 mod scheme;
@@ -13,7 +17,9 @@ mod step;
 
 pub use builder::SimulationBuilder;
 pub(crate) use constraints::{Admitted, Constraints};
+pub use control::StepControl;
 pub use energy::{Energy, Works};
+pub use newton::{Iteration, Newton};
 
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
@@ -26,7 +32,9 @@ use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
 use crate::system::System;
 use contact_step::{ContactRowsWork, InterfaceWork};
+use control::Judge;
 use energy::Ledger;
+use newton_step::NewtonWork;
 use operator::Operator;
 use program::Program;
 use scheme::Scheme;
@@ -39,6 +47,8 @@ pub struct Statistics {
     pub steps: u64,
     /// Solves with the effective matrix, responses of contact rows not counted.
     pub linear_solves: u64,
+    /// Iterations of Newton's method, in all stages together; none for linear systems.
+    pub newton_iterations: u64,
     /// Effective matrices factorized.
     pub factorizations: u64,
     /// Contact problems solved; a stage in which nothing comes near has none.
@@ -47,6 +57,10 @@ pub struct Statistics {
     pub contact_iterations: u64,
     /// Contacts that closed or opened, counted at the end of each step.
     pub contact_changes: u64,
+    /// Steps that failed or were judged too coarse, and were taken again with half the size.
+    pub refused_steps: u64,
+    /// Steps of the smallest size that were taken though they were judged too coarse.
+    pub coarse_steps: u64,
 }
 
 /// Why a run ended.
@@ -93,6 +107,8 @@ pub struct Simulation<'a, T: Real> {
     history: History<T>,
     work: Workspace<T>,
     ledger: Option<Ledger<T>>,
+    /// For runs that control their step size.
+    judge: Option<Judge<T>>,
     statistics: Statistics,
 }
 
@@ -108,6 +124,8 @@ struct Workspace<T: Real> {
     balance_supports: Vec<[T; 3]>,
     /// Whether M couples prescribed dofs with free ones.
     coupled_mass: bool,
+    /// For nonlinear systems.
+    newton: Option<NewtonWork<T>>,
     trial: ContactState<T>,
     /// v and a at the time of the new state, where the scheme stores those of another time.
     shown: [Vec<T>; 2],
@@ -204,6 +222,24 @@ impl<'a, T: Real> Simulation<'a, T> {
     /// The system.
     pub fn system(&self) -> &dyn System<T> {
         &*self.system
+    }
+
+    /// The iterations of Newton's method in the stage that was solved last, also if it failed; empty for linear systems and
+    /// for stages that are linear in their unknown.
+    ///
+    /// ```
+    /// # use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// # use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// # let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// # let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1).build()?;
+    /// run.step()?;
+    /// for iteration in run.convergence() {
+    ///     println!("{:.1e} {:.1e}", iteration.residual, iteration.increment);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn convergence(&self) -> &[Iteration] {
+        self.work.newton.as_ref().map_or(&[], |newton| &newton.report)
     }
 
     /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme

@@ -225,6 +225,7 @@ pub struct History<T> {
     /// Number of newest states since a contact last closed or opened, the first one after that included.
     pub(crate) smooth: usize,
     pub(crate) clock: Clock,
+    pub(crate) pace: Pace,
     /// Step size that made the current state.
     pub(crate) made_with: f64,
     /// The motions as they were computed, from which changes of the step size resample; empty until there is one.
@@ -330,5 +331,54 @@ impl Clock {
     /// Time at `fraction` of the step that comes next.
     pub(crate) fn at(&self, fraction: f64) -> f64 {
         self.reference + (self.steps as f64 + fraction) * self.h
+    }
+}
+
+/// Where the present step size stands in the nominal grid, for runs that control it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pace {
+    pub(crate) nominal: f64,
+    /// How often the nominal step is halved now.
+    level: u32,
+    /// Steps of the present size since the size last was the nominal one.
+    position: u64,
+    /// Steps taken since the size last changed, and whether it grew then.
+    steps: u32,
+    grown: bool,
+    /// Steps that growth asks for.
+    patience: u32,
+}
+
+/// Good steps before a step size grows, at first and at most.
+const PATIENCE: [u32; 2] = [2, 64];
+
+impl Pace {
+    pub(crate) fn new(nominal: f64) -> Self {
+        Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0] }
+    }
+
+    /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer.
+    pub(crate) fn halve(&mut self) {
+        if self.grown && self.steps == 0 {
+            self.patience = (2 * self.patience).min(PATIENCE[1]);
+        }
+        (self.level, self.position) = (self.level + 1, 2 * self.position);
+        (self.steps, self.grown) = (0, false);
+    }
+
+    /// After a good step: says whether the size may grow here.
+    pub(crate) fn advance(&mut self) -> bool {
+        self.position = if self.level > 0 { self.position + 1 } else { 0 };
+        self.steps += 1;
+        if self.grown {
+            self.patience = PATIENCE[0];
+        }
+        self.level > 0 && self.position.is_multiple_of(2) && self.steps >= self.patience
+    }
+
+    /// Growth: twice the size.
+    pub(crate) fn double(&mut self) {
+        (self.level, self.position) = (self.level - 1, self.position / 2);
+        (self.steps, self.grown) = (0, true);
     }
 }

@@ -186,6 +186,18 @@ impl ContactLevel {
     }
 }
 
+/// Which force of a nonlinear system a stage balances. For linear systems there is no difference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StageForce {
+    /// f(t̄, ū, v̄).
+    #[default]
+    AtBalance,
+    /// The force whose internal work from the last state to that of the stage is the change of the potential; ū must be the
+    /// mean of the two.
+    AlongPath,
+}
+
 /// One stage of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {
@@ -199,12 +211,15 @@ pub struct Stage {
     pub end: f64,
     /// Where contact is imposed.
     pub contact: ContactLevel,
+    /// Which force is balanced.
+    pub force: StageForce,
 }
 
 impl Stage {
     /// A stage whose balance holds at the new state, at the end of the step, with contact imposed on its displacements.
     pub fn new(recovery: Rows) -> Self {
-        Self { recovery, balance: recovery, load: 1.0, end: 1.0, contact: ContactLevel::POSITION }
+        let (contact, force) = (ContactLevel::POSITION, StageForce::AtBalance);
+        Self { recovery, balance: recovery, load: 1.0, end: 1.0, contact, force }
     }
 
     /// The same stage with its own balance rows, holding at `t_n + load h`.
@@ -223,6 +238,12 @@ impl Stage {
     #[must_use]
     pub fn with_contact(self, contact: ContactLevel) -> Self {
         Self { contact, ..self }
+    }
+
+    /// The same stage with the force of the path instead of that at the balance.
+    #[must_use]
+    pub fn along_path(self) -> Self {
+        Self { force: StageForce::AlongPath, ..self }
     }
 
     /// The quantity that contact constrains, as a row: displacements, or h v at velocity level.

@@ -1,13 +1,17 @@
 //! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
 
 use super::contact_step::{ContactRowsWork, InterfaceWork};
+use super::control::{Judge, StepControl};
 use super::energy::Ledger;
+use super::newton::Newton;
+use super::newton_step::NewtonWork;
 use super::operator::At;
+use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation};
 use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
-use crate::analysis;
+use crate::analysis::{self, LocalError};
 use crate::contact::ContactConstraint;
 use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
@@ -18,7 +22,7 @@ use crate::mass::Mass;
 use crate::real::Real;
 use crate::sparse;
 use crate::state::{ContactState, History, Motion, State};
-use crate::system::{Damping, System};
+use crate::system::{Damping, Linearity, Path, PathForce, System};
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
@@ -34,6 +38,8 @@ pub struct SimulationBuilder<'a, T: Real> {
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
     linear_solver: Box<dyn LinearSolver<T> + 'a>,
     start_up: StartUp,
+    newton: Option<Newton>,
+    control: Option<StepControl>,
     resumed: Option<(State<T>, History<T>)>,
     balance: EnergyBalance,
 }
@@ -70,6 +76,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             correctors: Vec::new(),
             linear_solver: Box::new(Automatic),
             start_up: StartUp::default(),
+            newton: None,
+            control: None,
             resumed: None,
             balance: EnergyBalance::Off,
         }
@@ -158,6 +166,22 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Settings of Newton's method; [`Newton::full`] by default for nonlinear systems. Given to a linear system, contact rows
+    /// of curved or deforming surfaces are followed within a step as for a nonlinear one.
+    #[must_use]
+    pub fn newton(mut self, newton: Newton) -> Self {
+        self.newton = Some(newton);
+        self
+    }
+
+    /// Lets the run change its step size by itself; without this every step has the size given, and one that fails is the
+    /// caller's affair.
+    #[must_use]
+    pub fn step_control(mut self, control: StepControl) -> Self {
+        self.control = Some(control);
+        self
+    }
+
     /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with
     /// C a step, with supports one evaluation of f as well.
     #[must_use]
@@ -207,7 +231,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 
         let mut projection = start::projection(&*system, dofs, rows)?;
         let (state, history) = if let Some((state, history)) = self.resumed {
-            check_resumed(&state, &history, &scheme, h, dofs)?;
+            let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
+            check_resumed(&state, &history, &scheme, (own, h), dofs)?;
             constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
             (state, history)
@@ -218,7 +243,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         contact_solver.reserve(rows);
 
         let contact = (rows, constraints.interface());
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
+        let h = history.clock.h;
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, contact };
         let program = compiler.compile(&scheme.tableau)?;
         let startup = match history.known < scheme.depth {
@@ -229,10 +255,26 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let slots = history.slots.len();
         let interface = constraints.interface().len();
         let mut work = workspace(&mut *system, &program, &self.correctors, projection, (rows, interface), slots);
+        work.newton = match (self.newton, system.linearity()) {
+            (None, Linearity::Linear) => None,
+            (settings, linearity) => {
+                let along_path =
+                    program.stages.iter().any(|stage| stage.along_path) && linearity == Linearity::Nonlinear;
+                if along_path {
+                    check_path(&mut *system, &scheme, &state.motion)?;
+                }
+                let path = along_path.then(|| PathWork::new(dofs));
+                Some(NewtonWork::new(settings.unwrap_or_default(), dofs, (rows, interface), path))
+            }
+        };
         work.shown = scheme.shown(&state.motion);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
             EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
+        };
+        let judge = match self.control {
+            None => None,
+            Some(control) => Some(Judge::new(control, local_error(&scheme, control, rows)?, dofs)),
         };
         Ok(Simulation {
             system,
@@ -248,6 +290,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             history,
             work,
             ledger,
+            judge,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
@@ -258,7 +301,7 @@ fn check_resumed<T: Real>(
     state: &State<T>,
     history: &History<T>,
     scheme: &Scheme<'_>,
-    h: f64,
+    (own, h): (f64, f64),
     dofs: usize,
 ) -> Result<()> {
     history.check(dofs, scheme.depth + scheme.tableau.stages.len())?;
@@ -269,9 +312,8 @@ fn check_resumed<T: Real>(
         let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
         return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
     }
-    if history.clock.h.to_bits() != h.to_bits() {
-        let value = history.clock.h;
-        return Err(Error::Parameter { name: "the step size of the history", value, range: "h of the run" });
+    if own.to_bits() != h.to_bits() {
+        return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
     }
     Ok(())
 }
@@ -305,6 +347,7 @@ fn workspace<T: Real>(
         balance_supports: vec![[T::zero(); 3]; prescribed.len()],
         coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
         prescribed,
+        newton: None,
         trial: ContactState::with_capacity(rows),
         shown: [Vec::new(), Vec::new()],
         closed_at_start: Vec::with_capacity(rows),
@@ -369,6 +412,37 @@ fn check_corrections<T: Real>(
         return Err(Error::Incompatible { part, reason });
     }
     Ok(())
+}
+
+/// What the local error of a scheme follows from; refused where contact would not show in it.
+fn local_error(scheme: &Scheme<'_>, control: StepControl, rows: usize) -> Result<LocalError> {
+    let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
+    let refuse = |reason| {
+        let part = format!("an estimate of the local error with {}", scheme.integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
+    if control.estimates() && rows > 0 && ahead {
+        return refuse(
+            "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
+        );
+    }
+    match analysis::local_error(&scheme.tableau) {
+        Some(error) => Ok(error),
+        None => refuse("its tableau has no principal root"),
+    }
+}
+
+/// Refuses systems that have neither a potential nor a force of their own for paths.
+fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_>, motion: &Motion<T>) -> Result<()> {
+    let path = Path { from: &motion.u, to: &motion.u, mean: &motion.u };
+    let own = system.force_along(motion.t, path, &motion.v, &mut vec![T::zero(); motion.u.len()])?;
+    match own == PathForce::Present || system.potential_energy(&motion.u).is_some() {
+        true => Ok(()),
+        false => Err(Error::Incompatible {
+            part: scheme.integrator.name(),
+            reason: "the system gives neither a potential energy nor a force along paths, so its energy is not defined",
+        }),
+    }
 }
 
 /// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.

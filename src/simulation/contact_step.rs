@@ -121,10 +121,10 @@ pub(super) struct InterfaceWork<T> {
     /// Forces of contact.
     pub(super) forces: Vec<T>,
     /// Values at d = 0 of the displacements and of what contact constrains.
-    displacement: Vec<T>,
+    pub(super) displacement: Vec<T>,
     target: Vec<T>,
     /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
-    response: Vec<T>,
+    pub(super) response: Vec<T>,
 }
 
 impl<T: Real> InterfaceWork<T> {
@@ -135,32 +135,32 @@ impl<T: Real> InterfaceWork<T> {
 }
 
 /// `values[dof] = base + weight · increment` on the interface.
-fn advance<T: Real>(dofs: &[usize], base: &[T], weight: T, increment: &[T], values: &mut [T]) {
+pub(super) fn advance<T: Real>(dofs: &[usize], base: &[T], weight: T, increment: &[T], values: &mut [T]) {
     for ((&dof, &base), &d) in dofs.iter().zip(base).zip(increment) {
         values[dof] = base + weight * d;
     }
 }
 
 /// Keeps the values on the interface.
-fn keep<T: Real>(dofs: &[usize], values: &[T], kept: &mut [T]) {
+pub(super) fn keep<T: Real>(dofs: &[usize], values: &[T], kept: &mut [T]) {
     for (&dof, kept) in dofs.iter().zip(kept) {
         *kept = values[dof];
     }
 }
 
 /// Where a stage imposes contact.
-struct Level<'s, T> {
-    target: Option<&'s ContactTarget<T>>,
-    clock: Clock,
+pub(super) struct Level<'s, T> {
+    pub(super) target: Option<&'s ContactTarget<T>>,
+    pub(super) clock: Clock,
 }
 
 impl<T: Real> Level<'_, T> {
-    fn is_velocity(&self) -> bool {
+    pub(super) fn is_velocity(&self) -> bool {
         self.target.is_some_and(|target| target.forecast.is_some())
     }
 
     /// Time and values that contact constrains.
-    fn place<'v>(&self, new: &'v Motion<T>, target: &'v [T]) -> (f64, &'v [T]) {
+    pub(super) fn place<'v>(&self, new: &'v Motion<T>, target: &'v [T]) -> (f64, &'v [T]) {
         match self.target {
             None => (new.t, &new.u),
             Some(rows) => (self.clock.at(rows.at), target),
@@ -176,6 +176,9 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     pub(super) g: &'s ContactJacobian<T>,
     pub(super) solver: &'s mut dyn ContactSolver<T>,
     pub(super) statistics: &'s mut Statistics,
+    /// The part of the unknown that motions contain already, in Newton's method: d is then measured from there, and
+    /// accelerations are complete.
+    pub(super) iterate: Option<&'s [T]>,
 }
 
 /// Times a stage is solved with another linearization of its power laws, at most.
@@ -297,7 +300,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, clock, constraints, g, .. } = self;
         let Workspace { interface, rows, balance, .. } = work;
         let t = clock.at(stage.load);
-        let reads_past = stage.balance.as_ref().unwrap_or(&stage.recovery).reads_past(2);
+        let known = self.iterate.is_some() || stage.balance.as_ref().unwrap_or(&stage.recovery).reads_past(2);
         // The ū of a balance is not read again: it may be overwritten. (If this is called again ū does not depend on d.)
         let motion = match (&stage.balance, balance.as_mut()) {
             (Some(_), Some(balance)) => {
@@ -315,7 +318,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         // g̈ at ā: the predicted part, and that of d.
         let InterfaceWork { response, increment, .. } = interface;
         for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
-            *a = if reads_past { motion.a[dof] } else { T::zero() } + balance_a * d;
+            *a = if known { motion.a[dof] } else { T::zero() } + balance_a * d;
         }
         constraints.rates(t, &motion.u, &motion.v, &mut rows.rates);
         for row in 0..constraints.len() {
@@ -501,6 +504,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let h = T::of(clock.h);
         let t = clock.at(aim.at);
         aim.row.predict(past, target);
+        if let Some(d) = self.iterate {
+            T::axpy(aim.row.weight, d, target);
+        }
         keep(constraints.interface(), target, &mut interface.target);
         // Displacements of supports, or h times their velocities.
         let mut support = |t: f64, values: &mut [T], what: fn(&[T; 3], T) -> T| {

@@ -7,7 +7,7 @@ use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
-use crate::system::{Damping, Linearity, System, TangentWeights};
+use crate::system::{Damping, Linearity, Path, System, TangentWeights};
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -52,6 +52,8 @@ pub(crate) struct At<'m, T> {
     pub(crate) t: f64,
     pub(crate) u: &'m [T],
     pub(crate) v: &'m [T],
+    /// For schemes that take the force of a path.
+    pub(crate) path: Option<Path<'m, T>>,
 }
 
 /// Whether K and C have a part in an effective matrix.
@@ -126,7 +128,10 @@ impl<T: Real> Operator<T> {
         if *tangent == Tangent::Present {
             part.resize(system.pattern().row_idx().len(), T::zero());
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
-            system.tangent(at.t, at.u, at.v, weights, part)?;
+            match at.path {
+                None => system.tangent(at.t, at.u, at.v, weights, part)?,
+                Some(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
+            }
         }
         let inertia = T::of(weights[2] / (h * h));
         let own = (T::one(), &part[..]);

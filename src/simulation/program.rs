@@ -6,7 +6,7 @@ use crate::linear_solver::LinearSolver;
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
-use crate::tableau::{ContactLevel, MAX_PAST, Row, Rows, Stage, Tableau};
+use crate::tableau::{ContactLevel, MAX_PAST, Row, Rows, Stage, StageForce, Tableau};
 use std::ops::Range;
 
 /// One term of a row: coefficient times one field of one past state.
@@ -159,6 +159,8 @@ pub(crate) struct CompiledStage<T> {
     pub(crate) contact: Option<ContactTarget<T>>,
     pub(crate) load: f64,
     pub(crate) end: f64,
+    /// Whether the force is that of the path over the stage.
+    pub(crate) along_path: bool,
     pub(crate) operator: usize,
     /// Pure z-weights of the acceleration rows, recovery and balance.
     pub(crate) acceleration: f64,
@@ -202,8 +204,8 @@ impl<T: Real> Program<T> {
             }
             if let Err(error) = self.operators[i].factorize(system, h, at) {
                 // They could be factorized before; should the host's tangent fail now, its first error is the one to tell.
-                let constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
-                constant.map(|operator| operator.factorize(system, old, at)).collect::<Result<()>>().ok();
+                let mut constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
+                constant.try_for_each(|operator| operator.factorize(system, old, at)).ok();
                 return Err(error);
             }
         }
@@ -269,6 +271,7 @@ impl<T: Real> Compiler<'_, T> {
                 contact: ContactTarget::new(stage, self.h),
                 load: stage.load,
                 end: stage.end,
+                along_path: stage.force == StageForce::AlongPath,
                 operator: shared.unwrap_or(program.operators.len() - 1),
                 acceleration: stage.recovery.a.z,
                 balance_acceleration: stage.balance.a.z,

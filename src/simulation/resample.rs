@@ -9,10 +9,10 @@ use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::{Clock, History, Motion, State, Trail};
+use crate::state::{Clock, History, Motion, Pace, State, Trail};
 
 impl<T: Real> Simulation<'_, T> {
-    /// Step size of the steps to come.
+    /// Size of the next step.
     pub fn step_size(&self) -> f64 {
         self.history.clock.h
     }
@@ -50,13 +50,20 @@ impl<T: Real> Simulation<'_, T> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
         }
+        self.change_step_size(h)?;
+        self.history.pace = Pace::new(h);
+        Ok(())
+    }
+
+    /// Changes the step size, whatever the nominal one is.
+    pub(super) fn change_step_size(&mut self, h: f64) -> Result<()> {
         let old = self.history.clock.h;
         if h.to_bits() == old.to_bits() {
             return Ok(());
         }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
         program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
         if let Some(startup) = startup
             && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h, at)
@@ -118,12 +125,9 @@ impl<T: Real> Simulation<'_, T> {
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
     /// let system = LinearSystem::lumped(vec![1.0], k)?.load(|t, f| f[0] = if t < 1.0 - 1e-9 { 0.0 } else { 3.0 });
     /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build()?;
-    /// run.run_until(0.9, &mut ())?;
-    /// run.set_step_size(0.1 - 1e-8)?; // end the step before the jump …
-    /// run.step()?;
-    /// run.set_step_size(1e-8)?;
-    /// run.run_until(1.0, &mut ())?;
-    /// run.restart()?; // … and begin again behind it
+    /// run.land_on(1.0 - 1e-8, &mut ())?; // before the jump
+    /// run.land_on(1.0, &mut ())?; // over it
+    /// run.restart()?; // and begin again behind it
     /// assert!((run.state().acceleration()[0] - 3.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -143,7 +147,7 @@ impl<T: Real> Simulation<'_, T> {
         let depth = scheme.depth;
         if begun.1.known < depth && startup.is_none() {
             let contact = (rows, constraints.interface());
-            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v };
+            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v, path: None };
             let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, contact };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
@@ -154,7 +158,9 @@ impl<T: Real> Simulation<'_, T> {
         if let Some(ledger) = &mut self.ledger {
             ledger.restart(&mut **system, &begun.0, g)?;
         }
+        let pace = history.pace;
         (*state, *history) = begun;
+        history.pace = pace;
         Ok(())
     }
 }

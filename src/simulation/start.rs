@@ -9,7 +9,7 @@ use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
 use crate::real::Real;
-use crate::state::{Clock, ContactState, History, Motion, State, Trail};
+use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
 use crate::system::System;
 use crate::tableau::{ContactLevel, StartUp};
 
@@ -71,6 +71,7 @@ impl<T: Real> Start<'_, T> {
             known,
             smooth: known,
             clock,
+            pace: Pace::new(h),
             made_with: h,
             trail: Trail::default(),
             unmoved: [Vec::new(), Vec::new()],

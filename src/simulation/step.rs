@@ -1,7 +1,9 @@
 //! One step: stages, corrections, acceptance; a failed step leaves everything as it was.
 
 use super::contact_step::ContactStep;
+use super::control::Verdict;
 use super::energy::StepBooks;
+use super::newton_step::NewtonStep;
 use super::program::CompiledStage;
 use super::{Simulation, Workspace};
 use crate::corrector::{Correction, Erased, ErasedGaps, Scheme};
@@ -11,13 +13,23 @@ use crate::state::Motion;
 use crate::system::System;
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step.
+    /// Takes one step: with [`step_control`](super::SimulationBuilder::step_control) of whatever size succeeds.
     ///
     /// # Errors
     ///
-    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`], or what
-    /// the host's own parts return. State and history are then as they were.
+    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
+    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], or what the host's own parts
+    /// return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
+    /// were.
     pub fn step(&mut self) -> Result<()> {
+        match self.judge {
+            Some(_) => self.controlled_step(),
+            None => self.attempt().map(drop),
+        }
+    }
+
+    /// Tries a step of the present size.
+    pub(super) fn attempt(&mut self) -> Result<Verdict> {
         if let Some(ledger) = &mut self.ledger {
             ledger.begin(&self.state);
         }
@@ -29,23 +41,37 @@ impl<T: Real> Simulation<'_, T> {
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         let result = self.stages().and_then(|()| self.accept());
-        if result.is_err() {
-            let Self { state, history, work, .. } = self;
+        if result.as_ref().is_ok_and(|&verdict| verdict == Verdict::Accepted) {
+            return result;
+        }
+        {
+            let Self { constraints, g, state, history, work, .. } = self;
             work.backup.undo(&mut history.slots);
             std::mem::swap(&mut state.motion, &mut history.slots[0]);
+            if work.newton.is_some() {
+                // Rows may have followed the trial: back to the state. What fails here failed before, and is told then.
+                constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
+            }
         }
         result
     }
 
-    /// Makes the motion in slot 0 of the history the state. An error leaves state and history to be undone.
-    fn accept(&mut self) -> Result<()> {
-        let Self { system, g, state, history, work, statistics, ledger, scheme, .. } = self;
+    /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
+    /// undone.
+    fn accept(&mut self) -> Result<Verdict> {
+        let Self { system, g, state, history, work, statistics, ledger, scheme, judge, .. } = self;
         let stages = work.backup.rotations;
         let flags = work.trial.closed.iter().zip(&work.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
-        let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
+        let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
         scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.prescribed, &mut work.shown);
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
+        if let Some(judge) = judge {
+            let verdict = judge.judge([motion[0], motion[1]], &work.prescribed, history.clock.h, changes);
+            if verdict == Verdict::Coarse {
+                return Ok(verdict);
+            }
+        }
         let corrections = work.correction_energy;
         let books = StepBooks { t: new.t, motion, contacts: &work.trial, g, corrections, h: history.clock.h };
         if let Some(ledger) = ledger {
@@ -79,7 +105,7 @@ impl<T: Real> Simulation<'_, T> {
         if history.known == depth {
             self.startup = None;
         }
-        Ok(())
+        Ok(Verdict::Accepted)
     }
 
     /// All stages of a step. On entry slot 0 of the history holds the current motion.
@@ -101,42 +127,49 @@ impl<T: Real> Simulation<'_, T> {
             new.t = clock.at(stage.end);
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());
-            residual(stage, clock.at(stage.load), &mut **system, new, past, work)?;
-            operator.begin(&mut work.increment, &mut work.interface.increment);
-            work.interface.forces.fill(T::zero());
-            statistics.linear_solves += 1;
-            if constraints.len() > 0 && T::all_finite(&work.interface.increment) {
-                ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.solve(
-                    &mut **system,
-                    operator,
-                    new,
-                    past,
-                    work,
-                )?;
-            }
-            operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
-            if !T::all_finite(&work.increment) {
-                let dof = work.increment.iter().position(|x| !x.is_finite()).unwrap_or(0);
-                let value = work.increment[dof].value();
-                return Err(Error::StepNotFinite { t: clock.at(0.0), h: clock.h, what: "the increment", dof, value });
-            }
-            let [w_u, w_v, w_a] = stage.recovery.weights();
-            T::axpy(w_u, &work.increment, &mut new.u);
-            T::axpy(w_v, &work.increment, &mut new.v);
-            if stage.recovery.reads_past(2) {
-                T::axpy(w_a, &work.increment, &mut new.a);
+            predict(stage, clock.at(stage.load), &mut **system, new, past, work)?;
+            if work.newton.is_some() {
+                let (system, solver) = (&mut **system, &mut **contact_solver);
+                let mut newton = NewtonStep { stage, clock, system, operator, constraints, g, solver, statistics };
+                newton.solve(new, past, work)?;
             } else {
-                T::scale_into(w_a, &work.increment, &mut new.a);
+                residual(stage, clock.at(stage.load), &mut **system, new, work)?;
+                operator.begin(&mut work.increment, &mut work.interface.increment);
+                work.interface.forces.fill(T::zero());
+                statistics.linear_solves += 1;
+                if constraints.len() > 0 && T::all_finite(&work.interface.increment) {
+                    let solver = &mut **contact_solver;
+                    let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
+                    contact.solve(&mut **system, operator, new, past, work)?;
+                }
+                operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+                if !T::all_finite(&work.increment) {
+                    let dof = work.increment.iter().position(|x| !x.is_finite()).unwrap_or(0);
+                    let value = work.increment[dof].value();
+                    return Err(Error::StepNotFinite {
+                        t: clock.at(0.0),
+                        h: clock.h,
+                        what: "the increment",
+                        dof,
+                        value,
+                    });
+                }
+                let [w_u, w_v, w_a] = stage.recovery.weights();
+                T::axpy(w_u, &work.increment, &mut new.u);
+                T::axpy(w_v, &work.increment, &mut new.v);
+                if stage.recovery.reads_past(2) {
+                    T::axpy(w_a, &work.increment, &mut new.a);
+                } else {
+                    T::scale_into(w_a, &work.increment, &mut new.a);
+                }
             }
             for (&dof, support) in work.prescribed.iter().zip(&work.supports) {
                 new.a[dof] = support[2];
             }
             if constraints.len() > 0 {
-                ContactStep { stage, clock, constraints, g, solver: &mut **contact_solver, statistics }.close(
-                    new,
-                    stage.impulse_weight(covector),
-                    work,
-                )?;
+                let solver = &mut **contact_solver;
+                let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
+                contact.close(new, stage.impulse_weight(covector), work)?;
                 if let Some(projection) = work.projection.as_mut().filter(|_| !work.buffers.closed.is_empty()) {
                     if work.projected_rows != constraints.version() {
                         work.projected_rows = constraints.version();
@@ -184,8 +217,9 @@ pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &
     Ok(())
 }
 
-/// Predicts the new motion at d = 0 and leaves f(t̄, ū, v̄) − M ā there in `work.increment`.
-fn residual<T: Real>(
+/// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities with
+/// the supports in place, and what accelerations have of the past.
+fn predict<T: Real>(
     stage: &CompiledStage<T>,
     t_balance: f64,
     system: &mut dyn System<T>,
@@ -193,44 +227,59 @@ fn residual<T: Real>(
     past: &[Motion<T>],
     work: &mut Workspace<T>,
 ) -> Result<()> {
-    let Workspace { increment, balance, prescribed, supports, balance_supports, coupled_mass, .. } = work;
+    let Workspace { balance, prescribed, supports, balance_supports, .. } = work;
     stage.recovery.predict(past, &mut [&mut new.u, &mut new.v, &mut new.a]);
-    if !prescribed.is_empty() {
-        system.prescribed_motion(new.t, supports);
-        finite_supports(new.t, prescribed, supports)?;
-        for (&dof, support) in prescribed.iter().zip(supports.iter()) {
-            (new.u[dof], new.v[dof]) = (support[0], support[1]);
-        }
-    }
-    let (rows, supports) = if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
+    put_supports(system, new.t, prescribed, supports, new)?;
+    if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
-        if !prescribed.is_empty() {
-            system.prescribed_motion(t_balance, balance_supports);
-            finite_supports(t_balance, prescribed, balance_supports)?;
-            for (&dof, support) in prescribed.iter().zip(balance_supports.iter()) {
-                (balance.u[dof], balance.v[dof]) = (support[0], support[1]);
-            }
-        }
-        system.force(t_balance, &balance.u, &balance.v, increment)?;
-        (rows, balance_supports)
-    } else {
-        system.force(t_balance, &new.u, &new.v, increment)?;
-        (&stage.recovery, supports)
+        put_supports(system, t_balance, prescribed, balance_supports, balance)?;
+    }
+    Ok(())
+}
+
+/// Puts displacements and velocities of the supports at t into a motion.
+fn put_supports<T: Real>(
+    system: &mut dyn System<T>,
+    t: f64,
+    prescribed: &[usize],
+    supports: &mut [[T; 3]],
+    motion: &mut Motion<T>,
+) -> Result<()> {
+    if prescribed.is_empty() {
+        return Ok(());
+    }
+    system.prescribed_motion(t, supports);
+    finite_supports(t, prescribed, supports)?;
+    for (&dof, support) in prescribed.iter().zip(supports.iter()) {
+        (motion.u[dof], motion.v[dof]) = (support[0], support[1]);
+    }
+    Ok(())
+}
+
+/// Leaves f(t̄, ū, v̄) − M ā of a predicted motion in `work.increment`.
+fn residual<T: Real>(
+    stage: &CompiledStage<T>,
+    t_balance: f64,
+    system: &mut dyn System<T>,
+    new: &mut Motion<T>,
+    work: &mut Workspace<T>,
+) -> Result<()> {
+    let Workspace { increment, balance, prescribed, supports, balance_supports, coupled_mass, .. } = work;
+    let (rows, supports, motion) = match (&stage.balance, balance.as_mut()) {
+        (Some(rows), Some(balance)) => (rows, balance_supports, balance),
+        _ => (&stage.recovery, supports, new),
     };
+    system.force(t_balance, &motion.u, &motion.v, increment)?;
     // ā at d = 0: the past's part on free dofs (none where the balance holds at the recovered state), and the motion of
     // the supports.
     if rows.reads_past(2) || *coupled_mass {
-        let acceleration = match (&stage.balance, balance.as_mut()) {
-            (Some(_), Some(balance)) => &mut balance.a,
-            _ => &mut new.a,
-        };
         if !rows.reads_past(2) {
-            acceleration.fill(T::zero());
+            motion.a.fill(T::zero());
         }
         for (&dof, support) in prescribed.iter().zip(supports.iter()) {
-            acceleration[dof] = support[2];
+            motion.a[dof] = support[2];
         }
-        system.mass().product(-T::one(), acceleration, increment);
+        system.mass().product(-T::one(), &motion.a, increment);
     }
     for &dof in prescribed.iter() {
         increment[dof] = T::zero();

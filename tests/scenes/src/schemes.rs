@@ -2,8 +2,8 @@
 
 use contact_dynamics::tableau::ContactLevel;
 use contact_dynamics::{
-    Bathe, Bdf2, CdLagrange, CentralDifference, ChungLee, Composite, GeneralizedAlpha, Gssss, Houbolt, HulbertChung,
-    MoreauJean, Newmark, NohBathe, Oalts, Park, TchamwaWielgosz, TimeIntegrator,
+    Bathe, Bdf2, CdLagrange, CentralDifference, ChungLee, Composite, EnergyMomentum, GeneralizedAlpha, Gssss, Houbolt,
+    HulbertChung, MoreauJean, Newmark, NohBathe, Oalts, Park, TchamwaWielgosz, TimeIntegrator,
 };
 
 /// A scheme and its published figures.
@@ -83,6 +83,7 @@ pub fn all() -> Vec<Listed> {
         implicit(|| Box::new(Bathe::with_radius(1.0).unwrap()), 2, 1.0, [0.817, 0.0]),
         implicit(|| Box::new(MoreauJean::new(0.5).unwrap()), 2, 1.0, [3.207, 0.0]),
         implicit(|| Box::new(MoreauJean::new(1.0).unwrap()), 1, 0.0, [12.003, 29.657]),
+        implicit(|| Box::new(EnergyMomentum), 2, 1.0, [3.207, 0.0]),
         explicit(|| Box::new(CentralDifference), 2, 2.0, [-1.693, 0.0]),
         explicit(|| Box::new(CdLagrange), 2, 2.0, [-1.693, 0.0]),
         explicit(|| Box::new(TchamwaWielgosz::new(1.033).unwrap()), 1, 1.937, [-2.021, 1.022]),

@@ -1,0 +1,55 @@
+//! The local error of a scheme, from what a step shows of it.
+
+use super::amplification;
+use super::order::order;
+use crate::tableau::Tableau;
+use faer::c64;
+
+/// Ω at which the error is taken: the terms of higher order are Ω² of it.
+const OMEGA: f64 = 0.02;
+
+/// How the error that a step adds follows from its distance to Taylor's expansion,
+///
+/// ```text
+/// e = factor · max( |u' − u − h v − ½ h² a| , h |v' − v − h a| ),
+/// ```
+///
+/// for smooth motion; both are of size hᵖ⁺¹.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LocalError {
+    /// p + 1: e falls with this power of h.
+    pub power: u32,
+    /// Error of a step over the distance, for small h.
+    pub factor: f64,
+}
+
+/// The local error of a scheme, from a free oscillation at small Ω: the error that a step adds to it is that of its
+/// principal root, and the distance that of its principal vector, so what earlier steps did to v and a is part of it.
+///
+/// `None` if no principal root is found.
+///
+/// ```
+/// use contact_dynamics::{Newmark, TimeIntegrator, analysis};
+/// // u' errs by h³/12 of the third derivative; h (v' − v − h a) is ½ h³ of it.
+/// let error = analysis::local_error(&Newmark::trapezoidal().tableau()).unwrap();
+/// assert!(error.power == 3 && (error.factor - 1.0 / 6.0).abs() < 1e-3);
+/// ```
+pub fn local_error(tableau: &Tableau) -> Option<LocalError> {
+    let order = order(tableau);
+    let eigen = amplification(tableau, OMEGA, 0.0).eigen().ok()?;
+    let (roots, vectors) = (eigen.S(), eigen.U());
+    let exact = c64::new(OMEGA.cos(), OMEGA.sin());
+    let distance = |root: c64| (root - exact).re.hypot((root - exact).im);
+    let principal = (0..vectors.ncols()).min_by(|&i, &j| distance(roots[i]).total_cmp(&distance(roots[j])))?;
+    let root = roots[principal];
+    let [u, stored_v, stored_a] = [0, 1, 2].map(|i| vectors[(i, principal)]);
+    // v and a at the time of the state, as it shows them.
+    let back = c64::new(1.0, 0.0) - c64::new(1.0, 0.0) / root;
+    let shown = |x: c64, shift: f64| x - x * back * shift;
+    let (v, a) = (shown(stored_v, order.velocity_shift), shown(stored_a, order.acceleration_shift));
+    let size = |x: c64| x.re.hypot(x.im);
+    let taylor = size(root * u - u - v - a * 0.5).max(size(root * v - v - a));
+    let factor = distance(root) * size(u) / taylor;
+    (factor > 0.0 && factor.is_finite()).then_some(LocalError { power: order.displacement + 1, factor })
+}

@@ -1,0 +1,300 @@
+//! Step-size control: refused steps are taken again with halves of the step, which grow back to the nominal one.
+
+use super::Simulation;
+use super::operator::At;
+use crate::analysis::LocalError;
+use crate::error::{Error, Result};
+use crate::observer::Observer;
+use crate::real::Real;
+use crate::simulation::Outcome;
+use crate::state::{History, Motion, State};
+
+/// How a run changes its step size by itself.
+///
+/// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a smaller
+/// one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is taken again with
+/// half the size; after two steps that went well the size doubles where that meets the nominal grid again, so every
+/// nominal time is met. If doubling fails at once, it waits twice as long the next time.
+///
+/// Two judgements may be added: an estimate of the [local error](Self::local_error), and a limit to the
+/// [contacts that change](Self::contact_changes) in a step. At the smallest size a judgement refuses nothing: the step is
+/// taken and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
+/// [`Error::StepRefused`], and the run is as it was before the step, with the step size it had.
+///
+/// Changes of the step size allocate, factorize, and resample the past of multistep schemes
+/// ([`set_step_size`](Simulation::set_step_size)).
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation, StepControl};
+///
+/// // A mass flies at a wall; far from it large steps will do.
+/// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Newmark::trapezoidal(), 0.1)
+///     .velocity(vec![-1.0])
+///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.03))
+///     .corrector(PersistencyCorrection::new())
+///     .step_control(StepControl::halving(1e-4)?.local_error(1e-3)?)
+///     .build()?;
+/// let mut smallest = 0.1_f64;
+/// run.run_until(2.0, &mut |step: &contact_dynamics::StepView<'_, f64>| {
+///     smallest = smallest.min(step.h);
+///     contact_dynamics::Control::Continue
+/// })?;
+/// // The impact is met by steps in which the mass travels no more than the tolerance; the others are large again.
+/// assert!(smallest <= 1e-3 && run.step_size() == 0.1);
+/// assert!(run.statistics().steps < 60 && run.statistics().refused_steps >= 7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepControl {
+    smallest: f64,
+    tolerance: Option<f64>,
+    changes: Option<usize>,
+}
+
+impl StepControl {
+    /// Halving of refused steps down to `smallest` (time), not below.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn halving(smallest: f64) -> Result<Self> {
+        positive("the smallest step size", smallest)?;
+        Ok(Self { smallest, tolerance: None, changes: None })
+    }
+
+    /// Refuses steps whose local error in any displacement is estimated at more than `tolerance` (length).
+    ///
+    /// The estimate compares a step with Taylor's expansion of the state it starts from, as that was shown, scaled by what
+    /// the tableau says ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or
+    /// opens it is not scaled, for the motion is not smooth there, and is about the distance that the contact moves in the
+    /// step with the velocity it lost: so uncertain is the instant of impact. Corrections do not hide it, since velocities
+    /// are compared as well. Schemes that impose contact ahead of the state show an impact one step late and are
+    /// refused by `build`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn local_error(self, tolerance: f64) -> Result<Self> {
+        positive("the tolerance of the local error", tolerance)?;
+        Ok(Self { tolerance: Some(tolerance), ..self })
+    }
+
+    /// Refuses steps in which more than `limit` contacts close or open.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for zero.
+    pub fn contact_changes(self, limit: usize) -> Result<Self> {
+        match limit {
+            0 => Err(Error::Parameter { name: "the limit of contact changes", value: 0.0, range: "1 or more" }),
+            limit => Ok(Self { changes: Some(limit), ..self }),
+        }
+    }
+
+    pub(super) fn estimates(&self) -> bool {
+        self.tolerance.is_some()
+    }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<()> {
+    match value > 0.0 && value.is_finite() {
+        true => Ok(()),
+        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
+    }
+}
+
+/// What became of a step that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    Accepted,
+    /// It was judged too coarse, and undone.
+    Coarse,
+}
+
+/// What a step is judged by, and memory for it.
+pub(super) struct Judge<T> {
+    pub(super) control: StepControl,
+    local: LocalError,
+    /// u, v and a where the step starts, as they were shown; empty if errors are not estimated.
+    start: Motion<T>,
+    /// Whether judgement is suspended: the step cannot be smaller.
+    pub(super) suspended: bool,
+    /// The estimate over the tolerance of the step judged last.
+    excess: f64,
+    /// Whether the step judged last would have been refused.
+    pub(super) coarse: bool,
+}
+
+impl<T: Real> Judge<T> {
+    pub(super) fn new(control: StepControl, local: LocalError, dofs: usize) -> Self {
+        let start = Motion::zero(if control.estimates() { dofs } else { 0 });
+        Self { control, local, start, suspended: false, excess: 0.0, coarse: false }
+    }
+
+    /// Remembers the state that a step starts from.
+    pub(super) fn begin(&mut self, state: &State<T>) {
+        if self.control.estimates() {
+            self.start.u.copy_from_slice(state.displacement());
+            self.start.v.copy_from_slice(state.velocity());
+            self.start.a.copy_from_slice(state.acceleration());
+        }
+    }
+
+    /// Judges a step that ends with u and v after `changes` of contact.
+    pub(super) fn judge(&mut self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64, changes: usize) -> Verdict {
+        self.excess = 0.0;
+        if let Some(tolerance) = self.control.tolerance {
+            let factor = if changes > 0 { 1.0 } else { self.local.factor };
+            self.excess = factor * self.distance([u, v], prescribed, h) / tolerance;
+        }
+        // Written so that NaN is refused.
+        let fine = self.excess <= 1.0 && self.control.changes.is_none_or(|limit| changes <= limit);
+        self.coarse = !fine;
+        match fine || self.suspended {
+            true => Verdict::Accepted,
+            false => Verdict::Coarse,
+        }
+    }
+
+    /// Largest distance of the free dofs from Taylor's expansion, in u and in h v.
+    fn distance(&self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64) -> f64 {
+        let Motion { u: u0, v: v0, a: a0, .. } = &self.start;
+        let mut prescribed = prescribed.iter().peekable();
+        let mut largest = 0.0_f64;
+        for dof in 0..u.len() {
+            if prescribed.next_if(|&&other| other == dof).is_some() {
+                continue;
+            }
+            let (rate, acceleration) = (v0[dof].value(), a0[dof].value());
+            let in_u = (u[dof] - u0[dof]).value() - h * (rate + 0.5 * h * acceleration);
+            let in_v = h * ((v[dof] - v0[dof]).value() - h * acceleration);
+            let distance = in_u.abs().max(in_v.abs());
+            if distance > largest || distance.is_nan() {
+                largest = distance;
+            }
+        }
+        largest
+    }
+
+    /// Whether a step twice as large promises to be fine, with some reserve.
+    fn may_grow(&self) -> bool {
+        self.excess * 2.0_f64.powi(i32::try_from(self.local.power).unwrap_or(3)) <= 0.5
+    }
+}
+
+impl<T: Real> Simulation<'_, T> {
+    /// Takes one step under control.
+    pub(super) fn controlled_step(&mut self) -> Result<()> {
+        let mut before: Option<(State<T>, History<T>)> = None;
+        let mut refusals = 0;
+        let result = loop {
+            let h = self.history.clock.h;
+            let smaller = 0.5 * h;
+            let Some(judge) = &mut self.judge else { break self.attempt().map(drop) };
+            let last = smaller < judge.control.smallest * (1.0 - 1e-9);
+            judge.suspended = last;
+            judge.begin(&self.state);
+            match self.attempt() {
+                Ok(Verdict::Accepted) => break Ok(()),
+                Err(error) if !error.is_recoverable() => break Err(error),
+                Err(source) if last => {
+                    self.statistics.refused_steps += 1;
+                    let (t, attempts) = (self.time(), refusals + 1);
+                    break Err(Error::StepRefused { t, h, attempts, source: Box::new(source) });
+                }
+                Ok(Verdict::Coarse) | Err(_) => {
+                    self.statistics.refused_steps += 1;
+                    refusals += 1;
+                    before.get_or_insert_with(|| (self.state.clone(), self.history.clone()));
+                    if let Err(error) = self.change_step_size(smaller) {
+                        break Err(error);
+                    }
+                    self.history.pace.halve();
+                }
+            }
+        };
+        match (result, before) {
+            (Ok(()), _) => {
+                self.grow();
+                Ok(())
+            }
+            (Err(error), None) => Err(error),
+            (Err(error), Some((state, history))) => {
+                let (h, tried) = (history.clock.h, self.history.clock.h);
+                (self.state, self.history) = (state, history);
+                self.compile_for(tried, h)?;
+                Err(error)
+            }
+        }
+    }
+
+    /// Counts a good step, and doubles the step size where the nominal grid and the judgement allow it.
+    fn grow(&mut self) {
+        let Some(judge) = &self.judge else { return };
+        self.statistics.coarse_steps += u64::from(judge.coarse);
+        let (may_grow, pace) = (judge.may_grow() && !judge.coarse, &mut self.history.pace);
+        if pace.advance() && may_grow {
+            // Should the larger matrix not factorize the run goes on with the smaller step.
+            let larger = 2.0 * self.history.clock.h;
+            if self.change_step_size(larger).is_ok() {
+                self.history.pace.double();
+            }
+        }
+    }
+
+    /// Factorizes for h what is factorized for another step size.
+    fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
+        let Self { system, scheme, program, startup, state, .. } = self;
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
+        program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
+        match startup {
+            Some(startup) => startup.set_step_size(&scheme.starter.stages, &mut **system, other, h, at),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it was.
+    ///
+    /// Two factorizations, if `t` is not on the grid.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.03)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// run.land_on(1.0, &mut ())?;
+    /// assert!((run.time() - 1.0).abs() < 1e-14 && run.step_size() == 0.03);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run_until`](Self::run_until) and [`set_step_size`](Self::set_step_size).
+    pub fn land_on(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
+        let nominal = self.history.pace.nominal;
+        let sliver = 1e-9 * nominal;
+        // One nominal step before, on the grid.
+        if self.run_until(t - nominal * (1.0 - 1e-9), observer)? == Outcome::Stopped {
+            return Ok(Outcome::Stopped);
+        }
+        while t.is_finite() && self.time() + self.history.clock.h <= t + sliver {
+            let before = self.time();
+            if self.run_until(before + self.history.clock.h, observer)? == Outcome::Stopped {
+                return Ok(Outcome::Stopped);
+            }
+        }
+        let rest = t - self.time();
+        if rest <= sliver {
+            return Ok(Outcome::Reached);
+        }
+        self.set_step_size(rest)?;
+        let outcome = self.run_until(t, observer);
+        let back = self.set_step_size(nominal);
+        back.and(outcome)
+    }
+}

@@ -1,0 +1,111 @@
+//! Settings of Newton's method, and what it reports of its iterations.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// When the effective matrix is formed and factorized anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TangentUpdate {
+    Iteration,
+    Stage,
+}
+
+/// How Newton's method solves the stages of a nonlinear system.
+///
+/// With r = f − M ā + Gᵀ λ and A the effective matrix, an iteration solves `A Δ = r` together with the contact conditions
+/// at the end of the step, 0 ≤ g ⊥ λ ≥ 0, and moves the unknown by Δ. Gaps that are not affine in u are linearized anew
+/// within the iteration, on the dofs of contact alone, until they are met: their curvature costs no factorization, and
+/// does not slow the convergence of the rest.
+///
+/// A stage is solved when both
+///
+/// * ‖r‖ ≤ `force` · (‖f‖ + ‖Gᵀ λ‖), and
+/// * the increment to come, estimated by ‖Δ‖ ‖r‖ / ‖r before‖, is at most `displacement` times the whole increment
+///
+/// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
+/// enters), or when increments are what rounding leaves of zero. Tolerances below 64 ε of the scalar are raised to it.
+///
+/// ```
+/// use contact_dynamics::Newton;
+/// let careful = Newton::full().line_search().tolerances(1e-11, 1e-10)?.iterations(30)?;
+/// assert_ne!(careful, Newton::default());
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Newton {
+    pub(super) tangent: TangentUpdate,
+    pub(super) line_search: bool,
+    force: f64,
+    displacement: f64,
+    pub(super) iterations: usize,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self::full()
+    }
+}
+
+impl Newton {
+    /// A new tangent in each iteration: quadratic convergence.
+    pub const fn full() -> Self {
+        Self { tangent: TangentUpdate::Iteration, line_search: false, force: 1e-9, displacement: 1e-8, iterations: 20 }
+    }
+
+    /// The tangent of the prediction for all iterations of a stage: linear convergence, one factorization. Pays where a
+    /// factorization is dear and a step small.
+    pub const fn modified() -> Self {
+        Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
+    }
+
+    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller. It costs nothing
+    /// where full increments do. Slender structures converge through larger residuals and are better left without.
+    #[must_use]
+    pub const fn line_search(self) -> Self {
+        Self { line_search: true, ..self }
+    }
+
+    /// Relative tolerances in force and displacement; 1e-9 and 1e-8 by default.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless both are in (0, 1).
+    pub fn tolerances(self, force: f64, displacement: f64) -> Result<Self> {
+        for (name, value) in
+            [("Newton's tolerance in force", force), ("Newton's tolerance in displacement", displacement)]
+        {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(Error::Parameter { name, value, range: "in (0, 1)" });
+            }
+        }
+        Ok(Self { force, displacement, ..self })
+    }
+
+    /// The largest number of iterations of a stage; 20 by default (60 for [`modified`](Self::modified)). Beyond it the
+    /// step is undone, and [`Error::NewtonNotConverged`] returned.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for zero.
+    pub fn iterations(self, iterations: usize) -> Result<Self> {
+        match iterations {
+            0 => Err(Error::Parameter { name: "Newton's number of iterations", value: 0.0, range: "1 or more" }),
+            iterations => Ok(Self { iterations, ..self }),
+        }
+    }
+
+    /// Tolerances in force and displacement that the scalar can meet.
+    pub(super) fn bounds<T: Real>(&self) -> [f64; 2] {
+        [self.force, self.displacement].map(|tolerance| tolerance.max(64.0 * T::epsilon().value()))
+    }
+}
+
+/// One iteration of Newton's method: [`Simulation::convergence`](crate::Simulation::convergence).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Iteration {
+    /// ‖f − M ā + Gᵀ λ‖ after the iteration, over ‖f‖ + ‖Gᵀ λ‖.
+    pub residual: f64,
+    /// ‖Δ‖ of the iteration over that of the whole increment so far.
+    pub increment: f64,
+}

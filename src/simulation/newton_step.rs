@@ -1,0 +1,416 @@
+//! A stage of a nonlinear system, solved by Newton's method.
+
+use super::contact_step::{ContactStep, Level, advance, keep};
+use super::newton::{Iteration, Newton, TangentUpdate};
+use super::operator::{At, Operator};
+use super::path::PathWork;
+use super::program::{CompiledStage, ScaledRows};
+use super::{Constraints, Statistics, Workspace};
+use crate::contact::{Candidates, ContactJacobian};
+use crate::contact_solver::ContactSolver;
+use crate::corrector::Gaps;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::{Clock, Motion};
+use crate::system::{Path, System};
+
+/// Memory of Newton's method.
+pub(super) struct NewtonWork<T> {
+    settings: Newton,
+    /// The whole increment of the stage so far; one a dof, as the residual without contact forces.
+    d: Vec<T>,
+    residual: Vec<T>,
+    /// On the interface: an increment without contact, and the displacements of the balance before it.
+    free: Vec<T>,
+    balance: Vec<T>,
+    /// Gaps by the rows that were solved with, one a candidate.
+    gaps: Vec<T>,
+    /// For schemes that take the force of the whole path.
+    path: Option<PathWork<T>>,
+    pub(super) report: Vec<Iteration>,
+}
+
+impl<T: Real> NewtonWork<T> {
+    /// Memory for a system of `dofs` dofs, `rows` contacts and an interface of `interface` dofs.
+    pub(super) fn new(
+        settings: Newton,
+        dofs: usize,
+        (rows, interface): (usize, usize),
+        path: Option<PathWork<T>>,
+    ) -> Self {
+        let zero = |size: usize| vec![T::zero(); size];
+        Self {
+            settings,
+            d: zero(dofs),
+            residual: zero(dofs),
+            free: zero(interface),
+            balance: zero(interface),
+            gaps: zero(rows),
+            path,
+            report: Vec::with_capacity(settings.iterations),
+        }
+    }
+}
+
+/// What a stage is solved with.
+pub(super) struct NewtonStep<'s, 'a, T: Real> {
+    pub(super) stage: &'s CompiledStage<T>,
+    pub(super) clock: Clock,
+    pub(super) system: &'s mut dyn System<T>,
+    pub(super) operator: &'s mut Operator<T>,
+    pub(super) constraints: &'s mut Constraints<'a, T>,
+    pub(super) g: &'s mut ContactJacobian<T>,
+    pub(super) solver: &'s mut dyn ContactSolver<T>,
+    pub(super) statistics: &'s mut Statistics,
+}
+
+/// Linearizations of curved gaps within an iteration, at most.
+const LINEARIZATIONS: usize = 20;
+
+/// The smallest share of an increment that a line search tries.
+const SHORTEST: f64 = 0.125;
+
+/// Norms at a trial state.
+#[derive(Clone, Copy)]
+struct Norms {
+    /// Of f − M ā + Gᵀ λ.
+    residual: f64,
+    /// Of f, and of Gᵀ λ.
+    force: f64,
+    contact: f64,
+}
+
+impl Norms {
+    fn scale(&self) -> f64 {
+        self.force + self.contact
+    }
+
+    fn relative(&self) -> f64 {
+        if self.residual > 0.0 { self.residual / self.scale() } else { 0.0 }
+    }
+}
+
+impl<T: Real> NewtonStep<'_, '_, T> {
+    /// Moves the predicted motion to where the balance and the contact conditions hold. `work.increment` is scratch.
+    pub(super) fn solve(&mut self, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) -> Result<()> {
+        let Some(mut newton) = work.newton.take() else { return Ok(()) };
+        let result = self.iterate(&mut newton, new, past, work);
+        work.newton = Some(newton);
+        result
+    }
+
+    fn iterate(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<()> {
+        self.begin(newton, new, past, work);
+        let limit = newton.settings.iterations;
+        let mut norms = self.evaluate(newton, new, past, work)?;
+        for iteration in 0..limit {
+            if self.operator.varies() && (iteration == 0 || newton.settings.tangent == TangentUpdate::Iteration) {
+                self.factorize(iteration, newton, new, past, work)?;
+            }
+            newton.residual.copy_from_slice(&work.increment);
+            self.operator.begin(&mut work.increment, &mut work.interface.increment);
+            self.statistics.linear_solves += 1;
+            self.statistics.newton_iterations += 1;
+            let settled = self.press(newton, new, past, work)?;
+            self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+            self.refuse_nan(&work.increment, "the increment")?;
+            // The increment, kept while `work.increment` becomes the residual it leaves.
+            let before = Norms { residual: self.loaded_norm(&newton.residual, &work.interface.forces), ..norms };
+            let size = norm(&work.increment);
+            let Some(share) = self.advance(newton, new, past, work, before, &mut norms)? else {
+                match settled {
+                    true => return Ok(()),
+                    false => break,
+                }
+            };
+            let (size, whole) = (share * size, norm(&newton.d));
+            let increment = if whole > 0.0 { size / whole } else { 0.0 };
+            newton.report.push(Iteration { residual: norms.relative(), increment });
+            let [force, displacement] = newton.settings.bounds::<T>();
+            let contraction = if before.residual > 0.0 { norms.residual / before.residual } else { 0.0 };
+            let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
+            // What rounding leaves: increments beyond which displacements do not change, or residuals that fall no more.
+            let weight = self.stage.recovery.weights()[0].value().abs();
+            let resolution = T::epsilon().value() * norm(&new.u);
+            let rounding = weight * size <= 4.0 * resolution
+                || contraction >= 0.5 && (size <= displacement * whole || weight * size <= 1e4 * resolution);
+            // Rows fit the whole increment.
+            let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
+            if settled && (met || rounding) {
+                return Ok(());
+            }
+        }
+        let last = newton.report.last().copied().unwrap_or_default();
+        Err(Error::NewtonNotConverged {
+            t: self.clock.at(0.0),
+            h: self.clock.h,
+            iterations: newton.report.len(),
+            residual: last.residual,
+            increment: last.increment,
+            dof: self.worst(&work.increment, &work.interface.forces),
+        })
+    }
+
+    /// Completes the prediction by accelerations.
+    fn begin(&mut self, newton: &mut NewtonWork<T>, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) {
+        newton.d.fill(T::zero());
+        newton.report.clear();
+        work.interface.forces.fill(T::zero());
+        let complete = |rows: &ScaledRows<T>, a: &mut [T], supports: &[[T; 3]]| {
+            if !rows.reads_past(2) {
+                a.fill(T::zero());
+            }
+            for (&dof, support) in work.prescribed.iter().zip(supports) {
+                a[dof] = support[2];
+            }
+        };
+        complete(&self.stage.recovery, &mut new.a, &work.supports);
+        if let (Some(rows), Some(balance)) = (&self.stage.balance, work.balance.as_mut()) {
+            complete(rows, &mut balance.a, &work.balance_supports);
+        }
+        if self.stage.along_path
+            && let (Some(path), Some(from)) = (&mut newton.path, past.first())
+        {
+            path.begin(self.system, &from.u);
+        }
+    }
+
+    /// Leaves f − M ā at the trial motion in `work.increment`.
+    fn evaluate(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<Norms> {
+        let Workspace { increment, balance, prescribed, interface, .. } = work;
+        let t = self.clock.at(self.stage.load);
+        let motion = match (&self.stage.balance, &*balance) {
+            (Some(_), Some(balance)) => balance,
+            _ => new,
+        };
+        match (&mut newton.path, past.first()) {
+            (Some(path), Some(from)) if self.stage.along_path => {
+                path.force(self.system, t, [&from.u, &new.u, &motion.u], &motion.v, increment)?;
+            }
+            _ => self.system.force(t, &motion.u, &motion.v, increment)?,
+        }
+        for &dof in prescribed.iter() {
+            increment[dof] = T::zero();
+        }
+        let force = norm(increment);
+        self.system.mass().product(-T::one(), &motion.a, increment);
+        for &dof in prescribed.iter() {
+            increment[dof] = T::zero();
+        }
+        self.refuse_nan(increment, "the residual")?;
+        let residual = self.loaded_norm(increment, &interface.forces);
+        Ok(Norms { residual, force, contact: norm(&interface.forces) })
+    }
+
+    /// A residual with the contact forces added.
+    fn loaded(&self, residual: &[T], forces: &[T]) -> impl Iterator<Item = f64> {
+        let mut interface = self.constraints.interface().iter().zip(forces).peekable();
+        residual.iter().enumerate().map(move |(dof, &r)| {
+            let force = interface.next_if(|(on, _)| **on == dof).map_or(T::zero(), |(_, &force)| force);
+            (r + force).value()
+        })
+    }
+
+    fn loaded_norm(&self, residual: &[T], forces: &[T]) -> f64 {
+        self.loaded(residual, forces).map(|r| r * r).sum::<f64>().sqrt()
+    }
+
+    /// The dof with the largest residual.
+    fn worst(&self, residual: &[T], forces: &[T]) -> usize {
+        let larger =
+            |worst: (usize, f64), (dof, r): (usize, f64)| if r.abs() > worst.1 { (dof, r.abs()) } else { worst };
+        self.loaded(residual, forces).enumerate().fold((0, 0.0), larger).0
+    }
+
+    fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {
+        if T::all_finite(values) {
+            return Ok(());
+        }
+        let dof = values.iter().position(|x| !x.is_finite()).unwrap_or(0);
+        let value = values[dof].value();
+        Err(Error::StepNotFinite { t: self.clock.at(0.0), h: self.clock.h, what, dof, value })
+    }
+
+    /// Forms and factorizes the effective matrix at the trial motion.
+    fn factorize(
+        &mut self,
+        iteration: usize,
+        newton: &NewtonWork<T>,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        work: &Workspace<T>,
+    ) -> Result<()> {
+        let motion = match (&self.stage.balance, &work.balance) {
+            (Some(_), Some(balance)) => balance,
+            _ => new,
+        };
+        let path = match (&newton.path, past.first()) {
+            (Some(_), Some(from)) if self.stage.along_path => Some(Path { from: &from.u, to: &new.u, mean: &motion.u }),
+            _ => None,
+        };
+        let at = At { t: self.clock.at(self.stage.load), u: &motion.u, v: &motion.v, path };
+        self.statistics.factorizations += 1;
+        self.operator.factorize(self.system, self.clock.h, at).map_err(|error| match error {
+            Error::Singular { dof, .. } => {
+                Error::IndefiniteTangent { t: self.clock.at(0.0), h: self.clock.h, iteration: iteration + 1, dof }
+            }
+            other => other,
+        })
+    }
+
+    /// Adds contact to the increment on the interface, with rows that fit where it ends. Says whether they do.
+    fn press(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<bool> {
+        work.interface.forces.fill(T::zero());
+        if self.constraints.len() == 0 || !T::all_finite(&work.interface.increment) {
+            return Ok(true);
+        }
+        newton.free.copy_from_slice(&work.interface.increment);
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &work.balance) {
+            keep(self.constraints.interface(), &balance.u, &mut newton.balance);
+        }
+        for pass in 0..LINEARIZATIONS {
+            if pass > 0 {
+                work.interface.increment.copy_from_slice(&newton.free);
+                work.interface.forces.fill(T::zero());
+            }
+            let Self { stage, clock, constraints, g, solver, statistics, .. } = self;
+            let iterate = Some(&newton.d[..]);
+            ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate }.solve(
+                &mut *self.system,
+                self.operator,
+                new,
+                past,
+                work,
+            )?;
+            if let (Some(_), Some(balance)) = (&self.stage.balance, &mut work.balance) {
+                for (&dof, &u) in self.constraints.interface().iter().zip(&newton.balance) {
+                    balance.u[dof] = u;
+                }
+            }
+            if self.follow(newton, new, work)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Linearizes the rows where the increment on the interface ends. Says whether the contact just solved is right for
+    /// them: gaps of pressed rows and contact forces as solved, no other row violated.
+    fn follow(&mut self, newton: &mut NewtonWork<T>, new: &mut Motion<T>, work: &mut Workspace<T>) -> Result<bool> {
+        let Self { stage, clock, constraints, g, operator, .. } = self;
+        let Workspace { interface, rows, trial, .. } = work;
+        let level = Level { target: stage.contact.as_ref(), clock: *clock };
+        if level.is_velocity() {
+            return Ok(true);
+        }
+        advance(
+            constraints.interface(),
+            &interface.displacement,
+            stage.recovery.weights()[0],
+            &interface.increment,
+            &mut new.u,
+        );
+        let (t, values) = level.place(new, &rows.target);
+        constraints.gap(t, values, &mut newton.gaps);
+        let moved = constraints.follow(t, values, g);
+        let mut settled = true;
+        if let Ok(Candidates::Changed) = moved {
+            operator.follow(constraints.version());
+            constraints.finite_gaps(t, values, &mut rows.y)?;
+            let [force, displacement] = newton.settings.bounds::<T>();
+            interface.response.fill(T::zero());
+            for row in 0..constraints.len() {
+                let lambda = trial.lambda_raw[row];
+                g.interface_scatter(row, lambda, &mut interface.response);
+                let advance = g.interface_magnitude(row, &interface.increment);
+                let tolerance = constraints.gap_rounding(row, g.magnitude(row, values), rows.y[row])
+                    + T::of(displacement) * stage.recovery.weights()[0].abs() * advance;
+                let miss = rows.y[row] - newton.gaps[row];
+                settled &= match lambda > T::zero() || constraints.law(row).is_equality() {
+                    true => miss.abs() <= tolerance,
+                    false => rows.y[row] >= -tolerance || !rows.enabled[row],
+                };
+            }
+            let moved_forces = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| new - old);
+            let miss = moved_forces.map(|x| x.value().powi(2)).sum::<f64>().sqrt();
+            settled &= miss <= force * norm(&interface.forces);
+        }
+        for (&dof, &u) in constraints.interface().iter().zip(&interface.displacement) {
+            new.u[dof] = u;
+        }
+        moved?;
+        Ok(settled)
+    }
+
+    /// Moves by the increment in `work.increment`, or by a share of it, which is returned; the residual there takes its
+    /// place. A stage that is linear in its unknown is solved by this, and nothing is returned.
+    fn advance(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+        before: Norms,
+        norms: &mut Norms,
+    ) -> Result<Option<f64>> {
+        // From here on `residual` keeps the increment.
+        std::mem::swap(&mut newton.residual, &mut work.increment);
+        self.shift(T::one(), newton, new, work);
+        if !self.operator.varies() {
+            return Ok(None);
+        }
+        *norms = self.evaluate(newton, new, past, work)?;
+        let mut share = 1.0;
+        if newton.settings.line_search {
+            let [force, _] = newton.settings.bounds::<T>();
+            while share > SHORTEST
+                && norms.residual > force * norms.scale()
+                && norms.residual > (1.0 - 1e-4 * share) * before.residual
+            {
+                share *= 0.5;
+                self.shift(-T::of(share), newton, new, work);
+                *norms = self.evaluate(newton, new, past, work)?;
+            }
+        }
+        Ok(Some(share))
+    }
+
+    /// Adds a share of the increment to everything that contains the unknown.
+    fn shift(&self, share: T, newton: &mut NewtonWork<T>, new: &mut Motion<T>, work: &mut Workspace<T>) {
+        let NewtonWork { d, residual: increment, .. } = newton;
+        T::axpy(share, increment, d);
+        let add = |rows: &ScaledRows<T>, motion: &mut Motion<T>| {
+            let [u, v, a] = rows.weights();
+            T::axpy(share * u, increment, &mut motion.u);
+            T::axpy(share * v, increment, &mut motion.v);
+            T::axpy(share * a, increment, &mut motion.a);
+        };
+        add(&self.stage.recovery, new);
+        if let (Some(rows), Some(balance)) = (&self.stage.balance, &mut work.balance) {
+            add(rows, balance);
+        }
+    }
+}
+
+/// The Euclidean norm.
+fn norm<T: Real>(x: &[T]) -> f64 {
+    x.iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt()
+}
