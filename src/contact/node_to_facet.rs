@@ -2,13 +2,15 @@
 
 mod geometry;
 mod search;
+mod stand;
 mod surface;
 
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, check_mesh, positive};
+use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, check_mesh, positive};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use geometry::{Foot, Location, Point, Shape, dot};
+use geometry::{Point, Shape};
 use search::{Bounds, Neighborhood, overhang};
+use stand::{Ground, Stand};
 use surface::Surface;
 
 /// A facet of a surface: the numbers of its 2, 3 or 4 nodes.
@@ -56,17 +58,14 @@ impl Facet {
     }
 }
 
-/// The rows that a search found.
+/// The rows that a search found, where they are linearized.
 #[derive(Debug)]
 struct Rows<T> {
     jacobian: ContactJacobian<T>,
     /// (node, pass)
     identities: Vec<(usize, usize)>,
-    /// Index of the facet in the list of its pass.
-    facets: Vec<usize>,
-    /// Gaps at the search.
-    gaps: Vec<T>,
-    /// Displacements at the search, one an entry of G.
+    stands: Vec<Stand>,
+    /// Displacements there, one an entry of G.
     displacements: Vec<T>,
 }
 
@@ -75,8 +74,7 @@ impl<T: Real> Rows<T> {
         Self {
             jacobian: ContactJacobian::with_capacity(rows, entries),
             identities: Vec::with_capacity(rows),
-            facets: Vec::with_capacity(rows),
-            gaps: Vec::with_capacity(rows),
+            stands: Vec::with_capacity(rows),
             displacements: Vec::with_capacity(entries),
         }
     }
@@ -84,9 +82,52 @@ impl<T: Real> Rows<T> {
     fn clear(&mut self) {
         self.jacobian.clear();
         self.identities.clear();
-        self.facets.clear();
-        self.gaps.clear();
+        self.stands.clear();
         self.displacements.clear();
+    }
+
+    /// Appends the row of a node on the vertices of a facet.
+    fn push<'a>(
+        &mut self,
+        (node, pass): (usize, usize),
+        stand: Stand,
+        vertices: &[usize],
+        dofs: impl Fn(usize) -> &'a [usize],
+        u: &[T],
+    ) {
+        let entries = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(stand.weights.map(|w| -w)));
+        for (node, share) in entries {
+            for (&dof, &component) in dofs(node).iter().zip(&stand.normal) {
+                let weight = T::of(share * component);
+                if weight != T::zero() {
+                    self.jacobian.dofs.push(dof);
+                    self.jacobian.weights.push(weight);
+                    self.displacements.push(u[dof]);
+                }
+            }
+        }
+        self.jacobian.pointers.push(self.jacobian.dofs.len());
+        self.identities.push((node, pass));
+        self.stands.push(stand);
+    }
+
+    /// Appends a row as another list has it.
+    fn keep(&mut self, other: &Self, row: usize) {
+        let range = other.jacobian.pointers[row]..other.jacobian.pointers[row + 1];
+        self.jacobian.dofs.extend_from_slice(&other.jacobian.dofs[range.clone()]);
+        self.jacobian.weights.extend_from_slice(&other.jacobian.weights[range.clone()]);
+        self.displacements.extend_from_slice(&other.displacements[range]);
+        self.jacobian.pointers.push(self.jacobian.dofs.len());
+        self.identities.push(other.identities[row]);
+        self.stands.push(other.stands[row]);
+    }
+
+    /// The gap of a row at u.
+    fn gap(&self, row: usize, u: &[T]) -> T {
+        let Self { jacobian, stands, displacements, .. } = self;
+        let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];
+        let moved = jacobian.row(row).zip(start).map(|((dof, weight), &start)| weight * (u[dof] - start));
+        T::of(stands[row].gap) + moved.sum()
     }
 }
 
@@ -108,11 +149,23 @@ struct Pass {
 ///
 /// # Linearization
 ///
-/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; until the next one
-/// normals and shape functions stay and gaps are affine, `g = g* + G (u − u*)`. This is for small to moderate motion in
-/// a step: what a node slides along a facet in one step should be a small share of its curvature radius, or facet. G is
-/// the derivative of the distance. [`rates`](ContactConstraint::rates) are zero: the turning of normals within a step
-/// is left out. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run.
+/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step. With a linear system
+/// normals and shape functions stay until the next one and gaps are affine, `g = g* + G (u − u*)`. This is for small to
+/// moderate motion in a step: what a node slides along a facet in one step should be a small share of its curvature
+/// radius, or facet. With a nonlinear system rows follow Newton's method
+/// ([`follow`](ContactConstraint::follow)): closest points are found again at each trial state, in the lists of the
+/// search, and at the end of the step gaps are the distances there. G is the derivative of the distance, and
+/// [`rates`](ContactConstraint::rates) have its second derivative along the motion, from nodes that slide on facets
+/// that turn. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run.
+///
+/// A row lasts for its step. Its facet goes on a quarter of itself beyond an open rim, and may turn 19° nearer to the
+/// node's own normal than [`facing`](Self::facing) lets a search find it, so that a node that slides off a table or
+/// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
+/// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
+/// reach where it was last linearized, it is open, and the row stays as it was.
+///
+/// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and
+/// are those of the facet.
 ///
 /// # Which facet, which normal
 ///
@@ -320,7 +373,7 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Index of the facet that a row of the last search stands on, in the list of its pass.
     pub fn facet(&self, row: usize) -> usize {
-        self.rows.facets[row]
+        self.rows.stands[row].facet
     }
 
     /// How often the lists of facets have been built: many times in a run, and a larger [`skin`](Self::skin) may pay.
@@ -389,46 +442,18 @@ impl<T: Real> NodeToFacet<T> {
 
     /// The rows of one pass, in the order of its nodes.
     fn find_rows(&mut self, pass: usize, near: &Bounds, u: &[T]) {
-        /// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
-        const SAME_SIDE: f64 = 0.5;
-        let Self { positions, passes, reach, partners, found, dimension, dofs, .. } = self;
-        let (surface, own) = match (pass, &self.own_surface) {
-            (0, own) => (&self.surface, own.as_ref()),
-            (_, Some(own)) => (own, Some(&self.surface)),
-            _ => return,
+        let Self { surface, own_surface, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
+            return;
         };
-        let Pass { nodes, neighborhood } = &passes[pass];
-        for (k, &node) in nodes.iter().enumerate() {
-            let p = positions[node];
-            if !near.contains(p) {
+        for (place, &node) in ground.nodes.iter().enumerate() {
+            if !near.contains(positions[node]) {
                 continue;
             }
-            let own_normal = own.and_then(|own| own.node_normal(node, positions));
-            let mut best: Option<(usize, (Shape, Foot))> = None;
-            for &index in neighborhood.of(k) {
-                let limit = best.map_or(*reach, |(_, (_, foot))| foot.distance);
-                let [lower, upper] = surface.facets()[index].shape(positions).bounds();
-                let bounds = Bounds { lower, upper };
-                if !bounds.inflated(limit + overhang(&bounds)).contains(p) {
-                    continue;
-                }
-                let Some((shape, foot)) = surface.project(index, p, positions) else { continue };
-                if foot.distance > *reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
-                    continue;
-                }
-                let same_side =
-                    |normal: Point| shape.normal(&foot.weights).is_none_or(|facet| dot(facet, normal) > SAME_SIDE);
-                if own_normal.is_none_or(|normal| !same_side(normal)) {
-                    best = Some((index, (shape, foot)));
-                }
-            }
-            let Some((facet, projected)) = best.filter(|(_, (_, foot))| foot.location != Location::Beyond) else {
-                continue;
-            };
-            let foot = &projected.1;
-            let vertices = surface.facets()[facet].nodes();
+            let Some(stand) = ground.closest(place, *reach) else { continue };
+            let vertices = ground.surface.facets()[stand.facet].nodes();
             if !partners.is_empty() {
-                let on = vertices.iter().zip(&foot.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
+                let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
                 let on = on.map(|(&vertex, _)| vertex);
                 match pass {
                     0 => partners[node] = on,
@@ -436,26 +461,65 @@ impl<T: Real> NodeToFacet<T> {
                     _ => {}
                 }
             }
-            let Some((normal, gap)) = surface.direction(facet, p, &projected, Self::rounding(), positions) else {
-                continue;
-            };
-            let entries = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(foot.weights.map(|w| -w)));
-            for (node, share) in entries {
-                for (&dof, &component) in dofs[node][..*dimension].iter().zip(&normal) {
-                    let weight = T::of(share * component);
-                    if weight != T::zero() {
-                        found.jacobian.dofs.push(dof);
-                        found.jacobian.weights.push(weight);
-                        found.displacements.push(u[dof]);
-                    }
-                }
-            }
-            found.jacobian.pointers.push(found.jacobian.dofs.len());
-            found.identities.push((node, pass));
-            found.facets.push(facet);
-            found.gaps.push(T::of(gap));
+            found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
         }
     }
+
+    /// The rows there are, where their nodes stand now; `motions` are those since the lists were built.
+    fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
+        /// Gap, in shares of the reach, above which a row surely does not press.
+        const OPEN: f64 = 0.01;
+        let Self { surface, own_surface, positions, passes, rows, found, dimension, dofs, .. } = self;
+        for (row, &(node, pass)) in rows.identities.iter().enumerate() {
+            let old = rows.stands[row];
+            let ground = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding());
+            // The list of the node has all facets as near as this.
+            let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
+                Bounds::of_points([geometry::sub(positions[node], before)]).spread(&motions[1 - pass])
+            });
+            let known = self.reach + self.skin - moved;
+            let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
+                let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
+                Some((stand, ground.surface.facets()[stand.facet].nodes()))
+            });
+            match stand {
+                Some((stand, vertices)) => {
+                    found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+                }
+                // There is nothing near that it could press on.
+                None if known > 0.0 && rows.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
+                None => {
+                    let contact = ContactId { constraint: 0, feature: node, candidate: pass };
+                    return Err(Error::ContactLost { t, contact });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Position and velocity of a node.
+    fn moving(&self, node: usize, u: &[T], v: &[T]) -> [Point; 2] {
+        let mut motion = [self.coordinates[node], [0.0; 3]];
+        for (i, &dof) in self.dofs[node][..self.dimension].iter().enumerate() {
+            motion[0][i] += u[dof].value();
+            motion[1][i] = v[dof].value();
+        }
+        motion
+    }
+}
+
+/// What the nodes of a pass stand on.
+fn ground<'a>(
+    pass: usize,
+    passes: &'a [Pass],
+    surface: &'a Surface,
+    own_surface: Option<&'a Surface>,
+    positions: &'a [Point],
+    rounding: f64,
+) -> Option<Ground<'a>> {
+    let Pass { nodes, neighborhood } = &passes[pass];
+    let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
+    Some(Ground { nodes, neighborhood, surface, own, positions, rounding })
 }
 
 fn component<T: Real>(x: &[T], i: usize) -> f64 {
@@ -502,8 +566,19 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
     }
 
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        self.check(u.len())?;
+        // A trial state that is not finite: the gaps say so.
+        let Ok((_, motions)) = self.move_nodes(u) else { return Ok(Candidates::Unchanged) };
+        self.found.clear();
+        self.move_rows(t, &motions, u)?;
+        let same = self.rows.jacobian == self.found.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+    }
+
     fn candidates(&self) -> usize {
-        self.rows.gaps.len()
+        self.rows.stands.len()
     }
 
     fn identity(&self, row: usize) -> (usize, usize) {
@@ -524,11 +599,21 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn gap(&mut self, _t: f64, u: &[T], out: &mut [T]) {
-        let Rows { jacobian, gaps, displacements, .. } = &self.rows;
-        for (row, (out, &gap)) in out.iter_mut().zip(gaps).enumerate() {
-            let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];
-            let moved = jacobian.row(row).zip(start).map(|((dof, weight), &start)| weight * (u[dof] - start));
-            *out = gap + moved.sum();
+        for (row, out) in out.iter_mut().enumerate().take(self.rows.stands.len()) {
+            *out = self.rows.gap(row, u);
+        }
+    }
+
+    fn rates(&mut self, _t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+        let Rows { identities, stands, .. } = &self.rows;
+        for ((out, &(node, pass)), stand) in out.iter_mut().zip(identities).zip(stands) {
+            let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
+            let facet = &surface.facets()[stand.facet];
+            let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
+            let [x, speed] = self.moving(node, u, v);
+            let [shape, velocity] = [0, 1].map(|k| Shape::new(corners.map(|corner| corner[k]), facet.count));
+            let acceleration = stand.acceleration(x, speed, &shape, &velocity);
+            *out = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
         }
     }
 

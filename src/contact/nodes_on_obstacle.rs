@@ -31,10 +31,11 @@ impl<T: Real, const D: usize> Node<T, D> {
 /// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
 /// identified by the number of the node.
 ///
-/// The rows are linearized where a step begins: within the step a node sees the tangent plane (and the obstacle's own
-/// motion exactly), which on a surface of radius R leaves a gap of up to (h v)²/(2R) that the next step corrects. On planes
-/// nothing is left. With a `reach` only nodes nearer than that are candidates, and a body farther away costs a bounding
-/// box.
+/// With a linear system the rows are linearized once, where a step begins: within the step a node sees the tangent plane
+/// (and the obstacle's own motion exactly), which on a surface of radius R leaves a gap of up to (h v)²/(2R) that the next
+/// step corrects. On planes nothing is left. With a nonlinear system they follow Newton's method to the end of the step,
+/// and nothing is left on any surface. With a `reach` only nodes nearer than that are candidates, and a body farther away
+/// costs a bounding box.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
@@ -197,6 +198,24 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             true => Ok(Candidates::Unchanged),
             false => Ok(Candidates::Changed),
         }
+    }
+
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        if self.obstacle.fixed_normal().is_some() {
+            return Ok(Candidates::Unchanged);
+        }
+        let [shift, ..] = self.motion(t);
+        let mut moved = Candidates::Unchanged;
+        for row in &mut self.rows {
+            row.place = self.nodes[row.node].at(u);
+            let (_, normal) = self.obstacle.distance(minus(row.place, shift));
+            // Where there is no normal the gap is reported, which is no number either.
+            if normal != row.normal && normal.iter().all(|x| x.is_finite()) {
+                row.normal = normal;
+                moved = Candidates::Changed;
+            }
+        }
+        Ok(moved)
     }
 
     fn candidates(&self) -> usize {

@@ -41,6 +41,8 @@ pub(super) fn unit(x: Point) -> Option<Point> {
 pub(super) struct Rim {
     pub(super) sides: [bool; 4],
     pub(super) vertices: [bool; 4],
+    /// How far the surface goes on beyond its rim, in shares of the facet: [`RIM`], if not said otherwise.
+    pub(super) beyond: f64,
 }
 
 /// Where on a facet a closest point lies.
@@ -79,6 +81,11 @@ impl Shape {
         Self { corners, count }
     }
 
+    /// Whether it is a segment.
+    pub(super) fn is_segment(&self) -> bool {
+        self.count == 2
+    }
+
     fn after(&self, k: usize) -> usize {
         if k + 1 == self.count { 0 } else { k + 1 }
     }
@@ -88,7 +95,7 @@ impl Shape {
     }
 
     /// The side that begins at vertex k, as a vector.
-    fn side(&self, k: usize) -> Point {
+    pub(super) fn side(&self, k: usize) -> Point {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
@@ -108,7 +115,7 @@ impl Shape {
     }
 
     /// The point with the given shape functions.
-    fn point(&self, weights: &[f64; 4]) -> Point {
+    pub(super) fn point(&self, weights: &[f64; 4]) -> Point {
         // Differences from the first corner: far from the origin the sum of weighted corners would lose digits.
         let first = self.corners[0];
         self.corners[1..self.count]
@@ -136,12 +143,26 @@ impl Shape {
 
     /// The outward unit normal where the shape functions are `weights`; none if the facet is degenerate there.
     pub(super) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
-        let [first, second] = match self.count {
-            2 => [self.side(0), [0.0, 0.0, 1.0]],
+        let [first, second] = self.tangents_at(weights);
+        unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
+    }
+
+    /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
+    pub(super) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
+        match self.count {
+            2 => [self.side(0), [0.0; 3]],
             3 => [self.side(0), sub(self.corners[2], self.corners[0])],
             _ => self.tangents(Self::coordinates(weights)),
-        };
-        unit(cross(first, second))
+        }
+    }
+
+    /// ∂²x/∂ξ∂η of a quadrilateral; the other shapes are flat.
+    pub(super) fn twist(&self) -> Point {
+        if self.count < 4 {
+            return [0.0; 3];
+        }
+        let [x0, x1, x2, x3] = self.corners;
+        add_scaled(add_scaled([0.0; 3], 0.25, sub(x0, x1)), 0.25, sub(x2, x3))
     }
 
     /// Angle between the sides that meet at vertex k; 1 for a segment.
@@ -172,7 +193,7 @@ impl Shape {
 
     /// The closest point of the facet; none if the facet is degenerate.
     ///
-    /// Beyond an open side the facet goes on for [`RIM`] of its extent, so that lever arms stay exact there.
+    /// Beyond an open side the facet goes on for a share of its extent, so that lever arms stay exact there.
     pub(super) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
         match self.count {
             2 => self.project_on_segment(p, rim),
@@ -191,7 +212,7 @@ impl Shape {
         // (vertex, share of the segment outside of it)
         let (vertex, outside) = if s < 0.5 { (0, -s) } else { (1, s - 1.0) };
         let (s, location) = match rim.vertices[vertex] {
-            true if outside <= RIM => (s, Location::Inside),
+            true if outside <= rim.beyond => (s, Location::Inside),
             true => (s.clamp(0.0, 1.0), Location::Beyond),
             false if outside <= 0.0 => (s, Location::Inside),
             false => (s.clamp(0.0, 1.0), Location::Vertex(vertex)),
@@ -209,7 +230,7 @@ impl Shape {
         let r = sub(p, self.corners[0]);
         let (w1, w2) = (dot(cross(r, second), normal) / square, dot(cross(first, r), normal) / square);
         let weights = [1.0 - w1 - w2, w1, w2, 0.0];
-        let outside = |k: usize| self.inset(&weights, k) < if rim.sides[k] { -RIM } else { 0.0 };
+        let outside = |k: usize| self.inset(&weights, k) < if rim.sides[k] { -rim.beyond } else { 0.0 };
         let outside = [outside(0), outside(1), outside(2), false];
         match outside.contains(&true) {
             false => Some(self.foot(p, weights, Location::Inside)),
@@ -230,7 +251,7 @@ impl Shape {
             let (vertex, excess) = if s < 0.5 { (k, -s) } else { (self.after(k), s - 1.0) };
             let (s, location) = match (rim.sides[k], rim.vertices[vertex]) {
                 (true, _) => (s.clamp(0.0, 1.0), Location::Beyond),
-                (false, true) if excess > RIM => (s.clamp(0.0, 1.0), Location::Beyond),
+                (false, true) if excess > rim.beyond => (s.clamp(0.0, 1.0), Location::Beyond),
                 (false, false) if excess > 0.0 => (s.clamp(0.0, 1.0), Location::Vertex(vertex)),
                 (false, _) => (s, Location::Side(k)),
             };
@@ -263,7 +284,7 @@ impl Shape {
     }
 
     fn project_on_quadrilateral(&self, p: Point, rim: Rim) -> Option<Foot> {
-        let [bottom, right, top, left] = rim.sides.map(|open| if open { 1.0 + 2.0 * RIM } else { 1.0 });
+        let [bottom, right, top, left] = rim.sides.map(|open| if open { 1.0 + 2.0 * rim.beyond } else { 1.0 });
         let (lower, upper) = ([-left, -bottom], [right, top]);
         let Some(z) = self.minimize_distance(p, self.start(p), lower, upper) else {
             return self.nearest_on_sides(p, rim, [true; 4]);
@@ -307,9 +328,7 @@ impl Shape {
         const TINY: f64 = 1e-7;
         // Steps made after convergence is in sight: one squares the error, one more settles the last digits.
         const POLISH: usize = 3;
-        let [x0, x1, x2, x3] = self.corners;
-        // ∂²x/∂ξ∂η.
-        let twist = add_scaled(add_scaled([0.0; 3], 0.25, sub(x0, x1)), 0.25, sub(x2, x3));
+        let twist = self.twist();
         let (mut z, mut polished) = (start, 0);
         let residual = |z: [f64; 2]| sub(self.point(&Self::bilinear(z)), p);
         for _ in 0..ITERATIONS {

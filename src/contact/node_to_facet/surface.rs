@@ -1,7 +1,7 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
 use super::Facet;
-use super::geometry::{Foot, Location, Point, Rim, Shape, add_scaled, dot, sub, unit};
+use super::geometry::{Foot, Location, Point, RIM, Rim, Shape, add_scaled, dot, sub, unit};
 use crate::error::{Error, Result};
 
 /// Facets that share sides, with their neighbors.
@@ -48,7 +48,7 @@ impl Surface {
         let mut nodes: Vec<_> = around.iter().map(|&(node, ..)| node).collect();
         nodes.dedup();
         let mut surface = Self {
-            rims: vec![Rim { sides: [true; 4], vertices: [false; 4] }; facets.len()],
+            rims: vec![Rim { sides: [true; 4], vertices: [false; 4], beyond: RIM }; facets.len()],
             neighbors: vec![[None; 4]; facets.len()],
             facets,
             nodes,
@@ -127,8 +127,19 @@ impl Surface {
 
     /// The closest point of a facet, with the shape of the facet.
     pub(super) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
+        self.project_beyond(facet, p, RIM, positions)
+    }
+
+    /// As `project`, on a surface that goes on beyond its rim for another share of the facet.
+    pub(super) fn project_beyond(
+        &self,
+        facet: usize,
+        p: Point,
+        beyond: f64,
+        positions: &[Point],
+    ) -> Option<(Shape, Foot)> {
         let shape = self.facets[facet].shape(positions);
-        shape.project(p, self.rims[facet]).map(|foot| (shape, foot))
+        shape.project(p, Rim { beyond, ..self.rims[facet] }).map(|foot| (shape, foot))
     }
 
     /// Sum of the normals on both sides of a side, at its share `s`.

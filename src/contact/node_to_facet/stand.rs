@@ -1,0 +1,151 @@
+//! Where a node stands on a surface: what searching and following share, and how the gap accelerates along a motion.
+
+use super::geometry::{Foot, Location, Point, Shape, add_scaled, dot};
+use super::search::{Bounds, Neighborhood, overhang};
+use super::surface::Surface;
+
+/// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
+const SAME_SIDE: f64 = 0.5;
+
+/// The same for the facet that a node stands on already, within a step.
+const SAME_SIDE_OF_LAST: f64 = 0.75;
+
+/// How far, in shares of the facet, the surface goes on beyond its rim for a node that leaves it within a step.
+const RIM_OF_LAST: f64 = 0.25;
+
+/// A node on a facet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stand {
+    /// Place of the node in the list of its pass.
+    pub(super) place: usize,
+    /// Index of the facet in the list of its pass.
+    pub(super) facet: usize,
+    location: Location,
+    /// Shape functions of the facet's vertices at the closest point.
+    pub(super) weights: [f64; 4],
+    pub(super) normal: Point,
+    pub(super) gap: f64,
+}
+
+/// The nodes of a pass and what they may stand on, at the positions now.
+#[derive(Clone, Copy)]
+pub(super) struct Ground<'a> {
+    pub(super) nodes: &'a [usize],
+    pub(super) neighborhood: &'a Neighborhood,
+    pub(super) surface: &'a Surface,
+    /// The surface of the nodes, if known.
+    pub(super) own: Option<&'a Surface>,
+    pub(super) positions: &'a [Point],
+    /// Shares of a facet below which closeness to a side or a vertex is rounding.
+    pub(super) rounding: f64,
+}
+
+impl Ground<'_> {
+    /// The closest facet within `reach` of the node at a place of the list; none beyond the rim.
+    pub(super) fn closest(&self, place: usize, reach: f64) -> Option<Stand> {
+        let Self { surface, positions, .. } = *self;
+        let p = positions[self.nodes[place]];
+        let own_normal = self.own_normal(place);
+        let mut best: Option<(usize, (Shape, Foot))> = None;
+        for &index in self.neighborhood.of(place) {
+            let limit = best.map_or(reach, |(_, (_, foot))| foot.distance);
+            let [lower, upper] = surface.facets()[index].shape(positions).bounds();
+            let bounds = Bounds { lower, upper };
+            if !bounds.inflated(limit + overhang(&bounds)).contains(p) {
+                continue;
+            }
+            let Some(projected) = surface.project(index, p, positions) else { continue };
+            let foot = &projected.1;
+            if foot.distance > reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
+                continue;
+            }
+            if faces(&projected, own_normal, SAME_SIDE) {
+                best = Some((index, projected));
+            }
+        }
+        let (facet, projected) = best?;
+        self.on(place, facet, &projected)
+    }
+
+    /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node
+    /// that slides over the rim, or turns away, ends its step.
+    pub(super) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
+        let p = self.positions[self.nodes[place]];
+        let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
+        let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), SAME_SIDE_OF_LAST);
+        stays.then(|| self.on(place, facet, &projected)).flatten()
+    }
+
+    fn own_normal(&self, place: usize) -> Option<Point> {
+        self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
+    }
+
+    fn on(&self, place: usize, facet: usize, projected: &(Shape, Foot)) -> Option<Stand> {
+        let Foot { weights, location, .. } = projected.1;
+        if location == Location::Beyond {
+            return None;
+        }
+        let p = self.positions[self.nodes[place]];
+        let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
+        Some(Stand { place, facet, location, weights, normal, gap })
+    }
+}
+
+/// Whether a facet is turned against the normal of a node, if that is known.
+fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f64) -> bool {
+    let same = |normal: Point| shape.normal(&foot.weights).is_none_or(|facet| dot(facet, normal) > same_side);
+    own_normal.is_none_or(|normal| !same(normal))
+}
+
+impl Stand {
+    /// d²g/ds² along x + s v, with the node at x of velocity v, and the facet and its vertices' velocities as shapes.
+    ///
+    /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet's
+    /// there, differentiating r · S,α = 0 gives A ξ̇ = p − g c with p_α = w · S,α, c_α = n · w,α and
+    /// A = S,α · S,β − g n · S,αβ, and the turning of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α ξ̇.
+    /// On a side or a vertex the node also turns around it: w⊥²/g. Closer than a share of the facet that turn is over
+    /// in no time, and the facet stands for the smooth surface that is meant.
+    pub(super) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
+        const CLOSE: f64 = 1e-3;
+        let n = self.normal;
+        let arm = add_scaled(x, -1.0, shape.point(&self.weights));
+        let w = add_scaled(v, -1.0, velocity.point(&self.weights));
+        let gap = dot(n, arm);
+        // The part of a straight line with the tangent s that turns by c.
+        let line = |s: Point, c: f64| c * (2.0 * dot(w, s) - gap * c) / dot(s, s);
+        match self.location {
+            Location::Vertex(_) if gap.abs() > CLOSE * shape.size() => {
+                let across = add_scaled(w, -dot(n, w), n);
+                dot(across, across) / gap
+            }
+            Location::Side(k) if gap.abs() > CLOSE * shape.size() => {
+                let s = shape.side(k);
+                let around = add_scaled(w, -dot(n, w), n);
+                let around = add_scaled(around, -dot(around, s) / dot(s, s), s);
+                dot(around, around) / gap + line(s, -dot(n, velocity.side(k)))
+            }
+            _ => {
+                let ([s, t], [s_rate, t_rate]) =
+                    (shape.tangents_at(&self.weights), velocity.tangents_at(&self.weights));
+                let c = [-dot(n, s_rate), -dot(n, t_rate)];
+                if shape.is_segment() {
+                    return line(s, c[0]);
+                }
+                let (p, twist) = ([dot(w, s), dot(w, t)], dot(n, shape.twist()));
+                let (ss, st, tt) = (dot(s, s), dot(s, t), dot(t, t));
+                let solve = |st: f64, b: [f64; 2]| {
+                    let determinant = ss * tt - st * st;
+                    [(tt * b[0] - st * b[1]) / determinant, (ss * b[1] - st * b[0]) / determinant]
+                };
+                // At a focus of a warped facet the closest point is lost; what is left is the flat facet.
+                let curved = st - gap * twist;
+                let convex = ss * tt - curved * curved > 1e-3 * (ss * tt - st * st);
+                let (curved, twist) = if convex { (curved, twist) } else { (st, 0.0) };
+                let slide = solve(curved, [p[0] - gap * c[0], p[1] - gap * c[1]]);
+                let along = solve(st, p);
+                let turn = [c[0] - twist * slide[1], c[1] - twist * slide[0]];
+                c[0] * slide[0] + c[1] * slide[1] + turn[0] * along[0] + turn[1] * along[1]
+            }
+        }
+    }
+}
