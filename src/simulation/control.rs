@@ -121,7 +121,8 @@ pub(super) struct Judge<T> {
     start: Motion<T>,
     /// Whether judgement is suspended: the step cannot be smaller.
     pub(super) suspended: bool,
-    /// The estimate over the tolerance of the step judged last.
+    /// The estimate of the step judged last, as a length and over the tolerance.
+    estimate: f64,
     excess: f64,
     /// Whether the step judged last would have been refused.
     pub(super) coarse: bool,
@@ -130,7 +131,7 @@ pub(super) struct Judge<T> {
 impl<T: Real> Judge<T> {
     pub(super) fn new(control: StepControl, local: LocalError, dofs: usize) -> Self {
         let start = Motion::zero(if control.estimates() { dofs } else { 0 });
-        Self { control, local, start, suspended: false, excess: 0.0, coarse: false }
+        Self { control, local, start, suspended: false, estimate: 0.0, excess: 0.0, coarse: false }
     }
 
     /// Remembers the state that a step starts from.
@@ -147,7 +148,8 @@ impl<T: Real> Judge<T> {
         self.excess = 0.0;
         if let Some(tolerance) = self.control.tolerance {
             let factor = if changes > 0 { 1.0 } else { self.local.factor };
-            self.excess = factor * self.distance([u, v], prescribed, h) / tolerance;
+            self.estimate = factor * self.distance([u, v], prescribed, h);
+            self.excess = self.estimate / tolerance;
         }
         // Written so that NaN is refused.
         let fine = self.excess <= 1.0 && self.control.changes.is_none_or(|limit| changes <= limit);
@@ -253,6 +255,12 @@ impl<T: Real> Simulation<'_, T> {
             Some(startup) => startup.set_step_size(&scheme.starter.stages, &mut **system, other, h, at),
             None => Ok(()),
         }
+    }
+
+    /// The estimate of the local error of the last step (length), for runs that
+    /// [control it](StepControl::local_error).
+    pub fn local_error(&self) -> Option<f64> {
+        self.judge.as_ref().filter(|judge| judge.control.estimates()).map(|judge| judge.estimate)
     }
 
     /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it was.
