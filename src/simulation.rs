@@ -181,7 +181,7 @@ impl<'a, T: Real> Simulation<'a, T> {
                 Wants::State => None,
                 Wants::Energy => Some(self.energy()),
             };
-            let view = StepView { state: &self.state, energy, h: self.history.clock.h, statistics: &self.statistics };
+            let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
             if observer.observe(&view) == Control::Stop {
                 return Ok(Outcome::Stopped);
             }

@@ -1,0 +1,402 @@
+//! Newton's method: it solves linear systems as the direct solve does, converges quadratically, follows curved gaps, and
+//! fails without leaving a trace.
+
+use contact_dynamics::contact::{Side, Sphere};
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::{
+    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, Linearity, Mass, Newmark, Newton,
+    NodesOnObstacle, PersistencyCorrection, Result, Simulation, System, TangentWeights, TimeIntegrator,
+};
+use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::schemes::{Listed, all};
+
+/// A linear system that says that it is not.
+struct Unknowing<S>(S);
+
+impl<S: System<f64>> System<f64> for Unknowing<S> {
+    fn dofs(&self) -> usize {
+        self.0.dofs()
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        self.0.mass()
+    }
+    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.0.force(t, u, v, out)
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.0.pattern()
+    }
+    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        self.0.tangent(t, u, v, weights, out)
+    }
+    fn damping_force(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Damping {
+        self.0.damping_force(u, v, out)
+    }
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        self.0.potential_energy(u)
+    }
+    fn external_load(&mut self, t: f64, out: &mut [f64]) {
+        self.0.external_load(t, out);
+    }
+    fn prescribed(&self) -> &[usize] {
+        self.0.prescribed()
+    }
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) {
+        self.0.prescribed_motion(t, out);
+    }
+}
+
+/// A point mass on a spring to the origin of the plane, with force k (l² − L²)/(2 L²) as that of a Green–Lagrange bar, and
+/// on a dashpot whose force is c |v|² v.
+struct Pendulum {
+    mass: [f64; 2],
+    axial: f64,
+    length: f64,
+    drag: f64,
+    pattern: SymbolicSparseColMat<usize>,
+    /// Factor of the tangent: 1 is right.
+    tangent: f64,
+}
+
+impl Pendulum {
+    fn new(axial: f64) -> Self {
+        let pattern = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 4], None, vec![0, 1, 0, 1]);
+        Self { mass: [10.0; 2], axial, length: 3.0, drag: 0.0, pattern, tangent: 1.0 }
+    }
+
+    fn place(&self, u: &[f64]) -> [f64; 2] {
+        [self.length + u[0], u[1]]
+    }
+
+    fn strain(&self, [x, y]: [f64; 2]) -> f64 {
+        0.5 * ((x * x + y * y) / self.length.powi(2) - 1.0)
+    }
+}
+
+impl System<f64> for Pendulum {
+    fn dofs(&self) -> usize {
+        2
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, _: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        let place = self.place(u);
+        let (tension, speed) = (self.axial * self.strain(place) / self.length, v[0] * v[0] + v[1] * v[1]);
+        for i in 0..2 {
+            out[i] = -tension * place[i] - self.drag * speed * v[i];
+        }
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        let place = self.place(u);
+        let (tension, speed) = (self.axial * self.strain(place) / self.length, v[0] * v[0] + v[1] * v[1]);
+        for i in 0..2 {
+            for j in 0..2 {
+                let unit = f64::from(u8::from(i == j));
+                let stiffness = self.axial / self.length.powi(3) * place[i] * place[j] + tension * unit;
+                let damping = self.drag * (speed * unit + 2.0 * v[i] * v[j]);
+                out[2 * j + i] = self.tangent * (weights.stiffness * stiffness + weights.damping * damping);
+            }
+        }
+        Ok(())
+    }
+    fn damping_force(&mut self, _: &[f64], v: &[f64], out: &mut [f64]) -> Damping {
+        if self.drag == 0.0 {
+            return Damping::None;
+        }
+        let speed = v[0] * v[0] + v[1] * v[1];
+        out.copy_from_slice(&[self.drag * speed * v[0], self.drag * speed * v[1]]);
+        Damping::Present
+    }
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        Some(0.5 * self.axial * self.length * self.strain(self.place(u)).powi(2))
+    }
+}
+
+const VELOCITY: [f64; 2] = [-1.0, 7.0];
+
+/// The pendulum at the time `until`, by the classical Runge–Kutta method with very small steps.
+fn exact(mut pendulum: Pendulum, until: f64) -> [f64; 4] {
+    let steps = 40_000;
+    let h = until / f64::from(steps);
+    let mut rate = |x: [f64; 4]| {
+        let mut force = [0.0; 2];
+        pendulum.force(0.0, &x[..2], &x[2..], &mut force).unwrap();
+        [x[2], x[3], force[0] / 10.0, force[1] / 10.0]
+    };
+    let add = |x: [f64; 4], c: f64, k: [f64; 4]| std::array::from_fn(|i| x[i] + c * k[i]);
+    (0..steps).fold([0.0, 0.0, VELOCITY[0], VELOCITY[1]], |x, _| {
+        let k1 = rate(x);
+        let k2 = rate(add(x, 0.5 * h, k1));
+        let k3 = rate(add(x, 0.5 * h, k2));
+        let k4 = rate(add(x, h, k3));
+        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
+    })
+}
+
+fn run(pendulum: Pendulum, scheme: Box<dyn TimeIntegrator>, h: f64) -> Simulation<'static, f64> {
+    Simulation::builder(pendulum, scheme, h).velocity(VELOCITY.to_vec()).build().unwrap()
+}
+
+#[test]
+fn a_linear_system_is_solved_as_by_the_direct_solve() {
+    for scheme in all().into_iter().filter(Listed::takes_multipliers) {
+        let bars = Bars::paper(10).delayed(0.3, 2e-3);
+        let build = |nonlinear: bool, newton: Option<Newton>| {
+            let system = bars.system::<f64>().rayleigh(0.0, 1e-5).unwrap();
+            let corrector = PersistencyCorrection::with_history_projection();
+            let corrector: Option<Box<dyn Corrector<f64>>> =
+                if scheme.takes_corrections() { Some(Box::new(corrector)) } else { None };
+            let system: Box<dyn System<f64>> = if nonlinear { Box::new(Unknowing(system)) } else { Box::new(system) };
+            let builder = Simulation::builder(system, (scheme.make)(), 2e-3)
+                .velocity(bars.velocities())
+                .constraint(bars.contact())
+                .correctors(corrector);
+            match newton {
+                Some(newton) => builder.newton(newton),
+                None => builder,
+            }
+            .build()
+            .unwrap()
+        };
+        let mut direct = build(false, None);
+        let mut others = [
+            build(true, None),
+            build(true, Some(Newton::modified().line_search())),
+            build(false, Some(Newton::full())),
+        ];
+        for step in 0..160 {
+            direct.step().unwrap();
+            for (which, run) in others.iter_mut().enumerate() {
+                run.step().unwrap();
+                let (one, other) = (direct.state(), run.state());
+                let name = format!("{}, variant {which}, step {step}", scheme.name());
+                close(one.displacement(), other.displacement(), 1e-9 * 0.01, &name);
+                close(one.velocity(), other.velocity(), 1e-7 * 0.05, &name);
+                close(one.contacts().forces(), other.contacts().forces(), 1e-6 * 0.0125, &name);
+                assert_eq!(one.contacts().closed(), other.contacts().closed(), "{name}");
+            }
+        }
+        // A linear force converges at once: a residual of rounding after the first iteration.
+        let [nonlinear, _, linear] = &others;
+        let stages = (scheme.make)().tableau().stages.len() as u64;
+        assert!(nonlinear.statistics().newton_iterations <= 2 * 161 * stages, "{}", scheme.name());
+        assert_eq!(linear.statistics().factorizations, direct.statistics().factorizations);
+    }
+}
+
+fn close(one: &[f64], other: &[f64], tolerance: f64, name: &str) {
+    for (i, (x, y)) in one.iter().zip(other).enumerate() {
+        assert!((x - y).abs() <= tolerance, "{name}: entry {i} is {x:e} and {y:e}");
+    }
+}
+
+#[test]
+fn every_scheme_has_its_order_on_a_nonlinear_motion() {
+    let pendulum = || Pendulum { drag: 0.02, ..Pendulum::new(2e3) };
+    let until = 1.0;
+    let reference = exact(pendulum(), until);
+    for scheme in all() {
+        let steps: f64 = if scheme.order == 1 { 4000.0 } else { 400.0 };
+        let errors = [steps, 2.0 * steps].map(|steps| {
+            let mut run = run(pendulum(), (scheme.make)(), until / steps);
+            run.run_until(until, &mut ()).unwrap();
+            let (u, v) = (run.state().displacement(), run.state().velocity());
+            let in_u = (u[0] - reference[0]).hypot(u[1] - reference[1]);
+            let in_v = (v[0] - reference[2]).hypot(v[1] - reference[3]);
+            [in_u, in_v]
+        });
+        for (coarse, fine) in errors[0].iter().zip(errors[1]) {
+            let order = (coarse / fine).log2();
+            assert!((order - f64::from(scheme.order)).abs() < 0.15, "{}: order {order}, {fine:e}", scheme.name());
+        }
+    }
+}
+
+/// Exponents of the residuals of a step: quadratic convergence doubles them.
+fn exponents(run: &Simulation<'_, f64>) -> Vec<f64> {
+    run.convergence().iter().map(|iteration| -iteration.residual.log10()).collect()
+}
+
+#[test]
+fn convergence_is_quadratic() {
+    let schemes: [(fn() -> Box<dyn TimeIntegrator>, f64); 4] = [
+        (|| Box::new(Composite), 0.16),
+        (|| Box::new(Newmark::trapezoidal()), 0.16),
+        (|| Box::new(Bathe::default()), 0.4),
+        (|| Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()), 0.16),
+    ];
+    for (make, h) in schemes {
+        let mut run = Simulation::builder(Pendulum { drag: 0.02, ..Pendulum::new(2e3) }, make(), h)
+            .velocity(VELOCITY.to_vec())
+            .newton(Newton::full().tolerances(1e-14, 1e-14).unwrap())
+            .build()
+            .unwrap();
+        let mut seen = 0;
+        for _ in 0..12 {
+            run.step().unwrap();
+            // r_{k+1} = C r_k²: the constant is the same for each pair above rounding.
+            let residuals: Vec<f64> = run.convergence().iter().map(|it| it.residual).filter(|&r| r > 1e-13).collect();
+            let constants: Vec<f64> = residuals.windows(2).map(|r| r[1] / (r[0] * r[0])).collect();
+            for pair in constants.windows(2) {
+                seen += 1;
+                assert!((0.1..10.0).contains(&(pair[1] / pair[0])), "{}: {:?}", make().name(), exponents(&run));
+            }
+        }
+        assert!(seen >= 5, "{}: {seen} pairs, {:?}", make().name(), exponents(&run));
+    }
+}
+
+#[test]
+fn a_modified_iteration_is_linear_and_finds_the_same() {
+    let start = |newton| {
+        Simulation::builder(Pendulum::new(2e3), Composite, 0.02)
+            .velocity(VELOCITY.to_vec())
+            .newton(newton)
+            .build()
+            .unwrap()
+    };
+    let (mut full, mut modified) = (start(Newton::full()), start(Newton::modified()));
+    let mut searching = start(Newton::full().line_search());
+    for _ in 0..200 {
+        for run in [&mut full, &mut modified, &mut searching] {
+            run.step().unwrap();
+        }
+    }
+    for run in [&modified, &searching] {
+        close(full.state().displacement(), run.state().displacement(), 1e-6, "displacement");
+    }
+    let [full, modified] = [full, modified].map(|run| *run.statistics());
+    assert!(modified.newton_iterations > full.newton_iterations);
+    // One factorization a step, and two when the scheme and its start were compiled.
+    assert_eq!(modified.factorizations, 200 + 2);
+    assert!(full.factorizations > modified.factorizations);
+}
+
+/// A pendulum inside a circle, on which it slides after the first contact.
+fn sliding(scheme: Box<dyn TimeIntegrator>, h: f64, newton: Newton) -> Simulation<'static, f64> {
+    let circle = Sphere::new([0.0, 0.0], 3.02, Side::Inside).unwrap();
+    let contact = NodesOnObstacle::new(circle, &[[3.0, 0.0]], &[[0, 1]], &[0]).unwrap();
+    Simulation::builder(Pendulum::new(200.0), scheme, h)
+        .velocity(vec![2.0, 7.0])
+        .constraint(contact)
+        .corrector(PersistencyCorrection::with_history_projection())
+        .newton(newton)
+        .build()
+        .unwrap()
+}
+
+#[test]
+fn curved_gaps_are_met_where_the_step_ends() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 5] = [
+        || Box::new(Composite),
+        || Box::new(Newmark::trapezoidal()),
+        || Box::new(Bathe::default()),
+        || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+        || Box::new(EnergyMomentum),
+    ];
+    for make in schemes {
+        let mut run = sliding(make(), 0.02, Newton::full());
+        let (mut closed, mut deepest, mut most) = (0, 0.0_f64, 0);
+        for _ in 0..200 {
+            run.step().unwrap();
+            let u = run.state().displacement();
+            let gap = 3.02 - (3.0 + u[0]).hypot(u[1]);
+            deepest = deepest.min(gap);
+            if run.state().contacts().raw_forces()[0] > 0.0 {
+                closed += 1;
+                assert!(gap.abs() < 1e-12, "{}: pressed with a gap of {gap:e}", make().name());
+                // The normal is that of the end of the step: velocity along it is removed.
+                let v = run.state().velocity();
+                let rate = ((3.0 + u[0]) * v[0] + u[1] * v[1]) / 3.02;
+                assert!(rate.abs() < 1e-9, "{}: rate {rate:e}", make().name());
+            }
+            most = most.max(run.convergence().len());
+        }
+        assert!(closed > 20, "{}: {closed} pressed steps", make().name());
+        assert!(deepest > -1e-12, "{}: {deepest:e}", make().name());
+        assert!(most <= 5, "{}: {most} iterations", make().name());
+    }
+}
+
+#[test]
+fn contact_on_a_curved_obstacle_leaves_convergence_quadratic() {
+    let mut run = sliding(Box::new(Composite), 0.1, Newton::full().tolerances(1e-14, 1e-14).unwrap());
+    let mut seen = 0;
+    for _ in 0..60 {
+        run.step().unwrap();
+        let residuals: Vec<f64> = run.convergence().iter().map(|it| it.residual).collect();
+        if run.state().contacts().raw_forces()[0] > 0.0 {
+            for r in residuals.windows(2) {
+                seen += 1;
+                assert!(r[1] < 10.0 * r[0] * r[0] + 1e-13, "{:?}", exponents(&run));
+            }
+        }
+    }
+    assert!(seen > 10, "{seen}");
+}
+
+#[test]
+fn failures_say_what_happened_and_leave_no_trace() {
+    // A tangent of the wrong sign.
+    let mut run = run(Pendulum { tangent: -0.9, ..Pendulum::new(2e4) }, Box::new(Newmark::trapezoidal()), 0.08);
+    let before = run.state().clone();
+    match run.step() {
+        Err(Error::IndefiniteTangent { iteration: 1.., .. } | Error::NewtonNotConverged { .. }) => {}
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(*run.state(), before);
+    // One that is half of what it should be: too few iterations.
+    let wrong = Pendulum { tangent: 0.5, drag: 0.02, ..Pendulum::new(2e3) };
+    let mut run = Simulation::builder(wrong, Composite, 0.05)
+        .velocity(VELOCITY.to_vec())
+        .newton(Newton::full().iterations(3).unwrap())
+        .build()
+        .unwrap();
+    let error = run.step().unwrap_err();
+    assert!(error.is_recoverable());
+    match &error {
+        Error::NewtonNotConverged { t, h, iterations: 3, residual, increment, dof: 0 | 1 } => {
+            assert_eq!((*t, *h), (0.0, 0.05));
+            assert_eq!(*residual, run.convergence()[2].residual);
+            assert_eq!(*increment, run.convergence()[2].increment);
+        }
+        other => panic!("{other:?}"),
+    }
+    for (force, displacement) in [(0.0, 1e-8), (1e-9, 1.0), (f64::NAN, 0.1)] {
+        assert!(matches!(Newton::full().tolerances(force, displacement), Err(Error::Parameter { .. })));
+    }
+    assert!(matches!(Newton::full().iterations(0), Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn a_system_without_energy_is_refused_by_the_conserving_scheme() {
+    struct Plain(Pendulum);
+    impl System<f64> for Plain {
+        fn dofs(&self) -> usize {
+            2
+        }
+        fn mass(&self) -> Mass<'_, f64> {
+            self.0.mass()
+        }
+        fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+            self.0.force(t, u, v, out)
+        }
+        fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+            self.0.pattern()
+        }
+        fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+            self.0.tangent(t, u, v, w, out)
+        }
+    }
+    let plain = Plain(Pendulum::new(1e3));
+    assert_eq!(System::<f64>::linearity(&plain), Linearity::Nonlinear);
+    match Simulation::builder(plain, EnergyMomentum, 0.01).build() {
+        Err(Error::Incompatible { part, .. }) => assert_eq!(part, "energy–momentum"),
+        other => panic!("{:?}", other.map(drop)),
+    }
+}
