@@ -2,8 +2,10 @@
 
 pub mod bars;
 pub mod drops;
+pub mod hyperelastic;
 pub mod measure;
 pub mod output;
+pub mod particles;
 pub mod plot;
 pub mod schemes;
 pub mod solids;
