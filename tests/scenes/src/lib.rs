@@ -11,6 +11,7 @@ pub mod schemes;
 pub mod solids;
 pub mod springs;
 pub mod tables;
+pub mod truss;
 pub mod wall_bar;
 
 pub use bars::{Bars, MassKind};
