@@ -77,9 +77,10 @@ pub struct ForceMismatch {
 ///
 /// # Errors
 ///
-/// [`Error::Empty`] without dofs, [`Error::Dimension`] if u, v, the mass or the pattern do not have the size of the system,
-/// [`Error::Incompatible`] for a pattern out of order, [`Error::Asymmetric`] for a mass that is not symmetric, [`Error::NotFinite`] for u and v, [`Error::Parameter`] for steps that are not positive or too
-/// small to change u or v, and those of the system.
+/// [`Error::Empty`] without dofs; [`Error::Dimension`] if u, v, the mass or the pattern do not have the size of the
+/// system; [`Error::Incompatible`] for a pattern out of order; [`Error::Asymmetric`] and [`Error::MatrixNotFinite`] for the
+/// mass; [`Error::NotFinite`] for u and v; [`Error::Parameter`] for steps that are not positive or too small to change
+/// u or v; and those of the system.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};

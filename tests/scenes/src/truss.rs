@@ -238,8 +238,8 @@ impl<const D: usize> System<f64> for Truss<D> {
         weights: TangentWeights<f64>,
         out: &mut [f64],
     ) -> Result<()> {
-        // The exact derivative is EA/L³ x̄ x(to)ᵀ + N̄/L 1. What is neglected, EA/L³ x̄ (x(to) − x̄)ᵀ, is nilpotent for a bar that
-        // turns without a change of length, where x̄ is normal to x(to) − x̄.
+        // The exact derivative is EA/L³ x̄ x(to)ᵀ + N̄/L 1. What is neglected, EA/L³ x̄ (x(to) − x̄)ᵀ, is nilpotent for a bar
+        // that turns without a change of length: x̄ is then normal to x(to) − x̄.
         self.add_stiffness(weights.stiffness, out, |bar| bar.along(path));
         Ok(())
     }
@@ -347,9 +347,9 @@ mod tests {
         assert!((truss.particles.mass.iter().sum::<f64>() - 3.0 * 0.3 * length).abs() < 1e-12);
     }
 
-    /// Places of the pendulum's mass at 1, 2 and 10 by the classical Runge–Kutta method, with the last state.
-    fn integrated(axial: f64, h: f64) -> (Vec<(f64, [f64; 2])>, Truss<2>, Vec<f64>, Vec<f64>) {
-        let mut pendulum = Truss::pendulum(axial);
+    /// Places of the pendulum's mass at 1, 2 and 10 by the classical Runge–Kutta method, and the last u and v.
+    fn integrated(pendulum: &mut Truss<2>, h: f64) -> (Vec<PendulumReference>, [Vec<f64>; 2]) {
+        let axial = pendulum.bars[0].axial;
         let mut rates = |y: [f64; 4]| {
             let mut force = [0.0; 4];
             pendulum.force(0.0, &[0.0, 0.0, y[0], y[1]], &[0.0; 4], &mut force).unwrap();
@@ -366,18 +366,20 @@ mod tests {
             let k4 = rates(add(y, h, k3));
             y = std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
             if [1, 2, 10].contains(&(step / steps)) && step % steps == 0 {
-                places.push(((step / steps) as f64, [PendulumReference::LENGTH + y[0], y[1]]));
+                let place = [PendulumReference::LENGTH + y[0], y[1]];
+                places.push(PendulumReference { axial, t: (step / steps) as f64, place });
             }
         }
-        (places, pendulum, vec![0.0, 0.0, y[0], y[1]], vec![0.0, 0.0, y[2], y[3]])
+        (places, [vec![0.0, 0.0, y[0], y[1]], vec![0.0, 0.0, y[2], y[3]]])
     }
 
     #[test]
     fn the_pendulum_meets_its_reference() {
         for (axial, h) in [(1e4, 1e-4), (1e7, 2e-5)] {
-            let (places, mut pendulum, u, v) = integrated(axial, h);
+            let mut pendulum = Truss::pendulum(axial);
+            let (places, [u, v]) = integrated(&mut pendulum, h);
             for reference in PendulumReference::PLACES.iter().filter(|reference| reference.axial == axial) {
-                let (_, place) = places.iter().find(|(t, _)| *t == reference.t).unwrap();
+                let PendulumReference { place, .. } = places.iter().find(|place| place.t == reference.t).unwrap();
                 for (x, expected) in place.iter().zip(reference.place) {
                     println!("{axial:e} {}: {:e}", reference.t, x - expected);
                     assert!((x - expected).abs() < 1e-7, "{reference:?} {place:?}");
