@@ -2,13 +2,16 @@
 
 pub mod bars;
 pub mod drops;
+pub mod hyperelastic;
 pub mod measure;
 pub mod output;
+pub mod particles;
 pub mod plot;
 pub mod schemes;
 pub mod solids;
 pub mod springs;
 pub mod tables;
+pub mod truss;
 pub mod wall_bar;
 
 pub use bars::{Bars, MassKind};

@@ -25,7 +25,7 @@ impl Material {
     }
 
     /// Lamé's λ and μ.
-    fn lame(&self) -> [f64; 2] {
+    pub fn lame(&self) -> [f64; 2] {
         let Self { young, poisson, .. } = *self;
         [young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson))]
     }
@@ -263,7 +263,7 @@ impl<const D: usize> Solid<D> {
     }
 
     /// Shape functions, their derivatives in space, and weight times volume, at the Gauss points of an element.
-    fn gauss_points(&self, element: &[usize]) -> Vec<(Vec<f64>, Vec<[f64; D]>, f64)> {
+    pub(crate) fn gauss_points(&self, element: &[usize]) -> Vec<(Vec<f64>, Vec<[f64; D]>, f64)> {
         let point = |k: usize| {
             let shapes = shapes::<D>(corner::<D>(k).map(|x| x / 3.0_f64.sqrt()));
             // jacobian[i][j] = ∂x_j/∂ξ_i

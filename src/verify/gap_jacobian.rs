@@ -1,0 +1,115 @@
+//! The rows of a constraint against differences of its gaps.
+
+use crate::contact::{ContactConstraint, ContactJacobian, GapRates};
+use crate::error::Result;
+use crate::real::Real;
+
+/// How far the rows of a constraint are from the derivatives of its gaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct GapJacobianError {
+    /// Rows compared.
+    pub rows: usize,
+    /// Largest difference between an entry of G and the derivative of the gap: a number, weights being of order one.
+    pub jacobian: f64,
+    /// The contact (feature, candidate) and the dof of that entry.
+    pub worst: ((usize, usize), usize),
+    /// Largest difference between a rate ∂g/∂t and the derivative of the gap (length/time).
+    pub rate: f64,
+    /// Rows that some displacement made vanish, compared as far as they were there.
+    pub rows_lost: usize,
+}
+
+/// Compares G and the gap rates of a constraint with central differences of its gap.
+///
+/// The gap is that after a [`search`](ContactConstraint::search) at the displaced position, so the check sees what the rows
+/// are linearized from, not only the rows themselves. `step` is the size of the displacements (length): small against
+/// what changes the geometry, large against its rounding, for instance 1e-6 of an element. Rows that a displacement makes
+/// appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out; at edges and kinks the gap has
+/// no derivative, so check at positions that are inside of facets. Time is varied by `step` over the largest speed in
+/// `v`, without another search. The constraint is left as after a search at (t, u, v).
+///
+/// # Errors
+///
+/// Those of the searches, and [`Error::MissingDof`](crate::Error::MissingDof) of
+/// [`check`](ContactConstraint::check).
+///
+/// ```
+/// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
+/// use contact_dynamics::verify;
+///
+/// let ball = Sphere::new([0.0, 0.0, 0.0], 1.0, Side::Outside)?;
+/// let mut contact = NodesOnObstacle::new(ball, &[[0.8, 0.5, 0.7]], &[[0, 1, 2]], &[0])?
+///     .moving(|t| [[0.0, 0.3 * t, 0.0], [0.0, 0.3, 0.0], [0.0; 3]]);
+/// let error = verify::gap_jacobian(&mut contact, 0.0, &[0.01, 0.0, -0.02], &[1.0; 3], 1e-5)?;
+/// assert!(error.rows == 1 && error.jacobian < 1e-9 && error.rate < 1e-6, "{error:?}");
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+pub fn gap_jacobian<T: Real>(
+    constraint: &mut dyn ContactConstraint<T>,
+    t: f64,
+    u: &[T],
+    v: &[T],
+    step: f64,
+) -> Result<GapJacobianError> {
+    constraint.check(u.len())?;
+    constraint.search(t, u, v)?;
+    let rows = constraint.candidates();
+    let ids: Vec<_> = (0..rows).map(|row| constraint.identity(row)).collect();
+    let mut g = ContactJacobian::default();
+    constraint.jacobian(&mut g);
+    let mut dofs = Vec::new();
+    constraint.dofs(&mut dofs);
+    dofs.sort_unstable();
+    dofs.dedup();
+
+    let mut error = GapJacobianError { rows, jacobian: 0.0, worst: ((0, 0), 0), rate: 0.0, rows_lost: 0 };
+    let mut lost = vec![false; rows];
+    // Rates first, while the rows are those of the search at u.
+    let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
+    let delay = if speed > 0.0 { step / speed } else { step };
+    let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
+    let mut rates = vec![GapRates::default(); rows];
+    constraint.rates(t, u, v, &mut rates);
+    constraint.gap(t - delay, u, &mut before);
+    constraint.gap(t + delay, u, &mut after);
+    for (rate, (&before, &after)) in rates.iter().zip(before.iter().zip(&after)) {
+        let difference = (after.value() - before.value()) / (2.0 * delay);
+        error.rate = error.rate.max((difference - rate.rate.value()).abs());
+    }
+
+    let mut displaced = u.to_vec();
+    for &dof in &dofs {
+        let mut gaps = [vec![None; rows], vec![None; rows]];
+        let mut places = [0.0; 2];
+        for ((gaps, place), sign) in gaps.iter_mut().zip(&mut places).zip([-1.0, 1.0]) {
+            displaced[dof] = u[dof] + T::of(sign * step);
+            *place = displaced[dof].value();
+            constraint.search(t, &displaced, v)?;
+            let mut found = vec![T::zero(); constraint.candidates()];
+            constraint.gap(t, &displaced, &mut found);
+            for (row, &gap) in found.iter().enumerate() {
+                let id = constraint.identity(row);
+                if let Some(at) = ids.iter().position(|other| *other == id) {
+                    gaps[at] = Some(gap.value());
+                }
+            }
+        }
+        displaced[dof] = u[dof];
+        for row in 0..rows {
+            let entry: f64 = g.row(row).filter(|entry| entry.0 == dof).map(|entry| entry.1.value()).sum();
+            match (gaps[0][row], gaps[1][row]) {
+                (Some(before), Some(after)) => {
+                    let difference = ((after - before) / (places[1] - places[0]) - entry).abs();
+                    if difference > error.jacobian || !difference.is_finite() {
+                        (error.jacobian, error.worst) = (difference, (ids[row], dof));
+                    }
+                }
+                _ => lost[row] = true,
+            }
+        }
+    }
+    constraint.search(t, u, v)?;
+    error.rows_lost = lost.iter().filter(|&&lost| lost).count();
+    Ok(error)
+}

@@ -1,0 +1,488 @@
+//! Elastic bodies at large strains, total Lagrangian: the elements of [`Solid`] with nonlinear materials.
+
+use crate::particles::{Assembly, Particles};
+use crate::solids::Solid;
+use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
+use contact_dynamics::{Error, Linearity, Mass, Path, PathForce, Result, System, TangentWeights};
+
+/// A nonlinear material with the Lamé constants λ and μ; both laws are Hooke's at small strains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Law {
+    /// W = ½ μ (tr C − 3 − 2 ln J) + ½ λ (ln J)².
+    NeoHookean,
+    /// W = ½ λ (tr E)² + μ E:E with Green's strain E.
+    StVenantKirchhoff,
+}
+
+/// A body of quad4 (plane strain) or hex8 elements with lumped mass.
+#[derive(Clone, Debug)]
+pub struct Hyperelastic<const D: usize> {
+    pub particles: Particles<D>,
+    law: Law,
+    lambda: f64,
+    mu: f64,
+    /// The corners of the elements, one element behind the other.
+    elements: Vec<usize>,
+    points: Vec<Point<D>>,
+    assembly: Assembly<D>,
+}
+
+/// More than the corners of a hex8 are not met; a quad4 leaves half of them unused.
+const CORNERS: usize = 8;
+
+type Tensor<const D: usize> = [[f64; D]; D];
+
+/// A Gauss point.
+#[derive(Clone, Debug)]
+struct Point<const D: usize> {
+    /// Derivatives of the shape functions in the reference configuration.
+    gradients: [[f64; D]; CORNERS],
+    /// Weight times volume.
+    volume: f64,
+}
+
+/// Deformation at a point.
+#[derive(Clone, Copy)]
+struct Deformation<const D: usize> {
+    /// Deformation gradient F.
+    gradient: Tensor<D>,
+    /// ∂u/∂X = F − 1: strains are formed from it, without loss of digits where they are small.
+    displacement_gradient: Tensor<D>,
+}
+
+fn tensor<const D: usize>(entry: impl Fn(usize, usize) -> f64) -> Tensor<D> {
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|i| a[i] * b[i]).sum()
+}
+
+fn apply<const D: usize>(a: &Tensor<D>, x: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|i| dot(&a[i], x))
+}
+
+/// Determinant and cofactors: ∂ det/∂ a.
+fn cofactors<const D: usize>(a: &Tensor<D>) -> (f64, Tensor<D>) {
+    let cofactor = |i: usize, j: usize| {
+        let (p, q) = ((i + 1) % D, (j + 1) % D);
+        if D == 2 {
+            return if i == j { a[p][q] } else { -a[p][q] };
+        }
+        let (r, s) = ((i + 2) % D, (j + 2) % D);
+        a[p][q] * a[r][s] - a[p][s] * a[r][q]
+    };
+    let cofactors = tensor(cofactor);
+    (dot(&a[0], &cofactors[0]), cofactors)
+}
+
+impl<const D: usize> Point<D> {
+    fn deformation(&self, element: &[usize], u: &[f64]) -> Deformation<D> {
+        let mut h = [[0.0; D]; D];
+        for (&node, gradient) in element.iter().zip(&self.gradients) {
+            for i in 0..D {
+                for j in 0..D {
+                    h[i][j] += u[D * node + i] * gradient[j];
+                }
+            }
+        }
+        Deformation { gradient: tensor(|i, j| h[i][j] + f64::from(u8::from(i == j))), displacement_gradient: h }
+    }
+}
+
+impl<const D: usize> Deformation<D> {
+    fn green_strain(&self) -> Tensor<D> {
+        let h = &self.displacement_gradient;
+        tensor(|i, j| 0.5 * (h[i][j] + h[j][i] + (0..D).map(|k| h[k][i] * h[k][j]).sum::<f64>()))
+    }
+}
+
+impl<const D: usize> Hyperelastic<D> {
+    pub fn new(solid: &Solid<D>, law: Law) -> Self {
+        let [lambda, mu] = solid.material.lame();
+        let points = solid.elements.iter().flat_map(|element| solid.gauss_points(element));
+        let points = points.map(|(_, derivatives, volume)| {
+            let mut gradients = [[0.0; D]; CORNERS];
+            gradients[..derivatives.len()].copy_from_slice(&derivatives);
+            Point { gradients, volume }
+        });
+        let elements = solid.elements.concat();
+        Self {
+            particles: Particles::new(solid.nodes.clone(), solid.lumped_mass()),
+            law,
+            lambda,
+            mu,
+            points: points.collect(),
+            assembly: Assembly::new(solid.nodes.len(), 1 << D, &elements),
+            elements,
+        }
+    }
+
+    #[must_use]
+    pub fn gravity(mut self, gravity: [f64; D]) -> Self {
+        self.particles.weigh(gravity);
+        self
+    }
+
+    #[must_use]
+    pub fn fix(mut self, dofs: Vec<usize>) -> Self {
+        self.particles.fix(dofs);
+        self
+    }
+
+    /// Elements, each with its corners and its Gauss points.
+    fn elements(&self) -> impl Iterator<Item = (usize, &[usize], &[Point<D>])> {
+        let corners = 1 << D;
+        let parts = self.elements.chunks_exact(corners).zip(self.points.chunks_exact(corners));
+        parts.enumerate().map(|(index, (element, points))| (index, element, points))
+    }
+
+    fn second_stress(&self, strain: &Tensor<D>) -> Tensor<D> {
+        let pressure = self.lambda * (0..D).map(|i| strain[i][i]).sum::<f64>();
+        tensor(|i, j| 2.0 * self.mu * strain[i][j] + if i == j { pressure } else { 0.0 })
+    }
+
+    fn energy_density(&self, deformation: &Deformation<D>) -> f64 {
+        let strain = deformation.green_strain();
+        let trace: f64 = (0..D).map(|i| strain[i][i]).sum();
+        match self.law {
+            Law::StVenantKirchhoff => {
+                0.5 * self.lambda * trace * trace + self.mu * strain.iter().map(|row| dot(row, row)).sum::<f64>()
+            }
+            Law::NeoHookean => {
+                // tr C − 3 = 2 tr E in the plane too, where F₃₃ = 1.
+                let dilatation = cofactors(&deformation.gradient).0.ln();
+                self.mu * (trace - dilatation) + 0.5 * self.lambda * dilatation * dilatation
+            }
+        }
+    }
+
+    /// `out −= ∫ P·∇N` of one point with first Piola–Kirchhoff stress P.
+    fn subtract(point: &Point<D>, element: &[usize], stress: &Tensor<D>, out: &mut [f64]) {
+        for (&node, gradient) in element.iter().zip(&point.gradients) {
+            for i in 0..D {
+                out[D * node + i] -= point.volume * dot(&stress[i], gradient);
+            }
+        }
+    }
+
+    /// Adds the stiffness of St. Venant–Kirchhoff at a deformation gradient F and a stress S of its own.
+    fn add_stiffness(
+        &self,
+        index: usize,
+        point: &Point<D>,
+        f: &Tensor<D>,
+        s: &Tensor<D>,
+        weight: f64,
+        out: &mut [f64],
+    ) {
+        let [lambda, mu, weight] = [self.lambda, self.mu, weight * point.volume];
+        let g = &point.gradients;
+        let (pushed, stressed) = (g.map(|g| apply(f, &g)), g.map(|g| apply(s, &g)));
+        let left: Tensor<D> = tensor(|i, k| dot(&f[i], &f[k]));
+        self.assembly.add(index, out, |a, b| {
+            let (geometric, shear) = (dot(&g[a], &stressed[b]), mu * dot(&g[a], &g[b]));
+            let (pa, pb) = (&pushed[a], &pushed[b]);
+            tensor(|i, k| {
+                let diagonal = if i == k { geometric } else { 0.0 };
+                weight * (lambda * pa[i] * pb[k] + mu * pb[i] * pa[k] + shear * left[i][k] + diagonal)
+            })
+        });
+    }
+
+    /// Determinant and cofactors of a deformation gradient, if the element is not turned inside out.
+    fn admitted(callback: &'static str, element: usize, f: &Tensor<D>) -> Result<(f64, Tensor<D>)> {
+        let (det, cofactors) = cofactors(f);
+        match det > 0.0 {
+            true => Ok((det, cofactors)),
+            false => {
+                Err(Error::Inadmissible { callback, source: format!("element {element}: det F = {det:e}").into() })
+            }
+        }
+    }
+
+    /// Mean deformation gradient and mean stress ½ (S(from) + S(to)).
+    fn along(&self, [from, to]: [Deformation<D>; 2]) -> [Tensor<D>; 2] {
+        let (before, after) = (from.green_strain(), to.green_strain());
+        let stress = self.second_stress(&tensor(|i, j| 0.5 * (before[i][j] + after[i][j])));
+        [tensor(|i, j| 0.5 * (from.gradient[i][j] + to.gradient[i][j])), stress]
+    }
+}
+
+impl<const D: usize> System<f64> for Hyperelastic<D> {
+    fn dofs(&self) -> usize {
+        self.particles.dofs()
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::Nonlinear
+    }
+
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.particles.mass)
+    }
+
+    fn force(&mut self, _: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
+        out.copy_from_slice(&self.particles.load);
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let deformation = point.deformation(element, u);
+                let f = &deformation.gradient;
+                let (det, cofactors) = Self::admitted("force", index, f)?;
+                let stress = match self.law {
+                    Law::StVenantKirchhoff => {
+                        let s = self.second_stress(&deformation.green_strain());
+                        tensor(|i, j| dot(&f[i], &s[j]))
+                    }
+                    Law::NeoHookean => {
+                        let factor = (self.lambda * det.ln() - self.mu) / det;
+                        tensor(|i, j| self.mu * f[i][j] + factor * cofactors[i][j])
+                    }
+                };
+                Self::subtract(point, element, &stress, out);
+            }
+        }
+        Ok(())
+    }
+
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.assembly.pattern.as_ref()
+    }
+
+    fn tangent(&mut self, _: f64, u: &[f64], _: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        out.fill(0.0);
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let deformation = point.deformation(element, u);
+                let f = &deformation.gradient;
+                let (det, cofactors) = Self::admitted("tangent", index, f)?;
+                match self.law {
+                    Law::StVenantKirchhoff => {
+                        let s = self.second_stress(&deformation.green_strain());
+                        self.add_stiffness(index, point, f, &s, weights.stiffness, out);
+                    }
+                    Law::NeoHookean => {
+                        let g = &point.gradients;
+                        // Gradients in the current configuration.
+                        let spatial = g.map(|g| apply(&cofactors, &g).map(|x| x / det));
+                        let [lambda, mu, weight] = [self.lambda, self.mu, weights.stiffness * point.volume];
+                        let shear = mu - lambda * det.ln();
+                        self.assembly.add(index, out, |a, b| {
+                            let diagonal = mu * dot(&g[a], &g[b]);
+                            let (sa, sb) = (&spatial[a], &spatial[b]);
+                            tensor(|i, k| {
+                                let diagonal = if i == k { diagonal } else { 0.0 };
+                                weight * (lambda * sa[i] * sb[k] + shear * sb[i] * sa[k] + diagonal)
+                            })
+                        });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn force_along(&mut self, _: f64, path: Path<'_, f64>, _: &[f64], out: &mut [f64]) -> Result<PathForce> {
+        if self.law != Law::StVenantKirchhoff {
+            return Ok(PathForce::None);
+        }
+        out.copy_from_slice(&self.particles.load);
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
+                Self::admitted("force_along", index, &ends[1].gradient)?;
+                let [f, s] = self.along(ends);
+                Self::subtract(point, element, &tensor(|i, j| dot(&f[i], &s[j])), out);
+            }
+        }
+        Ok(PathForce::Present)
+    }
+
+    fn tangent_along(
+        &mut self,
+        t: f64,
+        path: Path<'_, f64>,
+        v: &[f64],
+        weights: TangentWeights<f64>,
+        out: &mut [f64],
+    ) -> Result<()> {
+        if self.law != Law::StVenantKirchhoff {
+            return self.tangent(t, path.mean, v, weights, out);
+        }
+        out.fill(0.0);
+        // The exact derivative has F(to) on one side of the material part; F̄ on both makes it symmetric.
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
+                Self::admitted("tangent_along", index, &ends[1].gradient)?;
+                let [f, s] = self.along(ends);
+                self.add_stiffness(index, point, &f, &s, weights.stiffness, out);
+            }
+        }
+        Ok(())
+    }
+
+    /// NaN if an element of a Neo-Hookean body is turned inside out.
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        let element = |(_, element, points): (usize, &[usize], &[Point<D>])| {
+            let density = |point: &Point<D>| point.volume * self.energy_density(&point.deformation(element, u));
+            points.iter().map(density).sum::<f64>()
+        };
+        Some(self.elements().map(element).sum())
+    }
+
+    fn external_load(&mut self, _: f64, out: &mut [f64]) {
+        out.copy_from_slice(&self.particles.load);
+    }
+
+    fn prescribed(&self) -> &[usize] {
+        &self.particles.fixed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::particles::tests::{
+        asymmetry, balance, check_force_along, check_tangent_along, force_at, largest, scattered, stiffness_at, turned,
+    };
+    use crate::solids::Material;
+    use contact_dynamics::verify;
+
+    const RUBBER: Material = Material { young: 10.0, poisson: 0.35, density: 1.1 };
+    const LAWS: [Law; 2] = [Law::NeoHookean, Law::StVenantKirchhoff];
+
+    fn plate() -> Solid<2> {
+        Solid::rectangle([2.0, 1.0], [3, 2], RUBBER).mapped(|[x, y]| [x + 0.15 * y * y, y - 0.1 * x * y])
+    }
+
+    fn block() -> Solid<3> {
+        let bend = |[x, y, z]: [f64; 3]| [x + 0.1 * y * z, y - 0.1 * x * x, z + 0.12 * x * y];
+        Solid::block([1.0, 1.2, 0.9], [2, 2, 1], RUBBER).mapped(bend)
+    }
+
+    /// Stretched, turned by a large angle and scattered.
+    fn deformed<const D: usize>(body: &Hyperelastic<D>, angles: [f64; 2], phase: f64) -> Vec<f64> {
+        let scatter = scattered(body.particles.dofs(), 0.03, phase);
+        let u = body.particles.displaced(|x| turned(std::array::from_fn(|i| x[i] * [1.3, 0.85, 1.1][i]), angles));
+        u.iter().zip(&scatter).map(|(u, s)| u + s).collect()
+    }
+
+    fn check_tangent<const D: usize>(solid: &Solid<D>) {
+        for law in LAWS {
+            let mut body = Hyperelastic::new(solid, law).gravity([0.3; D]).fix(vec![0, 1, 4]);
+            let u = deformed(&body, [0.9, -0.6], 0.2);
+            let v = scattered(u.len(), 1.0, 0.1);
+            let error = verify::tangent(&mut body, 0.0, &u, &v, 1e-5, 1e-5).unwrap();
+            println!("{law:?} {D}: {:e}", error.largest());
+            assert!(error.largest() < 1e-7 && error.potential.is_some(), "{law:?}: {error:?}");
+            let k = stiffness_at(&mut body, &u);
+            assert!(asymmetry(body.pattern(), &k) <= 1e-15 * largest(&k));
+            assert_eq!(body.prescribed(), [0, 1, 4]);
+        }
+    }
+
+    #[test]
+    fn tangents_are_derivatives() {
+        check_tangent(&plate());
+        check_tangent(&block());
+    }
+
+    fn check_small_strains<const D: usize>(solid: &Solid<D>) {
+        let linear = solid.stiffness::<f64>();
+        for law in LAWS {
+            let mut body = Hyperelastic::new(solid, law);
+            let k = stiffness_at(&mut body, &vec![0.0; solid.dofs()]);
+            assert_eq!(body.pattern().row_idx(), linear.row_idx());
+            let difference = k.iter().zip(linear.val()).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+            assert!(difference < 1e-14 * largest(&k), "{law:?} {difference:e}");
+        }
+    }
+
+    #[test]
+    fn small_strains_are_linear() {
+        check_small_strains(&plate());
+        check_small_strains(&block());
+    }
+
+    fn check_rotation<const D: usize>(solid: &Solid<D>) {
+        for law in LAWS {
+            let mut body = Hyperelastic::new(solid, law);
+            let u = body.particles.displaced(|x| turned(x, [2.0, -1.2]).map(|x| x + 3.0));
+            let (force, stiffness) = (force_at(&mut body, &u), stiffness_at(&mut body, &u));
+            let energy = body.potential_energy(&u).unwrap();
+            assert!(largest(&force) < 1e-14 * largest(&stiffness), "{law:?} {:e}", largest(&force));
+            assert!(energy.abs() < 1e-14 * RUBBER.young, "{law:?} {energy:e}");
+            // In equilibrium at any deformation.
+            let u = deformed(&body, [0.9, -0.6], 0.2);
+            let force = force_at(&mut body, &u);
+            let unbalanced = balance(&body.particles, &u, &force);
+            assert!(unbalanced < 1e-14, "{unbalanced:e}");
+        }
+    }
+
+    #[test]
+    fn rotations_give_no_force() {
+        check_rotation(&plate());
+        check_rotation(&block());
+    }
+
+    fn check_energy<const D: usize>(solid: &Solid<D>) {
+        let [lambda, mu] = RUBBER.lame();
+        let volume = solid.lumped_mass::<f64>().iter().step_by(D).sum::<f64>() / RUBBER.density;
+        let stretches = &[1.4, 0.8, 1.2][..D];
+        for law in LAWS {
+            let mut body = Hyperelastic::new(solid, law);
+            let u = body.particles.displaced(|x| turned(std::array::from_fn(|i| x[i] * stretches[i]), [1.0, 0.4]));
+            // Closed forms in three principal stretches, the third one 1 in plane strain.
+            let squares: f64 = stretches.iter().map(|l| l * l - 1.0).sum();
+            let logarithm = stretches.iter().product::<f64>().ln();
+            let density = match law {
+                Law::NeoHookean => 0.5 * mu * (squares - 2.0 * logarithm) + 0.5 * lambda * logarithm * logarithm,
+                Law::StVenantKirchhoff => {
+                    let fourth: f64 = stretches.iter().map(|l| (l * l - 1.0).powi(2)).sum();
+                    lambda / 8.0 * squares * squares + mu / 4.0 * fourth
+                }
+            };
+            let energy = body.potential_energy(&u).unwrap();
+            assert!((energy / (density * volume) - 1.0).abs() < 1e-13, "{law:?}");
+        }
+    }
+
+    #[test]
+    fn homogeneous_energies_are_closed_forms() {
+        check_energy(&plate());
+        check_energy(&block());
+    }
+
+    fn check_path<const D: usize>(solid: &Solid<D>) {
+        let mut body = Hyperelastic::new(solid, Law::StVenantKirchhoff);
+        let [from, to] = [([0.9, -0.6], 0.2), ([1.6, 0.1], 1.3)].map(|(angles, phase)| deformed(&body, angles, phase));
+        let particles = body.particles.clone();
+        let error = check_force_along(&mut body, &particles, &from, &to);
+        println!("along a path {D}: {error:e}");
+        assert!(error < 1e-13, "{error:e}");
+        let direction = scattered(from.len(), 1.0, 0.4);
+        check_tangent_along(&mut body, &from, &direction);
+    }
+
+    #[test]
+    fn mean_stress_conserves_energy_and_momenta() {
+        check_path(&plate());
+        check_path(&block());
+    }
+
+    #[test]
+    fn elements_inside_out_are_inadmissible() {
+        for law in LAWS {
+            let mut body = Hyperelastic::new(&plate(), law);
+            let u = body.particles.displaced(|[x, y]| [x, -0.5 * y]);
+            let (v, mut out) = (vec![0.0; u.len()], vec![0.0; body.pattern().row_idx().len()]);
+            let weights = TangentWeights { stiffness: 1.0, damping: 0.0 };
+            let tangent = body.tangent(0.0, &u, &v, weights, &mut out);
+            assert!(matches!(tangent, Err(Error::Inadmissible { callback: "tangent", .. })));
+            let error = body.force(0.0, &u, &v, &mut out[..u.len()]).unwrap_err();
+            assert!(error.is_recoverable() && matches!(error, Error::Inadmissible { callback: "force", .. }));
+        }
+    }
+}
