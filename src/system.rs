@@ -104,8 +104,8 @@ pub trait System<T: Real>: Send {
     /// `out = f` of a step along a path whose internal work is the change of the potential,
     /// f_int · (to − from) = V(to) − V(from), for [`EnergyMomentum`](crate::EnergyMomentum); t and v are those of the middle.
     /// For St. Venant–Kirchhoff materials it is the force of the mean stress ½ (S(from) + S(to)) on the mean
-    /// configuration, which conserves angular momentum too. Default: none; the force at the mean is then completed by
-    /// the potential.
+    /// configuration, which conserves angular momentum too. Default: none; the forces at start, middle and end are then
+    /// averaged by the potential.
     ///
     /// # Errors
     ///

@@ -11,14 +11,14 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// u' = u + ½ h (v + v'),     M (v' − v)/h = f(t + ½ h; u → u', v̄) + Gᵀ λ,     v̄ = ½ (v + v')
 /// ```
 ///
-/// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none, a
-/// blend of the forces of the midpoint and the trapezoidal rule that does that work; the latter reads
+/// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none, the
+/// mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; the latter reads
 /// [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and takes
 /// three forces an iteration.
 ///
 /// * Conserves the energy of conservative systems without contact, whatever the step, to the tolerance of
 ///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` does (the mean
-///   stress on the mean configuration does, the blend errs by O(h²)).
+///   stress on the mean configuration does, Simpson's mean errs by O(h²)).
 /// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a lives at the middle
 ///   of the step and is extrapolated for a [`State`](crate::State).
 /// * The exact tangent of a path is not symmetric; a symmetric one close to it takes a few iterations more.

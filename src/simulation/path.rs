@@ -23,9 +23,9 @@ impl<T: Real> PathWork<T> {
         self.start = system.potential_energy(from);
     }
 
-    /// `out =` the system's own force along the path, or a blend of the forces of the midpoint and the trapezoidal rule,
-    /// `(1 − θ) f(ū) + θ ½ (f(u₀) + f(u₁))`, with the θ for which the internal work is the change of the potential. Both
-    /// rules sum to no net force, hence the blend does; on a short path it is Simpson's rule, θ = ⅓.
+    /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end,
+    /// a f(u₀) + b f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such means
+    /// the one nearest to Simpson's rule. Each of the three sums to no net force, hence the mean does.
     pub(super) fn force(
         &mut self,
         system: &mut dyn System<T>,
@@ -40,27 +40,27 @@ impl<T: Real> PathWork<T> {
         let Self { start, load, scratch } = self;
         system.force(t, mean, v, out)?;
         let (Some(before), Some(after)) = (*start, system.potential_energy(to)) else { return Ok(()) };
+        let work = |force: &[T]| (0..to.len()).map(|i| force[i] * (to[i] - from[i])).sum::<T>();
+        // What is not internal: loads and damping, the same in all three.
         system.external_load(t, load);
         if system.damping_force(mean, v, scratch) == Damping::Present {
             T::axpy(-T::one(), scratch, load);
         }
-        let work = |force: &dyn Fn(usize) -> T| (0..to.len()).map(|i| force(i) * (to[i] - from[i])).sum::<T>();
-        let internal = work(&|i| out[i] - load[i]);
-        let miss = (after - before) + internal;
+        let other = work(load);
         system.force(t, from, v, scratch)?;
         system.force(t, to, v, load)?;
-        let half = T::of(0.5);
-        for ((trapezoidal, &end), &middle) in scratch.iter_mut().zip(load.iter()).zip(out.iter()) {
-            *trapezoidal = half * (*trapezoidal + end) - middle;
+        let works = [work(scratch), work(out), work(load)];
+        let simpson = [1.0, 4.0, 1.0].map(|weight| T::of(weight / 6.0));
+        let miss = other - (after - before) - works.iter().zip(simpson).map(|(&work, weight)| work * weight).sum::<T>();
+        let center = works.iter().copied().sum::<T>() / T::of(3.0);
+        let apart = works.map(|work| work - center);
+        let square = apart.iter().map(|&x| x * x).sum::<T>();
+        let rounding = T::of(64.0) * T::epsilon() * (before.abs() + after.abs() + other.abs());
+        let share = if miss.abs() > rounding && miss * miss <= square { miss / square } else { T::zero() };
+        let [a, b, c]: [T; 3] = std::array::from_fn(|k| simpson[k] + share * apart[k]);
+        for ((out, &start), &end) in out.iter_mut().zip(scratch.iter()).zip(load.iter()) {
+            *out = a * start + b * *out + c * end;
         }
-        let difference = work(&|i| scratch[i]);
-        let rounding = T::of(64.0) * T::epsilon() * (before.abs() + after.abs() + internal.abs());
-        let theta = -miss / difference;
-        let theta = match difference.abs() > rounding && theta.abs() <= T::of(10.0) {
-            true => theta,
-            false => T::of(1.0 / 3.0),
-        };
-        T::axpy(theta, scratch, out);
         Ok(())
     }
 }
