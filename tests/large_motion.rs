@@ -45,7 +45,7 @@ fn the_stiff_pendulum_swings_as_the_soft_one_does() {
 
 #[test]
 fn energy_and_angular_momentum_stay_for_a_hundred_thousand_steps() {
-    // Some 380 turns of the rigid pendulum.
+    // Some 400 turns of the rigid pendulum.
     for axial in [1e4, 1e7, 1e10] {
         let swing = Swing::run(Box::new(EnergyMomentum), axial, 0.01, 1000.0).unwrap();
         assert!(swing.failure.is_none(), "{axial}: {:?}", swing.failure);

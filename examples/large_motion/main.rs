@@ -74,7 +74,7 @@ const THROW: Throw = Throw {
     slide: 0.1,
     speed: 0.3,
     spin: 0.3,
-    height: 0.02,
+    height: 0.3,
     gravity: 0.02,
     courant: 1.0,
 };
