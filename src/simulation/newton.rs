@@ -23,7 +23,9 @@ pub(super) enum TangentUpdate {
 /// * the increment to come, estimated by ‖Δ‖ ‖r‖ / ‖r before‖, is at most `displacement` times the whole increment
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
-/// enters), or when increments are what rounding leaves of zero. Tolerances below 64 ε of the scalar are raised to it.
+/// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of the
+/// whole or within rounding of u, and the residual has fallen by `force` or falls no more. Tolerances below 64 ε of the
+/// scalar are raised to it.
 ///
 /// ```
 /// use contact_dynamics::Newton;

@@ -17,9 +17,11 @@ use crate::system::{Path, System};
 /// Memory of Newton's method.
 pub(super) struct NewtonWork<T> {
     settings: Newton,
-    /// The whole increment of the stage so far; one a dof, as the residual without contact forces.
+    /// The whole increment of the stage so far, one a dof.
     d: Vec<T>,
+    /// Residual without contact forces before an iteration, and the increment of it.
     residual: Vec<T>,
+    increment: Vec<T>,
     /// On the interface: an increment without contact, and the displacements of the balance before it.
     free: Vec<T>,
     balance: Vec<T>,
@@ -43,6 +45,7 @@ impl<T: Real> NewtonWork<T> {
             settings,
             d: zero(dofs),
             residual: zero(dofs),
+            increment: zero(dofs),
             free: zero(interface),
             balance: zero(interface),
             gaps: zero(rows),
@@ -109,6 +112,7 @@ impl<T: Real> NewtonStep<'_, '_, T> {
         self.begin(newton, new, past, work);
         let limit = newton.settings.iterations;
         let mut norms = self.evaluate(newton, new, past, work)?;
+        let first = norms.residual;
         for iteration in 0..limit {
             if self.operator.varies() && (iteration == 0 || newton.settings.tangent == TangentUpdate::Iteration) {
                 self.factorize(iteration, newton, new, past, work)?;
@@ -129,20 +133,9 @@ impl<T: Real> NewtonStep<'_, '_, T> {
                     false => break,
                 }
             };
-            let (size, whole) = (share * size, norm(&newton.d));
-            let increment = if whole > 0.0 { size / whole } else { 0.0 };
-            newton.report.push(Iteration { residual: norms.relative(), increment });
-            let [force, displacement] = newton.settings.bounds::<T>();
-            let contraction = if before.residual > 0.0 { norms.residual / before.residual } else { 0.0 };
-            let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
-            // What rounding leaves: increments beyond which displacements do not change, or residuals that fall no more.
-            let weight = self.stage.recovery.weights()[0].value().abs();
-            let resolution = T::epsilon().value() * norm(&new.u);
-            let rounding = weight * size <= 4.0 * resolution
-                || contraction >= 0.5 && (size <= displacement * whole || weight * size <= 1e4 * resolution);
             // Rows fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
-            if settled && (met || rounding) {
+            if self.has_converged(newton, share * size, [first, before.residual], norms, new) && settled {
                 return Ok(());
             }
         }
@@ -155,6 +148,28 @@ impl<T: Real> NewtonStep<'_, '_, T> {
             increment: last.increment,
             dof: self.worst(&work.increment, &work.interface.forces),
         })
+    }
+
+    /// Whether an iteration of this size, which has brought the residual from `before` to what it is now (and that of the
+    /// prediction was `first`), is the last one; it is reported.
+    fn has_converged(
+        &self,
+        newton: &mut NewtonWork<T>,
+        size: f64,
+        [first, before]: [f64; 2],
+        norms: Norms,
+        new: &Motion<T>,
+    ) -> bool {
+        let ratio = |x: f64, y: f64| if y > 0.0 { x / y } else { 0.0 };
+        let (whole, contraction) = (norm(&newton.d), ratio(norms.residual, before));
+        newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
+        let [force, displacement] = newton.settings.bounds::<T>();
+        let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
+        // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more, or has
+        // fallen far.
+        let weight = self.stage.recovery.weights()[0].value().abs();
+        let small = size <= displacement * whole || weight * size <= 1e4 * T::epsilon().value() * norm(&new.u);
+        met || small && (contraction >= 0.5 || norms.residual <= force * first)
     }
 
     /// Completes the prediction by accelerations.
@@ -371,8 +386,7 @@ impl<T: Real> NewtonStep<'_, '_, T> {
         before: Norms,
         norms: &mut Norms,
     ) -> Result<Option<f64>> {
-        // From here on `residual` keeps the increment.
-        std::mem::swap(&mut newton.residual, &mut work.increment);
+        std::mem::swap(&mut newton.increment, &mut work.increment);
         self.shift(T::one(), newton, new, work);
         if !self.operator.varies() {
             return Ok(None);
@@ -395,7 +409,7 @@ impl<T: Real> NewtonStep<'_, '_, T> {
 
     /// Adds a share of the increment to everything that contains the unknown.
     fn shift(&self, share: T, newton: &mut NewtonWork<T>, new: &mut Motion<T>, work: &mut Workspace<T>) {
-        let NewtonWork { d, residual: increment, .. } = newton;
+        let NewtonWork { d, increment, .. } = newton;
         T::axpy(share, increment, d);
         let add = |rows: &ScaledRows<T>, motion: &mut Motion<T>| {
             let [u, v, a] = rows.weights();
