@@ -7,7 +7,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::{MATERIAL, Scene, Swing, Throw};
-use contact_dynamics_scenes::solids::Solid;
+use contact_dynamics_scenes::solids::{Material, Solid};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
 
@@ -217,4 +217,46 @@ fn a_soft_block_in_a_bowl_converges_quadratically_and_meets_the_surface() {
         assert!(residuals.len() <= 6, "{residuals:?}");
     }
     assert!(pressed >= 3 && quadratic > 200, "{pressed} pressed, {quadratic} pairs");
+}
+
+/// Displacements over the side and contact forces over E times it, of a square that falls on a floor; lengths are `length`
+/// times, E `stiffness` times, densities `density` times those of the default throw, and all slides at `slide` wave
+/// speeds.
+fn fall(scheme: Box<dyn TimeIntegrator>, [length, stiffness, density]: [f64; 3], slide: f64) -> Vec<f64> {
+    let material =
+        Material { young: stiffness * MATERIAL.young, density: density * MATERIAL.density, poisson: MATERIAL.poisson };
+    let speed = material.wave_speed() / MATERIAL.wave_speed();
+    let throw = Throw::default();
+    let solid = Solid::rectangle([length; 2], [4; 2], material).moved([-0.5 * length; 2]).rotated(throw.angle);
+    let body =
+        Hyperelastic::new(&solid.lifted(0.3 * length), Law::NeoHookean).gravity([0.0, -0.02 * speed * speed / length]);
+    let center = body.particles.center(&vec![0.0; body.particles.dofs()]);
+    let linear = [slide * material.wave_speed(), -throw.speed * speed];
+    let velocity = body.particles.rigid_velocity(linear, throw.spin * speed / length, center);
+    let h = 0.2 * length / speed;
+    let scene = Scene { nodes: (0..body.particles.nodes.len()).collect(), body, velocity, floor: None, h };
+    let mut run = scene.builder(scheme).unwrap().build().unwrap();
+    let mut seen = Vec::new();
+    for _ in 0..60 {
+        run.step().unwrap();
+        let drift = linear[0] * run.time();
+        let u = run.state().displacement().iter().enumerate();
+        seen.extend(u.map(|(dof, u)| (u - if dof % 2 == 0 { drift } else { 0.0 }) / length));
+        seen.push(run.state().contacts().forces().iter().sum::<f64>() / (stiffness * length));
+    }
+    seen
+}
+
+#[test]
+fn results_depend_neither_on_units_nor_on_a_common_velocity() {
+    for make in SCHEMES {
+        let reference = fall(make(), [1.0; 3], 0.0);
+        assert!(reference.iter().all(|x| x.is_finite()));
+        // mm, t, s with steel; inch, pound-force; and a slide at three times the wave speed.
+        for (units, slide) in [([1e3, 2.1e5, 7.85e-9], 0.0), ([39.37, 1.45e-4, 9.357e-8], 0.0), ([1.0; 3], 3.0)] {
+            let other = fall(make(), units, slide);
+            let worst = reference.iter().zip(&other).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-8, "{}, {units:?}, {slide}: {worst:e}", make().name());
+        }
+    }
 }
