@@ -179,6 +179,8 @@ fn a_tether_holds_two_particles_on_a_circle() {
             .build()
             .unwrap();
         let (mut force_error, mut stretch) = (0.0_f64, 0.0_f64);
+        // The first step moves along the tangent, which the force at the start lifts it from.
+        run.step().unwrap();
         while run.time() < 1.0 {
             run.step().unwrap();
             let (u, v) = (run.state().displacement(), run.state().velocity());
@@ -192,7 +194,7 @@ fn a_tether_holds_two_particles_on_a_circle() {
     };
     let (force, stretch) = run(2e-3);
     // The tangent of the circle leaves (h w)²/(2 L) a step, w the relative speed.
-    assert!(force < 0.03 && stretch < 1.05 * (2e-3 * 2.0 * speed).powi(2) / (2.0 * length), "{force} {stretch:e}");
+    assert!(force < 1e-4 && stretch < 1.05 * (2e-3 * 2.0 * speed).powi(2) / (2.0 * length), "{force} {stretch:e}");
     let finer = run(5e-4);
-    assert!(finer.0 < 0.4 * force && finer.1 < 0.1 * stretch, "{finer:?}");
+    assert!(finer.0 < 0.1 * force && finer.1 < 0.1 * stretch, "{finer:?}");
 }
