@@ -1,4 +1,5 @@
 //! Nodes against rigid obstacles: geometry, motion of the obstacle, curved surfaces, bodies far away.
+#![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
