@@ -1,5 +1,6 @@
 //! Contact constraints: where the gap is, which way it pushes, under which law.
 
+mod gap_function;
 mod law;
 mod linear_rows;
 #[cfg(feature = "search")]
@@ -7,6 +8,7 @@ mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
 
+pub use gap_function::GapFunction;
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]

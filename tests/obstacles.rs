@@ -1,4 +1,5 @@
 //! Nodes against rigid obstacles: geometry, motion of the obstacle, curved surfaces, bodies far away.
+#![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -6,6 +7,7 @@ use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
     PersistencyCorrection, Result, Simulation, verify,
 };
+use proptest::prelude::*;
 
 /// Free particles in D dimensions under gravity along the last axis.
 fn particles<const D: usize>(count: usize, gravity: f64) -> LinearSystem<'static, f64> {
@@ -244,4 +246,104 @@ fn obstacles_refuse_what_is_no_geometry() {
     let contact = NodesOnObstacle::new(plane, &[[0.0; 2]], &[[6, 7]], &[0]).unwrap();
     let built = Simulation::builder(particles::<2>(1, 0.0), Composite, 0.1).constraint(contact).build();
     assert!(matches!(built, Err(Error::MissingDof { .. })));
+}
+
+/// Rows and gaps.
+fn read<const D: usize>(
+    contact: &mut NodesOnObstacle<'_, f64, D>,
+    t: f64,
+    u: &[f64],
+) -> (ContactJacobian<f64>, Vec<f64>) {
+    let (mut g, mut gaps) = (ContactJacobian::default(), vec![f64::INFINITY; contact.candidates()]);
+    contact.jacobian(&mut g);
+    contact.gap(t, u, &mut gaps);
+    (g, gaps)
+}
+
+/// Follows from one state to another, and compares with a search there.
+fn check_follow<const D: usize>(
+    make: impl Fn() -> NodesOnObstacle<'static, f64, D>,
+    from: &[f64],
+    (t, to): (f64, &[f64]),
+) {
+    let (mut contact, mut fresh) = (make(), make());
+    contact.search(0.0, from, from).unwrap();
+    let before = contact.candidates();
+    assert_eq!(contact.follow(t, to).unwrap(), Candidates::Changed);
+    fresh.search(t, to, to).unwrap();
+    assert_eq!(read(&mut contact, t, to), read(&mut fresh, t, to));
+    assert!((0..before).all(|row| contact.identity(row) == (row, 0) && contact.magnitude(row) == fresh.magnitude(row)));
+    assert_eq!(contact.follow(t, to).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.search(t, to, to).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.follow(0.0, from).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search(t, to, to).unwrap(), Candidates::Changed);
+}
+
+proptest! {
+    #[test]
+    fn followed_rows_are_those_of_a_search(seed in 0.0..100.0_f64, t in 0.01..1.0_f64) {
+        let places = noise(30, seed);
+        let solid: Vec<_> = (0..10).map(|i| [places[3 * i], places[3 * i + 1], places[3 * i + 2]]).collect();
+        let flat: Vec<_> = (0..15).map(|i| [places[2 * i], places[2 * i + 1]]).collect();
+        let (from, to) = (noise(30, seed + 3.3), noise(30, seed + 5.7));
+        for side in [Side::Outside, Side::Inside] {
+            let moving = |contact: NodesOnObstacle<'static, f64, 3>| {
+                contact.moving(|t| [[0.1 * t, t * t, 0.0], [0.1, 2.0 * t, 0.0], [0.0, 2.0, 0.0]])
+            };
+            let sphere = Sphere::new([0.1, 0.0, -0.2], 0.7, side).unwrap();
+            check_follow(|| moving(on(sphere, &solid)), &from, (t, &to));
+            let cylinder = Cylinder::new([0.1, 0.0, -0.2], [1.0, 2.0, -0.5], 0.4, side).unwrap();
+            check_follow(|| moving(on(cylinder, &solid)), &from, (t, &to));
+            let disc = Sphere::new([0.1, 0.0], 0.7, side).unwrap();
+            check_follow(|| on(disc, &flat), &from, (t, &to));
+        }
+    }
+}
+
+#[test]
+fn planes_have_nothing_to_follow() {
+    let mut contact = on(Plane::new([0.0; 2], [0.6, 0.8]).unwrap(), &[[0.0, 1.0], [1.0, 0.0]]).moving(|t| {
+        assert!(t < 1.0, "the motion is not asked for");
+        [[0.0, t], [0.0, 1.0], [0.0; 2]]
+    });
+    let u = [0.3, 0.2, 0.1, -0.4];
+    contact.search(0.0, &[0.0; 4], &[0.0; 4]).unwrap();
+    let before = read(&mut contact, 0.5, &u);
+    assert_eq!(contact.follow(1.5, &u).unwrap(), Candidates::Unchanged);
+    assert_eq!(before, read(&mut contact, 0.5, &u));
+}
+
+#[test]
+fn followed_nodes_stay_candidates_out_of_reach() {
+    let ball = Sphere::new([0.0; 2], 1.0, Side::Outside).unwrap();
+    let mut contact = on(ball, &[[0.0, 1.1], [3.0, 0.0], [1.2, 0.0]]).reach(0.5).unwrap();
+    contact.search(0.0, &[0.0; 6], &[0.0; 6]).unwrap();
+    let to = [0.0, 3.0, -1.8, 0.0, 0.1, 0.1];
+    contact.follow(0.0, &to).unwrap();
+    assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [0, 2]);
+    assert!((read(&mut contact, 0.0, &to).1[0] - 3.1).abs() < 1e-14);
+    assert_eq!(contact.search(0.0, &to, &to).unwrap(), Candidates::Changed);
+    assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [1, 2]);
+}
+
+#[test]
+fn trial_states_without_a_distance_have_gaps_that_are_no_numbers() {
+    /// A floor that is defined for x > 0 only.
+    struct Half;
+    impl Obstacle<f64, 2> for Half {
+        fn distance(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+            let root = x.sqrt();
+            (y + 0.0 * root, [0.0 * root, 1.0])
+        }
+    }
+    let mut contact = on(Half, &[[1.0, 1.0], [2.0, 1.0]]);
+    contact.search(0.0, &[0.0; 4], &[0.0; 4]).unwrap();
+    for (to, bad) in [([-2.0, 0.0, 0.0, 0.0], 0), ([0.0, 0.0, f64::NAN, 0.0], 1)] {
+        let rows = read(&mut contact, 0.0, &[0.0; 4]).0;
+        contact.follow(0.0, &to).unwrap();
+        let (g, gaps) = read(&mut contact, 0.0, &to);
+        assert!(g == rows && gaps[bad].is_nan() && gaps[1 - bad] == 1.0, "{gaps:?}");
+        contact.follow(0.0, &[0.0; 4]).unwrap();
+        assert_eq!(read(&mut contact, 0.0, &[0.0; 4]).1, [1.0, 1.0]);
+    }
 }

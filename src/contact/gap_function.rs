@@ -1,0 +1,246 @@
+//! Gaps that are any function of some displacements.
+
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, positive};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a>;
+
+/// A row and where it is linearized.
+struct Row<'a, T> {
+    function: Function<'a, T>,
+    /// The dofs with the gradient there.
+    entries: Vec<(usize, T)>,
+    place: Vec<T>,
+    /// Whether there is no gradient there: then there is no gap.
+    broken: bool,
+}
+
+/// Any number of rows `g(t, x) ≥ 0`, each a smooth function of the displacements x of some dofs.
+///
+/// The function is called with t, x, the velocities v of the same dofs, and a slice for the gradient ∂g/∂x, all in the
+/// order of the dofs. It writes the whole gradient and returns
+///
+/// * the gap g (length),
+/// * its rate ∂g/∂t at fixed x (length/time), zero if nothing but x moves it,
+/// * its acceleration d²/ds² g(t + s, x + s v) at s = 0 (length/time²): vᵀ H v with the second derivatives H of g, and
+///   2 v · ∂²g/∂t∂x + ∂²g/∂t² if it depends on t.
+///
+/// It is pure; where only the gap matters v is zero. The last two may be left zero at the price of the correctors:
+/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares the gradient and the rate with differences.
+///
+/// With a linear system rows are linearized once, where a step begins; with a nonlinear one they follow Newton's method
+/// to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are
+/// identified by their order.
+///
+/// ```
+/// use contact_dynamics::contact::{ContactConstraint, GapFunction};
+///
+/// // The end of a rod (dofs 6 and 7, at (0, 1) in the beginning) stays above the parabola y = x²/4.
+/// let parabola = |_: f64, x: &[f64], v: &[f64], gradient: &mut [f64]| {
+///     gradient.copy_from_slice(&[-0.5 * x[0], 1.0]);
+///     [1.0 + x[1] - 0.25 * x[0] * x[0], 0.0, -0.5 * v[0] * v[0]]
+/// };
+/// // Two particles on a line, 0.5 apart in the beginning, are tethered: at most 2 apart.
+/// let tether = |_: f64, x: &[f64], _: &[f64], gradient: &mut [f64]| {
+///     let apart = 0.5 + x[1] - x[0];
+///     gradient.copy_from_slice(&[apart.signum(), -apart.signum()]);
+///     [2.0 - apart.abs(), 0.0, 0.0]
+/// };
+/// let mut contact = GapFunction::new(&[6, 7], parabola).and(&[0, 2], tether);
+///
+/// let (mut u, mut gaps) = ([0.0; 8], [0.0; 2]);
+/// u[6] = 2.0;
+/// contact.search(0.0, &u, &[0.0; 8])?;
+/// contact.gap(0.0, &u, &mut gaps);
+/// assert_eq!(gaps, [0.0, 1.5]);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+///
+/// Two balls in the plane whose centers stay at least 1 apart, checked as hosts should:
+///
+/// ```
+/// use contact_dynamics::contact::GapFunction;
+/// use contact_dynamics::verify;
+///
+/// let places = [0.0, 0.0, 1.2, 0.9];
+/// let balls = move |_: f64, x: &[f64], v: &[f64], gradient: &mut [f64]| {
+///     let r = [0, 1].map(|i| places[2 + i] + x[2 + i] - places[i] - x[i]);
+///     let w = [0, 1].map(|i| v[2 + i] - v[i]);
+///     let distance = r[0].hypot(r[1]);
+///     let n = r.map(|r| r / distance);
+///     gradient.copy_from_slice(&[-n[0], -n[1], n[0], n[1]]);
+///     let across = n[0] * w[1] - n[1] * w[0];
+///     [distance - 1.0, 0.0, across * across / distance]
+/// };
+/// let mut contact = GapFunction::new(&[0, 1, 2, 3], balls).scale(1.0)?;
+/// let error = verify::gap_jacobian(&mut contact, 0.0, &[0.1, 0.0, 0.0, -0.2], &[0.0; 4], 1e-5)?;
+/// assert!(error.rows == 1 && error.jacobian < 1e-9, "{error:?}");
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+pub struct GapFunction<'a, T: Real> {
+    rows: Vec<Row<'a, T>>,
+    law: ContactLaw,
+    scale: T,
+    /// Rows that have been linearized: all of them, or none before the first search.
+    candidates: usize,
+    /// Displacements, velocities and gradient of a row.
+    buffers: [Vec<T>; 3],
+}
+
+impl<T: Real> std::fmt::Debug for GapFunction<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GapFunction").field("rows", &self.rows.len()).field("law", &self.law).finish_non_exhaustive()
+    }
+}
+
+impl<'a, T: Real> GapFunction<'a, T> {
+    /// One row, a function of the displacements of these dofs.
+    pub fn new(dofs: &[usize], function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a) -> Self {
+        let (law, buffers) = (ContactLaw::Rigid, [const { Vec::new() }; 3]);
+        Self { rows: Vec::new(), law, scale: T::zero(), candidates: 0, buffers }.and(dofs, function)
+    }
+
+    /// One row more.
+    #[must_use]
+    pub fn and(
+        mut self,
+        dofs: &[usize],
+        function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a,
+    ) -> Self {
+        let (entries, place) = (dofs.iter().map(|&dof| (dof, T::zero())).collect(), vec![T::zero(); dofs.len()]);
+        self.rows.push(Row { function: Box::new(function), entries, place, broken: false });
+        for buffer in &mut self.buffers {
+            buffer.resize(buffer.len().max(dofs.len()), T::zero());
+        }
+        self.candidates = 0;
+        self
+    }
+
+    /// The law of all rows; [`ContactLaw::Rigid`] by default.
+    #[must_use]
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// The size of the coordinates (length) that the functions compute with: within the rounding of it gaps are zero. None
+    /// by default, and then a row that touches at the start must be given with a gap of exactly zero or more.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn scale(mut self, scale: T) -> Result<Self> {
+        positive("the scale of a gap function", scale.value())?;
+        self.scale = scale;
+        Ok(self)
+    }
+
+    /// Linearizes all rows at u; whether a gradient changed.
+    fn linearize(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        self.check(u.len())?;
+        let Self { rows, buffers: [_, still, gradient], .. } = self;
+        still.fill(T::zero());
+        let mut found = Candidates::Unchanged;
+        for Row { function, entries, place, broken } in rows {
+            for (x, &(dof, _)) in place.iter_mut().zip(&*entries) {
+                *x = u[dof];
+            }
+            let gradient = &mut gradient[..entries.len()];
+            // An entry that the function does not write is not that of another row.
+            gradient.fill(T::nan());
+            function(t, place, &still[..place.len()], gradient);
+            // Without a gradient the row stays as it was, and reports a gap that is NaN.
+            *broken = !gradient.iter().all(|x| x.is_finite());
+            if !*broken {
+                for ((_, old), &mut new) in entries.iter_mut().zip(gradient) {
+                    if *old != new {
+                        (*old, found) = (new, Candidates::Changed);
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
+    fn max_candidates(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn max_entries(&self) -> usize {
+        self.rows.iter().map(|row| row.entries.len()).sum()
+    }
+
+    fn check(&self, dofs: usize) -> Result<()> {
+        for row in &self.rows {
+            if row.entries.is_empty() {
+                let what = "the list of dofs of a gap function";
+                return Err(Error::Empty { what, remedy: "name the dofs that the gap depends on" });
+            }
+            if let Some(&(dof, _)) = row.entries.iter().find(|(dof, _)| *dof >= dofs) {
+                return Err(Error::MissingDof { what: "a gap function", dof, dofs });
+            }
+        }
+        Ok(())
+    }
+
+    fn dofs(&self, out: &mut Vec<usize>) {
+        out.extend(self.rows.iter().flat_map(|row| &row.entries).map(|entry| entry.0));
+    }
+
+    fn search(&mut self, t: f64, u: &[T], _v: &[T]) -> Result<Candidates> {
+        let found = self.linearize(t, u)?;
+        let before = std::mem::replace(&mut self.candidates, self.rows.len());
+        Ok(if before == self.candidates { found } else { Candidates::Changed })
+    }
+
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        self.linearize(t, u)
+    }
+
+    fn candidates(&self) -> usize {
+        self.candidates
+    }
+
+    fn identity(&self, row: usize) -> (usize, usize) {
+        (row, 0)
+    }
+
+    fn law(&self, _: usize) -> ContactLaw {
+        self.law
+    }
+
+    fn magnitude(&self, _: usize) -> T {
+        self.scale
+    }
+
+    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+        for row in &self.rows[..self.candidates] {
+            out.push(&row.entries);
+        }
+    }
+
+    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
+        let Self { rows, buffers: [_, still, gradient], candidates, .. } = self;
+        still.fill(T::zero());
+        for (Row { function, entries, place, broken }, out) in rows[..*candidates].iter_mut().zip(out) {
+            let [gap, ..] = function(t, place, &still[..place.len()], &mut gradient[..place.len()]);
+            let moved = entries.iter().zip(&*place).map(|(&(dof, weight), &x)| weight * (u[dof] - x));
+            *out = if *broken { T::nan() } else { gap + moved.sum() };
+        }
+    }
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+        let Self { rows, buffers: [x, w, gradient], candidates, .. } = self;
+        for (Row { function, entries, .. }, out) in rows[..*candidates].iter_mut().zip(out) {
+            let (x, w) = (&mut x[..entries.len()], &mut w[..entries.len()]);
+            for ((x, w), &(dof, _)) in x.iter_mut().zip(w.iter_mut()).zip(&*entries) {
+                (*x, *w) = (u[dof], v[dof]);
+            }
+            let [_, rate, acceleration] = function(t, x, w, &mut gradient[..entries.len()]);
+            *out = GapRates { rate, acceleration };
+        }
+    }
+}
