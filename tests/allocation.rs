@@ -1,7 +1,12 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
 use contact_dynamics::contact::{ContactLaw, Side, Sphere};
-use contact_dynamics::{Composite, Corrector, NodesOnObstacle, PersistencyCorrection, Simulation};
+use contact_dynamics::{
+    Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
+    TimeIntegrator,
+};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::{Bars, MassKind};
@@ -10,6 +15,44 @@ use contact_dynamics_scenes::{Bars, MassKind};
 fn steps_do_not_allocate() {
     bars();
     solids();
+    large_motion();
+}
+
+/// Blocks at large strains that bounce: Newton's method, factorizations, rows that follow a curved floor.
+fn large_motion() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] = [
+        || Box::new(Composite),
+        || Box::new(EnergyMomentum),
+        || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+    ];
+    for make in schemes {
+        for newton in [Newton::full().line_search(), Newton::modified()] {
+            let solid = Solid::block([1.0; 3], [3; 3], MATERIAL).rotated([1.0, 1.0, 0.0], 0.4).lifted(0.05);
+            let body = Hyperelastic::new(&solid, Law::NeoHookean).gravity([0.0, 0.0, -0.05]);
+            let ball = Sphere::new([0.3, 0.2, -3.0], 3.0, Side::Outside).unwrap();
+            let dofs = solid.node_dofs();
+            let contact = NodesOnObstacle::new(ball, &solid.nodes, &dofs, &solid.surface_nodes()).unwrap();
+            let mut run = Simulation::builder(body, make(), 0.05)
+                .velocity(solid.uniform([0.0, 0.0, -0.1]))
+                .constraint(contact)
+                .corrector(PersistencyCorrection::with_history_projection())
+                .newton(newton)
+                .build()
+                .unwrap();
+            for _ in 0..3 {
+                run.step().unwrap();
+            }
+            let mut changes = 0;
+            let counted = allocation_counter::measure(|| {
+                for _ in 0..200 {
+                    run.step().unwrap();
+                }
+                changes = run.statistics().contact_changes;
+            });
+            assert!(changes >= 4, "{}: {changes} changes", make().name());
+            assert_eq!(counted.count_total, 0, "{}, {newton:?}", make().name());
+        }
+    }
 }
 
 /// A block that a ball rolls over: candidates come and go, normals turn, a supernodal factor.

@@ -1,49 +1,51 @@
 //! Newton's method: it solves linear systems as the direct solve does, converges quadratically, follows curved gaps, and
 //! fails without leaving a trace.
 
-use contact_dynamics::contact::{Side, Sphere};
+use contact_dynamics::contact::{ContactLaw, Side, Sphere};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
-    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, Linearity, Mass, Newmark, Newton,
-    NodesOnObstacle, PersistencyCorrection, Result, Simulation, System, TangentWeights, TimeIntegrator,
+    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, Linearity, Mass,
+    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, System, TangentWeights,
+    TimeIntegrator,
 };
-use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::{Bars, MassKind};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
 
 /// A linear system that says that it is not.
 struct Unknowing<S>(S);
 
-impl<S: System<f64>> System<f64> for Unknowing<S> {
+impl<T: Real, S: System<T>> System<T> for Unknowing<S> {
     fn dofs(&self) -> usize {
         self.0.dofs()
     }
-    fn mass(&self) -> Mass<'_, f64> {
+    fn mass(&self) -> Mass<'_, T> {
         self.0.mass()
     }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+    fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
         self.0.force(t, u, v, out)
     }
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
         self.0.pattern()
     }
-    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+    fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
         self.0.tangent(t, u, v, weights, out)
     }
-    fn damping_force(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Damping {
+    fn damping_force(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Damping {
         self.0.damping_force(u, v, out)
     }
-    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         self.0.potential_energy(u)
     }
-    fn external_load(&mut self, t: f64, out: &mut [f64]) {
+    fn external_load(&mut self, t: f64, out: &mut [T]) {
         self.0.external_load(t, out);
     }
     fn prescribed(&self) -> &[usize] {
         self.0.prescribed()
     }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) {
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
         self.0.prescribed_motion(t, out);
     }
 }
@@ -189,6 +191,113 @@ fn a_linear_system_is_solved_as_by_the_direct_solve() {
         assert!(nonlinear.statistics().newton_iterations <= 2 * 161 * stages, "{}", scheme.name());
         assert_eq!(linear.statistics().factorizations, direct.statistics().factorizations);
     }
+}
+
+#[test]
+fn compliant_laws_and_supports_are_those_of_the_direct_solve() {
+    let laws = [
+        ContactLaw::Penalty { stiffness: 20.0 },
+        ContactLaw::PowerLaw { stiffness: 2e3, exponent: 1.5 },
+        ContactLaw::Bipenalty { stiffness: 20.0, mass: 1e-3 },
+        ContactLaw::AugmentedLagrangian { stiffness: 20.0, augmentations: 3 },
+    ];
+    for scheme in all() {
+        for law in laws {
+            for mass in [MassKind::Lumped, MassKind::Consistent] {
+                let bars = Bars::paper(6).delayed(0.3, 2e-3).with_mass(mass);
+                let last = bars.velocities::<f64>().len() - 1;
+                let [left, right] = bars.contact_dofs();
+                let system = || bars.system::<f64>().drive(last, |t| [-0.05 * t, -0.05, 0.0]).unwrap();
+                let build = |nonlinear: bool| {
+                    let system: Box<dyn System<f64>> =
+                        if nonlinear { Box::new(Unknowing(system())) } else { Box::new(system()) };
+                    Simulation::builder(system, (scheme.make)(), 2e-3)
+                        .velocity(bars.velocities())
+                        .constraint(LinearRows::new().row(law, &[(left, -1.0), (right, 1.0)], bars.gap))
+                        .build()
+                };
+                let (mut direct, mut newton) = match (build(false), build(true)) {
+                    (Ok(direct), Ok(newton)) => (direct, newton),
+                    (Err(one), Err(other)) => {
+                        assert_eq!(one.to_string(), other.to_string());
+                        continue;
+                    }
+                    (one, other) => panic!("{:?} {:?}", one.map(drop), other.map(drop)),
+                };
+                for step in 0..100 {
+                    direct.step().unwrap();
+                    newton.step().unwrap();
+                    let (one, other) = (direct.state(), newton.state());
+                    let name = format!("{}, {law:?}, {mass:?}, step {step}", scheme.name());
+                    close(one.displacement(), other.displacement(), 1e-8 * 0.01, &name);
+                    close(one.velocity(), other.velocity(), 1e-6 * 0.05, &name);
+                    close(one.contacts().forces(), other.contacts().forces(), 1e-5 * 0.0125, &name);
+                }
+                let reactions = [direct.reactions().unwrap(), newton.reactions().unwrap()];
+                close(&reactions[0], &reactions[1], 1e-5 * 0.0125, &scheme.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn single_precision_converges_to_its_own_rounding() {
+    let bars = Bars::paper(20).delayed(0.3, 1e-3);
+    let run = |system: Box<dyn System<f32>>| {
+        Simulation::builder(system, Composite, 1e-3)
+            .velocity(bars.velocities())
+            .constraint(bars.contact())
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap()
+    };
+    let (mut direct, mut newton) = (run(Box::new(bars.system())), run(Box::new(Unknowing(bars.system()))));
+    for _ in 0..400 {
+        direct.step().unwrap();
+        newton.step().unwrap();
+        for (x, y) in direct.state().displacement().iter().zip(newton.state().displacement()) {
+            assert!((x - y).abs() < 1e-4 * 0.02, "{x} {y}");
+        }
+    }
+    assert!(newton.statistics().newton_iterations < 2 * 402);
+}
+
+#[test]
+fn a_linear_body_follows_a_curved_obstacle_if_it_is_asked_to() {
+    let block = Solid::rectangle([1.0; 2], [6; 2], Material { young: 100.0, poisson: 0.3, density: 1.0 });
+    let top: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][1] > 0.99).collect();
+    let run = |newton: Option<Newton>| {
+        let ball = Sphere::new([-0.2, 1.35], 0.4, Side::Outside).unwrap();
+        let contact = NodesOnObstacle::new(ball, &block.nodes, &block.node_dofs(), &top)
+            .unwrap()
+            .moving(|t| [[t, 0.0], [1.0, 0.0], [0.0; 2]]);
+        let builder = Simulation::builder(block.system(), Composite, 0.02)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection());
+        let mut run = match newton {
+            Some(newton) => builder.newton(newton),
+            None => builder,
+        }
+        .build()
+        .unwrap();
+        let mut worst = 0.0_f64;
+        while run.time() < 0.8 {
+            run.step().unwrap();
+            let center = [run.time() - 0.2, 1.35];
+            for (row, &node) in top.iter().enumerate() {
+                let u = &run.state().displacement()[2 * node..2 * node + 2];
+                let [x, y] = [block.nodes[node][0] + u[0] - center[0], block.nodes[node][1] + u[1] - center[1]];
+                let gap = x.hypot(y) - 0.4;
+                let pressed = run.state().contacts().raw_forces()[row] > 0.0;
+                worst = worst.max(if pressed { gap.abs() } else { -gap });
+            }
+        }
+        (worst, *run.statistics())
+    };
+    let ((loose, _), (exact, counts)) = (run(None), run(Some(Newton::full())));
+    assert!(loose > 1e-5 && exact < 1e-9, "{loose:e} {exact:e}");
+    // The curvature costs contact problems, no factorization and no solve.
+    assert_eq!((counts.factorizations, counts.linear_solves), (1, counts.steps));
 }
 
 fn close(one: &[f64], other: &[f64], tolerance: f64, name: &str) {

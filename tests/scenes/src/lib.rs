@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod drops;
 pub mod hyperelastic;
+pub mod large;
 pub mod measure;
 pub mod output;
 pub mod particles;

@@ -85,6 +85,25 @@ impl<const D: usize> Particles<D> {
         moment
     }
 
+    /// Center of mass at displacements u.
+    pub fn center(&self, u: &[f64]) -> [f64; D] {
+        std::array::from_fn(|axis| {
+            let dofs = || (axis..self.dofs()).step_by(D);
+            let sum: f64 = dofs().map(|dof| self.mass[dof] * (self.nodes[dof / D][axis] + u[dof])).sum();
+            sum / dofs().map(|dof| self.mass[dof]).sum::<f64>()
+        })
+    }
+
+    /// Angular momentum about the center of mass.
+    pub fn spin(&self, u: &[f64], v: &[f64]) -> [f64; 3] {
+        let (center, momentum) = (self.center(u), self.linear_momentum(v));
+        let (mut x, mut p) = ([0.0; 3], [0.0; 3]);
+        x[..D].copy_from_slice(&center);
+        p[..D].copy_from_slice(&momentum);
+        let (whole, own) = (self.angular(u, v), cross(x, p));
+        std::array::from_fn(|k| whole[k] - own[k])
+    }
+
     fn angular(&self, u: &[f64], v: &[f64]) -> [f64; 3] {
         self.moment(u, |dof| self.mass[dof] * v[dof])
     }

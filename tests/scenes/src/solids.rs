@@ -119,6 +119,20 @@ impl Solid<3> {
         })
     }
 
+    /// A ring around the y axis, of `cells` elements across, around and along the axis.
+    pub fn hoop(radii: [f64; 2], width: f64, cells: [usize; 3], material: Material) -> Self {
+        let plane = Solid::ring(radii, [cells[0], cells[1]], material);
+        let count = plane.nodes.len();
+        let slice = |k: usize| width * (k as f64 / cells[2] as f64 - 0.5);
+        let nodes = (0..=cells[2]).flat_map(|k| plane.nodes.iter().map(move |[x, z]| [*x, slice(k), *z]));
+        // Seen against the y axis the plane's elements go clockwise: the far slice comes first.
+        let element = |k: usize, corners: &[usize]| -> Vec<usize> {
+            corners.iter().map(|n| n + (k + 1) * count).chain(corners.iter().map(|n| n + k * count)).collect()
+        };
+        let elements = (0..cells[2]).flat_map(|k| plane.elements.iter().map(move |corners| element(k, corners)));
+        Self { nodes: nodes.collect(), elements: elements.collect(), material }
+    }
+
     /// Turned about an axis through the origin.
     pub fn rotated(self, axis: [f64; 3], angle: f64) -> Self {
         let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();

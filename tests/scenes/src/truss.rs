@@ -69,6 +69,17 @@ impl<const D: usize> Truss<D> {
         Self { assembly: Assembly::new(nodes.len(), 2, &ends), particles: Particles::new(nodes, mass), bars }
     }
 
+    /// The same truss without load in another place: `map` is a rigid motion.
+    #[must_use]
+    pub fn placed(mut self, map: impl Fn([f64; D]) -> [f64; D]) -> Self {
+        let nodes = &mut self.particles.nodes;
+        nodes.iter_mut().for_each(|x| *x = map(*x));
+        for bar in &mut self.bars {
+            bar.vector = std::array::from_fn(|axis| nodes[bar.ends[1]][axis] - nodes[bar.ends[0]][axis]);
+        }
+        self
+    }
+
     #[must_use]
     pub fn gravity(mut self, gravity: [f64; D]) -> Self {
         self.particles.weigh(gravity);
