@@ -68,7 +68,48 @@ pub enum Linearity {
 /// model. Hosts with constant matrices take [`LinearSystem`].
 ///
 /// A force that cannot be evaluated at a trial state, because an element is turned inside out for instance, is
-/// [`Error::Inadmissible`](crate::Error::Inadmissible): the step is undone, and may be taken again with a smaller h.
+/// [`Error::Inadmissible`](crate::Error::Inadmissible) with the name of the method as its `callback`: the step is undone, and
+/// may be taken again with a smaller h.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+/// use contact_dynamics::{Mass, Newmark, Result, Simulation, System, TangentWeights, verify};
+///
+/// /// A mass of 2 on a spring that pulls with 2 u³.
+/// struct Cubic(SymbolicSparseColMat<usize>);
+///
+/// impl System<f64> for Cubic {
+///     fn dofs(&self) -> usize {
+///         1
+///     }
+///     fn mass(&self) -> Mass<'_, f64> {
+///         Mass::Lumped(&[2.0])
+///     }
+///     fn force(&mut self, _t: f64, u: &[f64], _v: &[f64], out: &mut [f64]) -> Result<()> {
+///         out[0] = -2.0 * u[0].powi(3);
+///         Ok(())
+///     }
+///     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+///         self.0.as_ref()
+///     }
+///     fn tangent(&mut self, _t: f64, u: &[f64], _v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+///         out[0] = w.stiffness * 6.0 * u[0] * u[0]; // no damping: nothing for w.damping
+///         Ok(())
+///     }
+/// }
+///
+/// let mut spring = Cubic(SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]));
+/// assert!(verify::tangent(&mut spring, 0.0, &[0.7], &[1.0], 1e-5, 1e-5)?.largest() < 1e-8);
+///
+/// // Released at u = 1 it passes through zero at t = 1.8540747 with the speed √½.
+/// let mut run = Simulation::builder(&mut spring, Newmark::trapezoidal(), 1.854_074_677 / 1000.0)
+///     .displacement(vec![1.0])
+///     .build()?;
+/// run.run_until(1.854, &mut ())?;
+/// assert!(run.state().displacement()[0].abs() < 1e-6);
+/// assert!((run.state().velocity()[0] + 0.5_f64.sqrt()).abs() < 1e-6);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
 pub trait System<T: Real>: Send {
     /// Number of degrees of freedom, prescribed ones included.
     fn dofs(&self) -> usize;
@@ -79,7 +120,7 @@ pub trait System<T: Real>: Send {
         Linearity::Nonlinear
     }
 
-    /// The mass matrix (constant).
+    /// The mass matrix (constant), positive on dofs that are free to move; prescribed dofs may have none.
     fn mass(&self) -> Mass<'_, T>;
 
     /// `out = f(t, u, v)`: external minus internal force, `out` holding anything on entry.
@@ -87,7 +128,7 @@ pub trait System<T: Real>: Send {
     /// # Errors
     ///
     /// [`Error::Inadmissible`](crate::Error::Inadmissible) if a smaller step may help, else
-    /// [`Error::Host`](crate::Error::Host).
+    /// [`Error::Host`](crate::Error::Host); the `callback` of either is the name of the method, here `"force"`.
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()>;
 
     /// Pattern of K and C together, both triangles, rows sorted in each column; it never changes.
@@ -103,6 +144,8 @@ pub trait System<T: Real>: Send {
 
     /// `out = f` of a step along a path whose internal work is the change of the potential,
     /// f_int · (to − from) = V(to) − V(from), for [`EnergyMomentum`](crate::EnergyMomentum); t and v are those of the middle.
+    /// As in [`force`](Self::force) the whole force is asked for: the external load at t, minus that internal force, minus the
+    /// damping force at the mean v.
     /// For St. Venant–Kirchhoff materials it is the force of the mean stress ½ (S(from) + S(to)) on the mean
     /// configuration, which conserves angular momentum too. Default: none; the forces at start, middle and end are then
     /// averaged by the potential.
@@ -117,6 +160,7 @@ pub trait System<T: Real>: Send {
 
     /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
     /// −2 ∂f/∂to (which is the stiffness where f is linear) and symmetric: what is neglected costs iterations, not accuracy.
+    /// C is −∂f/∂v, as in [`tangent`](Self::tangent).
     /// Default: the tangent at the mean.
     ///
     /// # Errors
@@ -147,7 +191,11 @@ pub trait System<T: Real>: Send {
         None
     }
 
-    /// `out = external load at t`, for the energy balance. The default is no load.
+    /// `out =` the part of the force that depends on t alone, for the energy balance and for
+    /// [`EnergyMomentum`](crate::EnergyMomentum) without [`force_along`](Self::force_along); [`force`](Self::force) contains
+    /// it. The default is no load. Loads that follow u have no place here, and no line in the energy balance: what they
+    /// do is in its remainder. `EnergyMomentum` would take them for internal forces; with such loads give
+    /// [`force_along`](Self::force_along).
     fn external_load(&mut self, t: f64, out: &mut [T]) {
         let _ = t;
         out.fill(T::zero());
