@@ -1,7 +1,10 @@
 //! Two deformable bodies in contact through node to facet: patch test, impacts of blocks and rings, one pass and two.
 
 use contact_dynamics::contact::{ContactLaw, NodeToFacet};
-use contact_dynamics::{Composite, Newmark, PersistencyCorrection, Simulation, verify};
+use contact_dynamics::{
+    Composite, EnergyMomentum, Newmark, PersistencyCorrection, Simulation, StepControl, TimeIntegrator, verify,
+};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
@@ -151,31 +154,97 @@ fn impacts_of_blocks_keep_momentum_with_one_pass_and_with_two() {
     }
 }
 
+/// Two rings side by side that fly at each other: outer radius 40, inner 30, their surfaces 0.5 apart if `offset`, the height of
+/// the second one above the first, is zero; E = 1, ρ = 0.001 (in these units the wave crosses the wall in 0.25).
+struct Rings {
+    solid: Solid<2>,
+    /// Number of nodes of the first one.
+    split: usize,
+    /// Outer surfaces, and the nodes of the second.
+    facets: [Vec<[usize; 2]>; 2],
+    nodes: Vec<usize>,
+}
+
+impl Rings {
+    fn new(offset: f64) -> Self {
+        let material = Material { young: 1.0, poisson: 0.4, density: 1e-3 };
+        let centers = [[0.0, 0.0], [80.5, offset]];
+        let ring = |k: usize, angle: f64| Solid::ring([30.0, 40.0], [3, 64], material).rotated(angle).moved(centers[k]);
+        let left = ring(0, 0.02);
+        let split = left.nodes.len();
+        let solid = left.with(ring(1, 0.031));
+        let outer = |k: usize| {
+            let [x0, y0] = centers[k];
+            side(&solid, |n, [x, y]| (n < split) == (k == 0) && ((x - x0).hypot(y - y0) - 40.0).abs() < 1e-9)
+        };
+        let [(first, _), (second, nodes)] = [outer(0), outer(1)];
+        Self { facets: [segments(&first), segments(&second)], nodes, split, solid }
+    }
+
+    fn contact(&self) -> NodeToFacet<f64> {
+        let Self { solid, nodes, facets, .. } = self;
+        NodeToFacet::new(&solid.nodes, &solid.node_dofs(), nodes, facets[0].clone(), 5.0).unwrap()
+    }
+
+    /// Each at `speed` toward the other.
+    fn velocity(&self, speed: f64) -> Vec<f64> {
+        let along = |dof: usize| if dof < 2 * self.split { speed } else { -speed };
+        (0..self.solid.dofs()).map(|dof| if dof % 2 == 0 { along(dof) } else { 0.0 }).collect()
+    }
+}
+
+#[test]
+fn rings_at_large_strains_collide_in_few_iterations() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+        [|| Box::new(Composite), || Box::new(Newmark::trapezoidal()), || Box::new(EnergyMomentum)];
+    for make in schemes {
+        // Head on at a thirtieth of the wave speed; off center and faster, in one pass and in two.
+        for (speed, offset, passes) in [(1.0, 0.0, 1), (2.0, 20.0, 1), (2.0, 20.0, 2)] {
+            let rings = Rings::new(offset);
+            let contact = match passes {
+                1 => rings.contact().facing(rings.facets[1].clone()).unwrap(),
+                _ => rings.contact().two_pass(rings.facets[1].clone()).unwrap(),
+            };
+            let body = Hyperelastic::new(&rings.solid, Law::NeoHookean);
+            let mut run = Simulation::builder(body, make(), 0.5)
+                .velocity(rings.velocity(speed))
+                .constraint(contact)
+                .corrector(PersistencyCorrection::with_history_projection())
+                .step_control(StepControl::halving(0.5 / 64.0).unwrap())
+                .build()
+                .unwrap();
+            let along: Vec<f64> = (0..rings.solid.dofs()).map(|dof| f64::from(u8::from(dof % 2 == 0))).collect();
+            let left: Vec<f64> =
+                along.iter().enumerate().map(|(dof, x)| if dof < 2 * rings.split { *x } else { 0.0 }).collect();
+            let (energy, momentum) = (run.energy().total(), run.momentum(&left).unwrap());
+            let name = format!("{}, {speed}, {offset}, {passes}", make().name());
+            let mut most = 0;
+            while run.time() < 120.0 {
+                let before = *run.statistics();
+                run.step().unwrap();
+                let after = *run.statistics();
+                if after.refused_steps == before.refused_steps {
+                    most = most.max(after.newton_iterations - before.newton_iterations);
+                }
+                assert!(run.energy().total() < energy * (1.0 + 1e-9), "{name}");
+                assert!(run.gaps().iter().all(|&gap| gap > -1e-12 * 40.0), "{name}");
+            }
+            assert!(most <= 8 && run.statistics().refused_steps < 10, "{name}: {most} iterations");
+            assert!(run.momentum(&along).unwrap().abs() < 1e-11 * momentum, "{name}");
+            // They part again.
+            assert!(run.momentum(&left).unwrap() < 0.0 && run.statistics().contact_changes >= 8, "{name}");
+        }
+    }
+}
+
 #[test]
 fn rings_collide_without_gaining_energy() {
-    // Outer radius 40, inner 30, 8 apart; E = 1, ρ = 0.001 (in these units the wave crosses the wall in 0.25).
-    let material = Material { young: 1.0, poisson: 0.4, density: 1e-3 };
-    let ring = |x: f64, angle: f64| Solid::ring([30.0, 40.0], [3, 64], material).rotated(angle).moved([x, 0.0]);
-    let left = ring(0.0, 0.02);
-    let split = left.nodes.len();
-    let solid = left.with(ring(80.5, 0.031));
-    let outer = |n: usize, [x, y]: [f64; 2]| {
-        let center = if n < split { 0.0 } else { 80.5 };
-        ((x - center).hypot(y) - 40.0).abs() < 1e-9
-    };
-    let (facets, _) = side(&solid, |n, p| n < split && outer(n, p));
-    let (own, nodes) = side(&solid, |n, p| n >= split && outer(n, p));
+    let rings = Rings::new(0.0);
+    let (solid, split) = (&rings.solid, rings.split);
     for law in [ContactLaw::Rigid, ContactLaw::Penalty { stiffness: 10.0 }] {
-        let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), &nodes, segments(&facets), 5.0)
-            .unwrap()
-            .facing(segments(&own))
-            .unwrap()
-            .with_law(law);
-        let v: Vec<f64> = (0..solid.dofs())
-            .map(|dof| if dof % 2 == 0 { if dof < 2 * split { 0.3 } else { -0.3 } } else { 0.0 })
-            .collect();
+        let contact = rings.contact().facing(rings.facets[1].clone()).unwrap().with_law(law);
         let mut run = Simulation::builder(solid.system(), Composite, 0.05)
-            .velocity(v)
+            .velocity(rings.velocity(0.3))
             .constraint(contact)
             .corrector(PersistencyCorrection::with_history_projection())
             .build()
