@@ -143,7 +143,7 @@ impl Loop {
             let (bounds, tolerance) = (&[Bound::NonNegative; ROWS.len()], &[ROUNDING; ROWS.len()]);
             let problem = ContactProblem { delassus, offset, bounds, tolerance, version: 0 };
             // Multipliers of the iteration before are the guess.
-            self.solver.solve(&problem, &mut self.raw).map_err(|failure| format!("{failure:?}"))?;
+            self.solver.solve(&problem, &mut self.raw)?;
             responses.iter().zip(&self.raw).for_each(|(response, &lambda)| add(lambda, response, &mut d));
             for i in 0..3 {
                 add(w[i], &d, &mut new[i]);

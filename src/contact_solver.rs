@@ -117,6 +117,23 @@ pub enum ContactFailure<T> {
     },
 }
 
+impl<T: Real> std::fmt::Display for ContactFailure<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contradictory { row, other, residual } => {
+                let residual = residual.value();
+                write!(f, "rows {row} and {other} contradict each other: {row} stays violated by {residual:e}")
+            }
+            Self::NotConverged { iterations, row, residual } => {
+                let residual = residual.value();
+                write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
+            }
+        }
+    }
+}
+
+impl<T: Real> std::error::Error for ContactFailure<T> {}
+
 /// A solver of [`ContactProblem`]s.
 ///
 /// ```
