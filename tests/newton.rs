@@ -5,8 +5,8 @@ use contact_dynamics::contact::{ContactLaw, Side, Sphere};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, Linearity, Mass,
-    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, System, TangentWeights,
-    TimeIntegrator,
+    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StepControl, System,
+    TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -510,4 +510,168 @@ fn a_system_without_energy_is_refused_by_the_conserving_scheme() {
         Err(Error::Incompatible { part, .. }) => assert_eq!(part, "energy–momentum"),
         other => panic!("{:?}", other.map(drop)),
     }
+}
+
+/// A mass on a spring that yields: the plastic part of the elongation is history, which only accepted steps move.
+struct Yielding {
+    mass: [f64; 1],
+    stiffness: f64,
+    limit: f64,
+    plastic: f64,
+    pattern: SymbolicSparseColMat<usize>,
+}
+
+impl Yielding {
+    fn elastic(&self, u: f64) -> f64 {
+        self.stiffness * (u - self.plastic)
+    }
+}
+
+impl System<f64> for Yielding {
+    fn dofs(&self) -> usize {
+        1
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, _: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
+        out[0] = -self.elastic(u[0]).clamp(-self.limit, self.limit);
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, u: &[f64], _: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        let elastic = self.elastic(u[0]).abs() < self.limit;
+        out[0] = if elastic { weights.stiffness * self.stiffness } else { 0.0 };
+        Ok(())
+    }
+    fn commit(&mut self, _: f64, u: &[f64], _: &[f64]) -> Result<()> {
+        let force = self.elastic(u[0]).clamp(-self.limit, self.limit);
+        self.plastic = u[0] - force / self.stiffness;
+        Ok(())
+    }
+}
+
+#[test]
+fn history_variables_move_with_accepted_steps_only() {
+    // Thrown with v: elastic until k u = Y, then decelerated by Y/m; it swings about the plastic elongation afterwards.
+    let (stiffness, limit, v) = (100.0, 5.0, 2.0);
+    let yielded: f64 = limit / stiffness;
+    let rest = 0.5 * (v * v - stiffness * yielded * yielded) / limit;
+    let schemes: [Make; 2] = [|| Box::new(Newmark::trapezoidal()), || Box::new(Bathe::default())];
+    for make in schemes {
+        let pattern = SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]);
+        let mut host = Yielding { mass: [1.0], stiffness, limit, plastic: 0.0, pattern };
+        let h = 1e-3;
+        // Some steps are taken twice: the judgement must come before the history moves.
+        let control = StepControl::halving(h / 8.0).unwrap().local_error(2e-9).unwrap();
+        let mut run =
+            Simulation::builder(&mut host, make(), h).velocity(vec![v]).step_control(control).build().unwrap();
+        let mut turned = 0.0_f64;
+        run.run_until(3.0, &mut |step: &contact_dynamics::StepView<'_, f64>| {
+            turned = turned.max(step.state.displacement()[0]);
+            contact_dynamics::Control::Continue
+        })
+        .unwrap();
+        assert!(run.statistics().refused_steps > 0, "{}", make().name());
+        let (u, v) = (run.state().displacement()[0], run.state().velocity()[0]);
+        drop(run);
+        assert!((turned - yielded - rest).abs() < 1e-4, "{}: {turned}", make().name());
+        // It unloads elastically: amplitude Y/k about the plastic elongation, which is that of the first swing.
+        assert!((host.plastic - rest).abs() < 1e-4, "{}: {} {rest}", make().name(), host.plastic);
+        let amplitude = (u - host.plastic).hypot(v / stiffness.sqrt());
+        assert!((amplitude / yielded - 1.0).abs() < 1e-3, "{}: {amplitude}", make().name());
+    }
+}
+
+#[test]
+fn the_corrected_force_is_that_of_the_balance() {
+    // Where the balance holds at the state: M a = f(u, v) + Gᵀ p after the correction too, with the damping of the
+    // corrected velocity and the normal at the end of the step.
+    let schemes: [Make; 3] =
+        [|| Box::new(Composite), || Box::new(Newmark::trapezoidal()), || Box::new(Bathe::default())];
+    for make in schemes {
+        let circle = Sphere::new([0.0, 0.0], 3.02, Side::Inside).unwrap();
+        let contact = NodesOnObstacle::new(circle, &[[3.0, 0.0]], &[[0, 1]], &[0]).unwrap();
+        let host = || Pendulum { drag: 0.5, ..Pendulum::new(200.0) };
+        let mut run = Simulation::builder(host(), make(), 0.02)
+            .velocity(vec![2.0, 7.0])
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        let mut closed = 0;
+        for step in 0..100 {
+            run.step().unwrap();
+            let state = run.state();
+            let (u, v, a) = (state.displacement(), state.velocity(), state.acceleration());
+            let mut force = [0.0; 2];
+            host().force(state.time(), u, v, &mut force).unwrap();
+            let length = (3.0 + u[0]).hypot(u[1]);
+            let p = state.contacts().forces()[0];
+            closed += usize::from(state.contacts().raw_forces()[0] > 0.0);
+            // The normal points to the center.
+            for (i, x) in [3.0 + u[0], u[1]].into_iter().enumerate() {
+                let miss = 10.0 * a[i] - force[i] + p * x / length;
+                assert!(miss.abs() < 1e-5, "{}, step {step}: {miss:e} of {:e}", make().name(), 10.0 * a[i]);
+            }
+        }
+        assert!(closed > 5, "{closed}");
+    }
+}
+
+#[test]
+fn a_failed_step_leaves_the_rows_of_the_state() {
+    // The host fails after some evaluations, when the row has followed the trial.
+    struct Failing(Pendulum, std::sync::Arc<std::sync::atomic::AtomicUsize>);
+    impl System<f64> for Failing {
+        fn dofs(&self) -> usize {
+            2
+        }
+        fn mass(&self) -> Mass<'_, f64> {
+            self.0.mass()
+        }
+        fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+            use std::sync::atomic::Ordering::Relaxed;
+            if self.1.fetch_sub(1, Relaxed) == 0 {
+                self.1.store(usize::MAX, Relaxed);
+                return Err(Error::Inadmissible { callback: "force", source: "now".into() });
+            }
+            self.0.force(t, u, v, out)
+        }
+        fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+            self.0.pattern()
+        }
+        fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+            self.0.tangent(t, u, v, w, out)
+        }
+        fn prescribed(&self) -> &[usize] {
+            &[1]
+        }
+        fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) {
+            out[0] = [t, 1.0, 0.0];
+        }
+    }
+    let counter = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(usize::MAX));
+    let circle = Sphere::new([0.0, 0.0], 3.02, Side::Inside).unwrap();
+    let contact = NodesOnObstacle::new(circle, &[[3.0, 0.0]], &[[0, 1]], &[0]).unwrap();
+    let host = Failing(Pendulum { drag: 0.5, ..Pendulum::new(200.0) }, counter.clone());
+    let mut run = Simulation::builder(host, Composite, 0.05)
+        .velocity(vec![2.0, 0.0])
+        .constraint(contact)
+        .corrector(PersistencyCorrection::with_history_projection())
+        .build()
+        .unwrap();
+    for _ in 0..10 {
+        run.step().unwrap();
+    }
+    assert!(run.state().contacts().raw_forces()[0] > 0.0);
+    // What is read of the state needs the rows there: the support bears its share of the contact force.
+    run.restart().unwrap();
+    let before = (run.state().clone(), run.reactions().unwrap());
+    counter.store(1, std::sync::atomic::Ordering::Relaxed);
+    assert!(matches!(run.step(), Err(Error::Inadmissible { .. })));
+    assert_eq!((run.state().clone(), run.reactions().unwrap()), before);
+    run.step().unwrap();
 }
