@@ -1,18 +1,18 @@
 //! A stage of a nonlinear system, solved by Newton's method.
 
-use super::contact_step::{ContactStep, Level, advance, keep};
+use super::Workspace;
+use super::contact_step::{Level, advance, keep};
 use super::newton::{Iteration, Newton, TangentUpdate};
-use super::operator::{At, Operator};
+use super::operator::At;
 use super::path::PathWork;
-use super::program::{CompiledStage, ScaledRows};
-use super::{Constraints, Statistics, Workspace};
-use crate::contact::{Candidates, ContactJacobian};
-use crate::contact_solver::ContactSolver;
+use super::program::ScaledRows;
+use super::step::StageSolve;
+use crate::contact::Candidates;
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::{Clock, Motion};
-use crate::system::{Path, System};
+use crate::state::Motion;
+use crate::system::Path;
 
 /// Memory of Newton's method.
 pub(super) struct NewtonWork<T> {
@@ -55,18 +55,6 @@ impl<T: Real> NewtonWork<T> {
     }
 }
 
-/// What a stage is solved with.
-pub(super) struct NewtonStep<'s, 'a, T: Real> {
-    pub(super) stage: &'s CompiledStage<T>,
-    pub(super) clock: Clock,
-    pub(super) system: &'s mut dyn System<T>,
-    pub(super) operator: &'s mut Operator<T>,
-    pub(super) constraints: &'s mut Constraints<'a, T>,
-    pub(super) g: &'s mut ContactJacobian<T>,
-    pub(super) solver: &'s mut dyn ContactSolver<T>,
-    pub(super) statistics: &'s mut Statistics,
-}
-
 /// Linearizations of curved gaps within an iteration, at most.
 const LINEARIZATIONS: usize = 20;
 
@@ -93,9 +81,14 @@ impl Norms {
     }
 }
 
-impl<T: Real> NewtonStep<'_, '_, T> {
-    /// Moves the predicted motion to where the balance and the contact conditions hold. `work.increment` is scratch.
-    pub(super) fn solve(&mut self, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) -> Result<()> {
+impl<T: Real> StageSolve<'_, '_, T> {
+    /// Moves the predicted motion to where the balance and the contact conditions hold, by Newton's method.
+    pub(super) fn by_iteration(
+        &mut self,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<()> {
         let Some(mut newton) = work.newton.take() else { return Ok(()) };
         let result = self.iterate(&mut newton, new, past, work);
         work.newton = Some(newton);
@@ -249,15 +242,6 @@ impl<T: Real> NewtonStep<'_, '_, T> {
         self.loaded(residual, forces).enumerate().fold((0, 0.0), larger).0
     }
 
-    fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {
-        if T::all_finite(values) {
-            return Ok(());
-        }
-        let dof = values.iter().position(|x| !x.is_finite()).unwrap_or(0);
-        let value = values[dof].value();
-        Err(Error::StepNotFinite { t: self.clock.at(0.0), h: self.clock.h, what, dof, value })
-    }
-
     /// Forms and factorizes the effective matrix at the trial motion.
     fn factorize(
         &mut self,
@@ -306,15 +290,7 @@ impl<T: Real> NewtonStep<'_, '_, T> {
                 work.interface.increment.copy_from_slice(&newton.free);
                 work.interface.forces.fill(T::zero());
             }
-            let Self { stage, clock, constraints, g, solver, statistics, .. } = self;
-            let iterate = Some(&newton.d[..]);
-            ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate }.solve(
-                &mut *self.system,
-                self.operator,
-                new,
-                past,
-                work,
-            )?;
+            self.contact(Some(&newton.d), new, past, work)?;
             if let (Some(_), Some(balance)) = (&self.stage.balance, &mut work.balance) {
                 for (&dof, &u) in self.constraints.interface().iter().zip(&newton.balance) {
                     balance.u[dof] = u;

@@ -3,13 +3,15 @@
 use super::contact_step::ContactStep;
 use super::control::Verdict;
 use super::energy::StepBooks;
-use super::newton_step::NewtonStep;
+use super::operator::Operator;
 use super::program::CompiledStage;
-use super::{Simulation, Workspace};
+use super::{Constraints, Simulation, Statistics, Workspace};
+use crate::contact::ContactJacobian;
+use crate::contact_solver::ContactSolver;
 use crate::corrector::{Correction, Erased, ErasedGaps, Scheme};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::Motion;
+use crate::state::{Clock, Motion};
 use crate::system::System;
 
 impl<T: Real> Simulation<'_, T> {
@@ -41,19 +43,21 @@ impl<T: Real> Simulation<'_, T> {
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         let result = self.stages().and_then(|()| self.accept());
-        if result.as_ref().is_ok_and(|&verdict| verdict == Verdict::Accepted) {
-            return result;
-        }
-        {
-            let Self { constraints, g, state, history, work, .. } = self;
-            work.backup.undo(&mut history.slots);
-            std::mem::swap(&mut state.motion, &mut history.slots[0]);
-            if work.newton.is_some() {
-                // Rows may have followed the trial: back to the state. What fails here failed before, and is told then.
-                constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
-            }
+        if !matches!(result, Ok(Verdict::Accepted)) {
+            self.undo();
         }
         result
+    }
+
+    /// Undoes what an attempt has done to state, history and rows.
+    fn undo(&mut self) {
+        let Self { constraints, g, state, history, work, .. } = self;
+        work.backup.undo(&mut history.slots);
+        std::mem::swap(&mut state.motion, &mut history.slots[0]);
+        if work.newton.is_some() {
+            // Rows may have followed the trial: back to the state. What fails here failed before, and is told then.
+            constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
+        }
     }
 
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
@@ -128,40 +132,11 @@ impl<T: Real> Simulation<'_, T> {
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());
             predict(stage, clock.at(stage.load), &mut **system, new, past, work)?;
-            if work.newton.is_some() {
-                let (system, solver) = (&mut **system, &mut **contact_solver);
-                let mut newton = NewtonStep { stage, clock, system, operator, constraints, g, solver, statistics };
-                newton.solve(new, past, work)?;
-            } else {
-                residual(stage, clock.at(stage.load), &mut **system, new, work)?;
-                operator.begin(&mut work.increment, &mut work.interface.increment);
-                work.interface.forces.fill(T::zero());
-                statistics.linear_solves += 1;
-                if constraints.len() > 0 && T::all_finite(&work.interface.increment) {
-                    let solver = &mut **contact_solver;
-                    let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
-                    contact.solve(&mut **system, operator, new, past, work)?;
-                }
-                operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
-                if !T::all_finite(&work.increment) {
-                    let dof = work.increment.iter().position(|x| !x.is_finite()).unwrap_or(0);
-                    let value = work.increment[dof].value();
-                    return Err(Error::StepNotFinite {
-                        t: clock.at(0.0),
-                        h: clock.h,
-                        what: "the increment",
-                        dof,
-                        value,
-                    });
-                }
-                let [w_u, w_v, w_a] = stage.recovery.weights();
-                T::axpy(w_u, &work.increment, &mut new.u);
-                T::axpy(w_v, &work.increment, &mut new.v);
-                if stage.recovery.reads_past(2) {
-                    T::axpy(w_a, &work.increment, &mut new.a);
-                } else {
-                    T::scale_into(w_a, &work.increment, &mut new.a);
-                }
+            let (parts, solver) = (&mut **system, &mut **contact_solver);
+            let mut solve = StageSolve { stage, clock, system: parts, operator, constraints, g, solver, statistics };
+            match work.newton {
+                None => solve.directly(new, past, work)?,
+                Some(_) => solve.by_iteration(new, past, work)?,
             }
             for (&dof, support) in work.prescribed.iter().zip(&work.supports) {
                 new.a[dof] = support[2];
@@ -204,6 +179,67 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         Ok(())
+    }
+}
+
+/// What a stage is solved with.
+pub(super) struct StageSolve<'s, 'a, T: Real> {
+    pub(super) stage: &'s CompiledStage<T>,
+    pub(super) clock: Clock,
+    pub(super) system: &'s mut dyn System<T>,
+    pub(super) operator: &'s mut Operator<T>,
+    pub(super) constraints: &'s mut Constraints<'a, T>,
+    pub(super) g: &'s mut ContactJacobian<T>,
+    pub(super) solver: &'s mut dyn ContactSolver<T>,
+    pub(super) statistics: &'s mut Statistics,
+}
+
+impl<T: Real> StageSolve<'_, '_, T> {
+    /// Moves the predicted motion of a linear system to where the balance and the contact conditions hold.
+    fn directly(&mut self, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) -> Result<()> {
+        let Self { stage, clock, system, operator, .. } = self;
+        residual(stage, clock.at(stage.load), &mut **system, new, work)?;
+        operator.begin(&mut work.increment, &mut work.interface.increment);
+        work.interface.forces.fill(T::zero());
+        self.statistics.linear_solves += 1;
+        if self.constraints.len() > 0 && T::all_finite(&work.interface.increment) {
+            self.contact(None, new, past, work)?;
+        }
+        self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+        self.refuse_nan(&work.increment, "the increment")?;
+        let recovery = &self.stage.recovery;
+        let [w_u, w_v, w_a] = recovery.weights();
+        T::axpy(w_u, &work.increment, &mut new.u);
+        T::axpy(w_v, &work.increment, &mut new.v);
+        if recovery.reads_past(2) {
+            T::axpy(w_a, &work.increment, &mut new.a);
+        } else {
+            T::scale_into(w_a, &work.increment, &mut new.a);
+        }
+        Ok(())
+    }
+
+    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already.
+    pub(super) fn contact(
+        &mut self,
+        iterate: Option<&[T]>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, system, operator, constraints, g, solver, statistics } = self;
+        let mut contact =
+            ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate };
+        contact.solve(&mut **system, operator, new, past, work)
+    }
+
+    pub(super) fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {
+        if T::all_finite(values) {
+            return Ok(());
+        }
+        let dof = values.iter().position(|x| !x.is_finite()).unwrap_or(0);
+        let value = values[dof].value();
+        Err(Error::StepNotFinite { t: self.clock.at(0.0), h: self.clock.h, what, dof, value })
     }
 }
 
