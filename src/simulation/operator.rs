@@ -2,12 +2,13 @@
 
 use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
-use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
+use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
 use crate::system::{Damping, Linearity, Path, System, TangentWeights};
+use faer::sparse::SymbolicSparseColMatRef;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -31,9 +32,22 @@ pub(crate) struct Operator<T> {
     /// Version of the rows that these are responses to.
     rows: u64,
     delassus: Delassus<T>,
-    /// One vector of the system, for factorizations that cannot condense.
+    contact: ContactPath,
+    /// Columns of the system's size, for full solves.
     full: Vec<T>,
 }
+
+/// How contact gets its responses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ContactPath {
+    /// From the trailing block of a factor with the interface eliminated last.
+    Condensed,
+    /// By full solves, a column a row.
+    Full,
+}
+
+/// Fill beyond that of a free order, above which a matrix that is factorized again and again is not ordered for contact.
+const DEAR: f64 = 1.25;
 
 /// The Delassus operator of some rows, kept until they or their responses change.
 #[derive(Debug)]
@@ -76,10 +90,14 @@ impl<T: Real> Operator<T> {
         (rows, interface): (usize, &[usize]),
     ) -> Result<Self> {
         let (tangent, combination) = pattern(system, weights)?;
-        let mut factor = solver.analyze(combination.pattern(), interface)?;
+        let linearity = system.linearity();
+        let varies = tangent == Tangent::Present && linearity == Linearity::Nonlinear;
+        let (factor, contact) = analyze(solver, combination.pattern(), interface, varies)?;
         let columns = memory::zeros(rows, interface.len(), "the responses of the contact rows")?;
-        let full = match factor.condensation() {
-            None if rows > 0 => vec![T::zero(); system.dofs()],
+        let full = match contact {
+            ContactPath::Full if rows > 0 => {
+                memory::zeros(COLUMNS, system.dofs(), "the responses of the contact rows")?
+            }
             _ => Vec::new(),
         };
         let (interface, computed) = (interface.to_vec(), vec![false; rows]);
@@ -92,7 +110,7 @@ impl<T: Real> Operator<T> {
         let mut operator = Self {
             weights,
             tangent,
-            linearity: system.linearity(),
+            linearity,
             combination,
             part: Vec::new(),
             values: Vec::new(),
@@ -102,9 +120,14 @@ impl<T: Real> Operator<T> {
             computed,
             rows: 0,
             delassus,
+            contact,
             full,
         };
         operator.factorize(system, h, at)?;
+        if !operator.full.is_empty() {
+            // Memory for that many columns is allocated now.
+            operator.factor.solve(&mut operator.full);
+        }
         Ok(operator)
     }
 
@@ -156,7 +179,7 @@ impl<T: Real> Operator<T> {
 
     /// Begins `A d = r` with r in `increment`, and writes d on the interface.
     pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) {
-        if let Some(condensed) = self.factor.condensation().filter(|_| !on_interface.is_empty()) {
+        if let Some(condensed) = condensation(self.contact, &mut *self.factor).filter(|_| !on_interface.is_empty()) {
             condensed.condense(increment, on_interface);
             return;
         }
@@ -169,16 +192,17 @@ impl<T: Real> Operator<T> {
     /// Finishes what [`begin`](Self::begin) began: `increment` becomes d with contact `forces` on the interface, which
     /// have changed d there to `on_interface`.
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) {
-        let Self { factor, interface, full, .. } = self;
-        if let Some(condensed) = factor.condensation().filter(|_| !on_interface.is_empty()) {
+        let Self { contact, factor, interface, full, .. } = self;
+        if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
             condensed.expand(on_interface, increment);
         } else if forces.iter().any(|force| *force != T::zero()) {
-            full.fill(T::zero());
+            let column = &mut full[..increment.len()];
+            column.fill(T::zero());
             for (&force, &dof) in forces.iter().zip(interface.iter()) {
-                full[dof] = force;
+                column[dof] = force;
             }
-            factor.solve(full);
-            T::axpy(T::one(), full, increment);
+            factor.solve(column);
+            T::axpy(T::one(), column, increment);
             for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
                 increment[dof] = x;
             }
@@ -187,7 +211,7 @@ impl<T: Real> Operator<T> {
 
     /// `f ← A⁻¹ f` on the interface, for one column of forces there.
     pub(crate) fn respond(&mut self, forces: &mut [T]) {
-        respond(&mut *self.factor, &self.interface, &mut self.full, forces);
+        respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces);
     }
 
     /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response) for ascending rows.
@@ -206,7 +230,7 @@ impl<T: Real> Operator<T> {
             }
             if end > first {
                 let values = &mut self.columns[first * size..end * size];
-                respond(&mut *self.factor, &self.interface, &mut self.full, values);
+                respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, values);
             }
             rest = &rest[(end - first).max(1)..];
         }
@@ -272,20 +296,60 @@ impl<T: Real> Operator<T> {
     }
 }
 
-/// `f ← A⁻¹ f` on the interface, for columns of forces there; `full` is scratch for factorizations that cannot condense.
-fn respond<T: Real>(factor: &mut dyn Factorization<T>, interface: &[usize], full: &mut [T], forces: &mut [T]) {
-    if let Some(condensed) = factor.condensation() {
+/// Analyzes with the interface last, or freely: where the solver does not condense, and where a matrix that varies would
+/// cost much more to factorize than a few full solves.
+fn analyze<T: Real>(
+    solver: &dyn LinearSolver<T>,
+    pattern: SymbolicSparseColMatRef<'_, usize>,
+    interface: &[usize],
+    varies: bool,
+) -> Result<(Box<dyn Factorization<T>>, ContactPath)> {
+    let mut last = solver.analyze(pattern, interface)?;
+    if last.condensation().is_none() {
+        return Ok((last, ContactPath::Full));
+    }
+    if varies && !interface.is_empty() {
+        let free = solver.analyze(pattern, &[])?;
+        if last.stored_values() as f64 > DEAR * free.stored_values() as f64 {
+            return Ok((free, ContactPath::Full));
+        }
+    }
+    Ok((last, ContactPath::Condensed))
+}
+
+/// The condensation, where contact uses it.
+fn condensation<T: Real>(path: ContactPath, factor: &mut dyn Factorization<T>) -> Option<&mut dyn Condensation<T>> {
+    match path {
+        ContactPath::Condensed => factor.condensation(),
+        ContactPath::Full => None,
+    }
+}
+
+/// `f ← A⁻¹ f` on the interface, for columns of forces there; `full` is scratch for full solves.
+fn respond<T: Real>(
+    (path, factor): (ContactPath, &mut dyn Factorization<T>),
+    interface: &[usize],
+    full: &mut [T],
+    forces: &mut [T],
+) {
+    if let Some(condensed) = condensation(path, factor) {
         condensed.solve(forces);
         return;
     }
-    for column in forces.chunks_exact_mut(interface.len().max(1)) {
-        full.fill(T::zero());
-        for (&force, &dof) in column.iter().zip(interface) {
-            full[dof] = force;
+    let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
+    for forces in forces.chunks_mut(COLUMNS * height) {
+        let columns = &mut full[..forces.len() / height * size];
+        columns.fill(T::zero());
+        for (column, forces) in columns.chunks_exact_mut(size).zip(forces.chunks_exact(height)) {
+            for (&force, &dof) in forces.iter().zip(interface) {
+                column[dof] = force;
+            }
         }
-        factor.solve(full);
-        for (x, &dof) in column.iter_mut().zip(interface) {
-            *x = full[dof];
+        factor.solve(columns);
+        for (column, forces) in columns.chunks_exact(size).zip(forces.chunks_exact_mut(height)) {
+            for (x, &dof) in forces.iter_mut().zip(interface) {
+                *x = column[dof];
+            }
         }
     }
 }
