@@ -6,7 +6,7 @@ use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatR
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
     Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, Linearity, Mass,
-    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StepControl, System,
+    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp, StepControl, System,
     TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::{Listed, all};
@@ -213,7 +213,8 @@ fn compliant_laws_and_supports_are_those_of_the_direct_solve() {
                 let bars = Bars::paper(6).delayed(0.3, 2e-3).with_mass(mass);
                 let last = bars.velocities::<f64>().len() - 1;
                 let [left, right] = bars.contact_dofs();
-                let system = || bars.system::<f64>().drive(last, |t| [-0.05 * t, -0.05, 0.0]).unwrap();
+                let system =
+                    || bars.system::<f64>().drive(last, |t| [-0.05 * t - 0.1 * t * t, -0.05 - 0.2 * t, -0.2]).unwrap();
                 let build = |nonlinear: bool| {
                     let system: Box<dyn System<f64>> =
                         if nonlinear { Box::new(Unknowing(system())) } else { Box::new(system()) };
@@ -740,4 +741,68 @@ fn contact_ahead_of_the_state_is_met_after_several_iterations() {
         assert!(met > 3 && most > 2, "{}: {met} steps pressed, {most} iterations", scheme.name());
     }
     assert!(tried > 0);
+}
+
+/// A light mass on a spring whose force levels off, F atan u: Newton's method overshoots from far away.
+struct Leveling {
+    mass: [f64; 1],
+    pattern: SymbolicSparseColMat<usize>,
+    /// Times before this one are not admitted.
+    begins: f64,
+}
+
+impl Leveling {
+    fn new(mass: f64, begins: f64) -> Self {
+        Self { mass: [mass], pattern: SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]), begins }
+    }
+}
+
+impl System<f64> for Leveling {
+    fn dofs(&self) -> usize {
+        1
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, t: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
+        out[0] = -u[0].atan();
+        match t < self.begins {
+            true => Err(Error::Inadmissible { callback: "force", source: "before the beginning".into() }),
+            false => Ok(()),
+        }
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, u: &[f64], _: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        out[0] = weights.stiffness / (1.0 + u[0] * u[0]);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_line_search_converges_where_full_increments_overshoot() {
+    let run = |newton: Newton| {
+        let mut run = Simulation::builder(Leveling::new(1e-6, 0.0), Newmark::new(0.5, 1.0).unwrap(), 1.0)
+            .displacement(vec![5.0])
+            .newton(newton)
+            .start_up(StartUp::Taylor)
+            .build()
+            .unwrap();
+        // Without acceleration at the start the prediction would be far away at once.
+        let result = run.step();
+        (result, run.state().displacement()[0], run.convergence().len())
+    };
+    assert!(matches!(run(Newton::full()).0, Err(Error::NewtonNotConverged { .. } | Error::StepNotFinite { .. })));
+    let (result, u, iterations) = run(Newton::full().line_search());
+    result.unwrap();
+    assert!(u.is_finite() && iterations < 60, "{u} after {iterations}");
+}
+
+#[test]
+fn a_past_that_the_host_does_not_admit_is_not_free_flight() {
+    // At rest in equilibrium: no acceleration, so the straight past is asked for, and refused.
+    let mut run = Simulation::builder(Leveling::new(1.0, -1e-9), Composite, 0.1).velocity(vec![0.0]).build().unwrap();
+    assert!(run.history().is_empty());
+    run.run_until(1.0, &mut ()).unwrap();
 }

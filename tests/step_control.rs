@@ -235,6 +235,17 @@ fn a_controlled_run_is_continued_bit_for_bit() {
 }
 
 #[test]
+fn a_restart_keeps_the_place_in_the_nominal_grid() {
+    let rule = Rule { window: [0.2003, 0.2107], limit: H / 8.0, recoverable: true };
+    let (mut run, _) = reluctant(SCHEMES[0], rule, Some(StepControl::halving(H / 64.0).unwrap()));
+    run.run_until(0.2053, &mut ()).unwrap();
+    assert!(run.step_size() < H);
+    run.restart().unwrap();
+    run.run_until(0.25, &mut ()).unwrap();
+    assert!((run.step_size() - H).abs() < 1e-15 && ((run.time() / H).round() * H - run.time()).abs() < 1e-12);
+}
+
+#[test]
 fn control_that_refuses_nothing_changes_nothing() {
     let control = StepControl::halving(1e-9).unwrap().local_error(1.0).unwrap().contact_changes(5).unwrap();
     for make in SCHEMES {
@@ -347,7 +358,10 @@ fn the_error_follows_the_tolerance() {
                 .build()
                 .unwrap();
             run.run_until(5.0, &mut ()).unwrap();
-            assert_eq!(run.statistics().coarse_steps, 0);
+            let counts = run.statistics();
+            assert_eq!(counts.coarse_steps, 0);
+            // Growth that would be refused is not tried.
+            assert!(counts.refused_steps < 10 + counts.steps / 20, "{}: {counts:?}", make().name());
             (error_of(&run, omega), run.statistics().steps)
         });
         // Errors a step fall 100 times, steps become 100^(1/3) times as many, give or take a power of two.

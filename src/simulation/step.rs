@@ -269,6 +269,14 @@ fn predict<T: Real>(
     if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
         put_supports(system, t_balance, prescribed, balance_supports, balance)?;
+        if let (true, Some(start)) = (stage.along_path, past.first()) {
+            // The mean of the ends is that of the supports too: work is force times the way between them.
+            let per_step = T::of((new.t - start.t).recip());
+            for &dof in prescribed.iter() {
+                let (from, to) = (start.u[dof], new.u[dof]);
+                (balance.u[dof], balance.v[dof]) = (T::of(0.5) * (from + to), per_step * (to - from));
+            }
+        }
     }
     Ok(())
 }
