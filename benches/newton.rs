@@ -3,7 +3,7 @@
 //! `cargo bench --bench newton -- [elements a side]…` (default 6 and 10)
 
 use contact_dynamics::faer::sparse::SparseColMat;
-use contact_dynamics::{Automatic, Composite, LinearSolver, Newton, Simulation, System, TangentWeights};
+use contact_dynamics::{Automatic, Composite, Factorization, LinearSolver, Newton, Simulation, System, TangentWeights};
 use contact_dynamics_scenes::hyperelastic::Hyperelastic;
 use contact_dynamics_scenes::large::{Scene, Throw};
 use std::hint::black_box;
@@ -37,6 +37,13 @@ fn measure(cells: usize) {
     let near = Throw { gravity: 0.05, height: 0.0, spin: 0.0, slide: 0.0, angle: 0.0, ..throw }.cube();
     let (dofs, candidates) = (far.body.dofs(), far.nodes.len());
     println!("cube of {cells}³ hex8 elements, {dofs} dofs, {candidates} candidates, neo-Hookean, Courant number 1");
+    let fill = |axes: &[usize]| {
+        let last: Vec<usize> = far.nodes.iter().flat_map(|node| axes.iter().map(move |axis| 3 * node + axis)).collect();
+        let factor: Box<dyn Factorization<f64>> = Automatic.analyze(far.body.pattern(), &last).expect("memory");
+        factor.stored_values() as f64 / 1e6
+    };
+    let [free, one, all] = [fill(&[]), fill(&[2]), fill(&[0, 1, 2])];
+    println!("fill: {free:.2} M free, {one:.2} M with one dof a candidate last, {all:.2} M with all their dofs last");
     let mut rows = parts(&far);
     for (name, scene, newton) in [
         ("step away, full", &far, Newton::full()),
