@@ -806,3 +806,46 @@ fn a_past_that_the_host_does_not_admit_is_not_free_flight() {
     assert!(run.history().is_empty());
     run.run_until(1.0, &mut ()).unwrap();
 }
+
+#[test]
+fn a_negative_stiffness_asks_for_smaller_steps() {
+    /// A pencil on its tip: u'' = 100 sin u.
+    struct Pencil(SymbolicSparseColMat<usize>);
+    impl System<f64> for Pencil {
+        fn dofs(&self) -> usize {
+            1
+        }
+        fn mass(&self) -> Mass<'_, f64> {
+            Mass::Lumped(&[1.0])
+        }
+        fn force(&mut self, _: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
+            out[0] = 100.0 * u[0].sin();
+            Ok(())
+        }
+        fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+            self.0.as_ref()
+        }
+        fn tangent(&mut self, _: f64, u: &[f64], _: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+            out[0] = -w.stiffness * 100.0 * u[0].cos();
+            Ok(())
+        }
+    }
+    let build = |h: f64, control: Option<StepControl>| {
+        let pattern = SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]);
+        let builder = Simulation::builder(Pencil(pattern), Newmark::trapezoidal(), h).displacement(vec![1e-3]);
+        match control {
+            Some(control) => builder.step_control(control),
+            None => builder,
+        }
+        .build()
+        .unwrap()
+    };
+    // 4/h² < 100: no step of that size has a solution that is stable.
+    let mut run = build(0.25, None);
+    assert!(matches!(run.step(), Err(Error::IndefiniteTangent { iteration: 1, dof: 0, .. })));
+    let mut run = build(0.25, Some(StepControl::halving(1e-4).unwrap().local_error(1e-7).unwrap()));
+    run.run_until(0.5, &mut ()).unwrap();
+    // It falls as u₀ cosh 10 t at first.
+    let exact = 1e-3 * 5.0_f64.cosh();
+    assert!((run.state().displacement()[0] / exact - 1.0).abs() < 0.01, "{}", run.state().displacement()[0] / exact);
+}

@@ -27,7 +27,7 @@ struct Row<'a, T> {
 ///   2 v · ∂²g/∂t∂x + ∂²g/∂t² if it depends on t.
 ///
 /// It is pure; where only the gap matters v is zero. The last two may be left zero at the price of the correctors:
-/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares the gradient and the rate with differences.
+/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
 ///
 /// With a linear system rows are linearized once, where a step begins; with a nonlinear one they follow Newton's method
 /// to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are
@@ -74,8 +74,9 @@ struct Row<'a, T> {
 ///     [distance - 1.0, 0.0, across * across / distance]
 /// };
 /// let mut contact = GapFunction::new(&[0, 1, 2, 3], balls).scale(1.0)?;
-/// let error = verify::gap_jacobian(&mut contact, 0.0, &[0.1, 0.0, 0.0, -0.2], &[0.0; 4], 1e-5)?;
-/// assert!(error.rows == 1 && error.jacobian < 1e-9, "{error:?}");
+/// let (u, v) = ([0.1, 0.0, 0.0, -0.2], [1.0, 0.0, 0.0, -0.5]);
+/// let error = verify::gap_jacobian(&mut contact, 0.0, &u, &v, 1e-6)?;
+/// assert!(error.rows == 1 && error.jacobian < 1e-8 && error.acceleration < 1e-5, "{error:?}");
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub struct GapFunction<'a, T: Real> {

@@ -123,7 +123,11 @@ impl<T: Real> Operator<T> {
             contact,
             full,
         };
-        operator.factorize(system, h, at)?;
+        match operator.factorize(system, h, at) {
+            // Another state, or a smaller step, may do: the step will say.
+            Err(Error::Singular { .. }) if operator.varies() => {}
+            other => other?,
+        }
         if !operator.full.is_empty() {
             // Memory for that many columns is allocated now.
             operator.factor.solve(&mut operator.full);
