@@ -747,13 +747,19 @@ fn contact_ahead_of_the_state_is_met_after_several_iterations() {
 struct Leveling {
     mass: [f64; 1],
     pattern: SymbolicSparseColMat<usize>,
-    /// Times before this one are not admitted.
+    /// Times before this one are not admitted, nor elongations beyond a bound.
     begins: f64,
+    bound: f64,
 }
 
 impl Leveling {
     fn new(mass: f64, begins: f64) -> Self {
-        Self { mass: [mass], pattern: SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]), begins }
+        Self {
+            mass: [mass],
+            pattern: SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]),
+            begins,
+            bound: 1e300,
+        }
     }
 }
 
@@ -766,8 +772,8 @@ impl System<f64> for Leveling {
     }
     fn force(&mut self, t: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
         out[0] = -u[0].atan();
-        match t < self.begins {
-            true => Err(Error::Inadmissible { callback: "force", source: "before the beginning".into() }),
+        match t < self.begins || u[0].abs() > self.bound {
+            true => Err(Error::Inadmissible { callback: "force", source: "too early or too far".into() }),
             false => Ok(()),
         }
     }
@@ -782,8 +788,9 @@ impl System<f64> for Leveling {
 
 #[test]
 fn a_line_search_converges_where_full_increments_overshoot() {
-    let run = |newton: Newton| {
-        let mut run = Simulation::builder(Leveling::new(1e-6, 0.0), Newmark::new(0.5, 1.0).unwrap(), 1.0)
+    let run = |newton: Newton, bound: f64| {
+        let host = Leveling { bound, ..Leveling::new(1e-6, 0.0) };
+        let mut run = Simulation::builder(host, Newmark::new(0.5, 1.0).unwrap(), 1.0)
             .displacement(vec![5.0])
             .newton(newton)
             .start_up(StartUp::Taylor)
@@ -793,10 +800,19 @@ fn a_line_search_converges_where_full_increments_overshoot() {
         let result = run.step();
         (result, run.state().displacement()[0], run.convergence().len())
     };
-    assert!(matches!(run(Newton::full()).0, Err(Error::NewtonNotConverged { .. } | Error::StepNotFinite { .. })));
-    let (result, u, iterations) = run(Newton::full().line_search());
+    assert!(matches!(
+        run(Newton::full(), 1e300).0,
+        Err(Error::NewtonNotConverged { .. } | Error::StepNotFinite { .. })
+    ));
+    let (result, u, iterations) = run(Newton::full().line_search(), 1e300);
     result.unwrap();
     assert!(u.is_finite() && iterations < 60, "{u} after {iterations}");
+    // Neither does it go where the host cannot follow.
+    let farthest = u.abs().max(5.0) + 1.0;
+    assert!(matches!(run(Newton::full(), farthest).0, Err(Error::Inadmissible { .. })));
+    let (result, same, _) = run(Newton::full().line_search(), farthest);
+    result.unwrap();
+    assert!((same - u).abs() < 1e-6 * u.abs().max(1.0), "{same} {u}");
 }
 
 #[test]

@@ -60,8 +60,8 @@ impl Newton {
         Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
     }
 
-    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller. It costs nothing
-    /// where full increments do. Slender structures converge through larger residuals and are better left without.
+    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller or lead to a state that
+    /// the host does not admit. It costs nothing where full increments do. Slender structures converge through larger residuals and are better left without.
     #[must_use]
     pub const fn line_search(self) -> Self {
         Self { line_search: true, ..self }

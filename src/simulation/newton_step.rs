@@ -27,6 +27,8 @@ pub(super) struct NewtonWork<T> {
     balance: Vec<T>,
     /// Gaps by the rows that were solved with, one a candidate.
     gaps: Vec<T>,
+    /// Change of the contact forces by the last linearization of curved gaps, over the forces.
+    unsettled: f64,
     /// For schemes that take the force of the whole path.
     path: Option<PathWork<T>>,
     pub(super) report: Vec<Iteration>,
@@ -49,6 +51,7 @@ impl<T: Real> NewtonWork<T> {
             free: zero(interface),
             balance: zero(interface),
             gaps: zero(rows),
+            unsettled: 0.0,
             path,
             report: Vec::with_capacity(settings.iterations),
         }
@@ -121,10 +124,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let before = Norms { residual: self.loaded_norm(&newton.residual, &work.interface.forces), ..norms };
             let size = norm(&work.increment);
             let Some(share) = self.advance(newton, new, past, work, before, &mut norms)? else {
-                match settled {
-                    true => return Ok(()),
-                    false => break,
+                if settled {
+                    return Ok(());
                 }
+                // The stage is linear but for its gaps, which have been linearized that often.
+                newton.report.clear();
+                newton.report.resize(LINEARIZATIONS, Iteration { residual: newton.unsettled, increment: 0.0 });
+                break;
             };
             // Rows fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
@@ -132,6 +138,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 return Ok(());
             }
         }
+        // (There is at least one iteration.)
         let last = newton.report.last().copied().unwrap_or_default();
         Err(Error::NewtonNotConverged {
             t: self.clock.at(0.0),
@@ -189,6 +196,14 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
+    /// The motion at which the balance holds.
+    fn balanced<'m>(&self, new: &'m Motion<T>, balance: Option<&'m Motion<T>>) -> &'m Motion<T> {
+        match (&self.stage.balance, balance) {
+            (Some(_), Some(balance)) => balance,
+            _ => new,
+        }
+    }
+
     /// Leaves f − M ā at the trial motion in `work.increment`.
     fn evaluate(
         &mut self,
@@ -199,10 +214,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     ) -> Result<Norms> {
         let Workspace { increment, balance, prescribed, interface, .. } = work;
         let t = self.clock.at(self.stage.load);
-        let motion = match (&self.stage.balance, &*balance) {
-            (Some(_), Some(balance)) => balance,
-            _ => new,
-        };
+        let motion = self.balanced(new, balance.as_ref());
         match (&mut newton.path, past.first()) {
             (Some(path), Some(from)) if self.stage.along_path => {
                 path.force(self.system, t, [&from.u, &new.u, &motion.u], &motion.v, increment)?;
@@ -251,10 +263,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         past: &[Motion<T>],
         work: &Workspace<T>,
     ) -> Result<()> {
-        let motion = match (&self.stage.balance, &work.balance) {
-            (Some(_), Some(balance)) => balance,
-            _ => new,
-        };
+        let motion = self.balanced(new, work.balance.as_ref());
         let path = match (&newton.path, past.first()) {
             (Some(_), Some(from)) if self.stage.along_path => Some(Path { from: &from.u, to: &new.u, mean: &motion.u }),
             _ => None,
@@ -342,7 +351,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             let moved_forces = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| new - old);
             let miss = moved_forces.map(|x| x.value().powi(2)).sum::<f64>().sqrt();
-            settled &= miss <= force * norm(&interface.forces);
+            let size = norm(&interface.forces);
+            newton.unsettled = if size > 0.0 { miss / size } else { 0.0 };
+            settled &= miss <= force * size;
         }
         for (&dof, &u) in constraints.interface().iter().zip(&interface.displacement) {
             new.u[dof] = u;
@@ -367,20 +378,26 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if !self.operator.varies() {
             return Ok(None);
         }
-        *norms = self.evaluate(newton, new, past, work)?;
+        let [force, _] = newton.settings.bounds::<T>();
         let mut share = 1.0;
-        if newton.settings.line_search {
-            let [force, _] = newton.settings.bounds::<T>();
-            while share > SHORTEST
-                && norms.residual > force * norms.scale()
-                && norms.residual > (1.0 - 1e-4 * share) * before.residual
-            {
-                share *= 0.5;
-                self.shift(-T::of(share), newton, new, work);
-                *norms = self.evaluate(newton, new, past, work)?;
+        loop {
+            let found = self.evaluate(newton, new, past, work);
+            let may_shorten = newton.settings.line_search && share > SHORTEST;
+            match found {
+                Ok(found) => {
+                    *norms = found;
+                    let falls = found.residual <= (1.0 - 1e-4 * share) * before.residual;
+                    if !may_shorten || falls || found.residual <= force * found.scale() {
+                        return Ok(Some(share));
+                    }
+                }
+                // The host may admit a state that is nearer.
+                Err(error) if may_shorten && error.is_recoverable() => {}
+                Err(error) => return Err(error),
             }
+            share *= 0.5;
+            self.shift(-T::of(share), newton, new, work);
         }
-        Ok(Some(share))
     }
 
     /// Adds a share of the increment to everything that contains the unknown.
