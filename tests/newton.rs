@@ -1,13 +1,13 @@
 //! Newton's method: it solves linear systems as the direct solve does, converges quadratically, follows curved gaps, and
 //! fails without leaving a trace.
 
-use contact_dynamics::contact::{ContactLaw, Side, Sphere};
-use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::contact::{ContactLaw, GapFunction, Side, Sphere};
+use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
-    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, Linearity, Mass,
-    Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp, StepControl, System,
-    TangentWeights, TimeIntegrator,
+    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem, Linearity,
+    Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp, StepControl,
+    System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -864,4 +864,36 @@ fn a_negative_stiffness_asks_for_smaller_steps() {
     // It falls as u₀ cosh 10 t at first.
     let exact = 1e-3 * 5.0_f64.cosh();
     assert!((run.state().displacement()[0] / exact - 1.0).abs() < 0.01, "{}", run.state().displacement()[0] / exact);
+}
+
+#[test]
+fn gaps_that_never_stand_still_fail_the_step() {
+    // Waves of the floor that a step flies over: where it ends its slope may be anything.
+    let floor = |_: f64, x: &[f64], _: &[f64], gradient: &mut [f64]| {
+        let phase = 200.0 * x[0];
+        gradient.copy_from_slice(&[-20.0 * phase.cos(), 1.0]);
+        [0.5 + x[1] - 0.1 * phase.sin(), 0.0, 0.0]
+    };
+    let zero = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let mut refused = 0;
+    for slide in 0..20 {
+        let mut run =
+            Simulation::builder(LinearSystem::lumped(vec![1.0; 2], zero.clone()).unwrap(), Newmark::trapezoidal(), 1.0)
+                .velocity(vec![0.1 * f64::from(slide), -1.0])
+                .constraint(GapFunction::new(&[0, 1], floor))
+                .newton(Newton::full())
+                .build()
+                .unwrap();
+        let before = run.state().clone();
+        if let Err(error) = run.step() {
+            refused += 1;
+            assert!(error.is_recoverable());
+            match error {
+                Error::NewtonNotConverged { iterations: 20, residual, .. } => assert!(residual > 1e-9, "{residual:e}"),
+                other => panic!("{other:?}"),
+            }
+            assert_eq!(*run.state(), before);
+        }
+    }
+    assert!(refused > 0);
 }

@@ -352,7 +352,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let moved_forces = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| new - old);
             let miss = moved_forces.map(|x| x.value().powi(2)).sum::<f64>().sqrt();
             let size = norm(&interface.forces);
-            newton.unsettled = if size > 0.0 { miss / size } else { 0.0 };
+            // A gap that is missed is a force that is missed.
+            let change = if size > 0.0 { miss / size } else { 0.0 };
+            newton.unsettled = if settled { change } else { change.max(1.0) };
             settled &= miss <= force * size;
         }
         for (&dof, &u) in constraints.interface().iter().zip(&interface.displacement) {
