@@ -271,6 +271,6 @@ impl<'a, T: Real> Simulation<'a, T> {
     ///
     /// The host's own.
     pub fn reactions(&mut self) -> Result<Vec<T>> {
-        energy::reactions(&mut *self.system, &self.state, &self.g)
+        energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g))
     }
 }

@@ -483,9 +483,13 @@ impl<T: Real> NodeToFacet<T> {
                 Some((stand, ground.surface.facets()[stand.facet].nodes()))
             });
             match stand {
-                Some((stand, vertices)) => {
-                    found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
-                }
+                Some((stand, vertices)) => match old.followed_by(stand) {
+                    Some(stand) => {
+                        found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+                    }
+                    // Until the next search it stays where it was linearized last.
+                    None => found.keep(rows, row),
+                },
                 // There is nothing near that it could press on.
                 None if known > 0.0 && rows.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
                 None => {

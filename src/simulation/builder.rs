@@ -270,7 +270,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.shown = scheme.shown(&state.motion);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
-            EnergyBalance::On => Some(Ledger::new(&mut *system, &state, &g, rows)?),
+            EnergyBalance::On => Some(Ledger::new(&mut *system, &state, (&constraints, &g))?),
         };
         let judge = match self.control {
             None => None,

@@ -5,6 +5,7 @@ use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
+use crate::state::ContactState;
 
 /// The constraints in the order given, their rows one after the other.
 pub(crate) struct Constraints<'a, T: Real> {
@@ -227,6 +228,17 @@ impl<'a, T: Real> Constraints<'a, T> {
                 Err(Error::ContactNotFinite { t, what: "the gap", contact: self.ids[row], value: out[row].value() })
             }
         }
+    }
+
+    /// (contact, row) of the contacts of a state that are candidates still: a search may have found others since.
+    pub(crate) fn rows_of<'c>(&'c self, contacts: &'c ContactState<T>) -> impl Iterator<Item = (usize, usize)> + 'c {
+        let (same, sorted) = (self.ids == contacts.ids, self.ids.is_sorted());
+        let row = move |contact: usize, id: &ContactId| match (same, sorted) {
+            (true, _) => Some(contact),
+            (_, true) => self.ids.binary_search(id).ok(),
+            _ => self.ids.iter().position(|other| other == id),
+        };
+        contacts.ids.iter().enumerate().filter_map(move |(contact, id)| row(contact, id).map(|row| (contact, row)))
     }
 
     /// Refuses rows that act on no free dof, and gaps that are not numbers.

@@ -1,5 +1,6 @@
 //! Energy of a state, the energy balance of a run, and the forces of the supports.
 
+use super::Constraints;
 use crate::contact::ContactJacobian;
 use crate::error::Result;
 use crate::real::Real;
@@ -56,6 +57,9 @@ pub(crate) struct Ledger<T> {
     lambda: Vec<T>,
 }
 
+/// The constraints and their rows of G.
+pub(crate) type Rows<'r, 'a, T> = (&'r Constraints<'a, T>, &'r ContactJacobian<T>);
+
 /// An accepted step, as the ledger sees it.
 pub(crate) struct StepBooks<'a, T> {
     pub(crate) t: f64,
@@ -68,12 +72,7 @@ pub(crate) struct StepBooks<'a, T> {
 }
 
 impl<T: Real> Ledger<T> {
-    pub(crate) fn new(
-        system: &mut dyn System<T>,
-        state: &State<T>,
-        g: &ContactJacobian<T>,
-        rows: usize,
-    ) -> Result<Self> {
+    pub(crate) fn new(system: &mut dyn System<T>, state: &State<T>, rows: Rows<'_, '_, T>) -> Result<Self> {
         let zero = || vec![T::zero(); system.dofs()];
         let mut ledger = Self {
             works: Works::default(),
@@ -84,10 +83,10 @@ impl<T: Real> Ledger<T> {
             residual: zero(),
             power: T::zero(),
             reactions: vec![T::zero(); system.prescribed().len()],
-            lambda: vec![T::zero(); rows],
+            lambda: vec![T::zero(); rows.0.capacity()],
         };
         ledger.start = energy(system, state, None).total();
-        ledger.restart(system, state, g)?;
+        ledger.restart(system, state, rows)?;
         Ok(ledger)
     }
 
@@ -96,9 +95,9 @@ impl<T: Real> Ledger<T> {
         &mut self,
         system: &mut dyn System<T>,
         state: &State<T>,
-        g: &ContactJacobian<T>,
+        rows: Rows<'_, '_, T>,
     ) -> Result<()> {
-        self.reactions = reactions(system, state, g)?;
+        self.reactions = reactions(system, state, rows)?;
         self.power = self.damping_power(system, state.displacement(), state.velocity());
         system.external_load(state.time(), &mut self.load);
         Ok(())
@@ -111,10 +110,10 @@ impl<T: Real> Ledger<T> {
         }
     }
 
-    /// Remembers what the step starts from.
-    pub(crate) fn begin(&mut self, state: &State<T>) {
+    /// Remembers what the step starts from: displacements, and forces carried over to the candidates of the step.
+    pub(crate) fn begin(&mut self, state: &State<T>, carried: &ContactState<T>) {
         self.old_u.copy_from_slice(state.displacement());
-        let lambda = state.contacts().forces();
+        let lambda = carried.forces();
         self.lambda[..lambda.len()].copy_from_slice(lambda);
         self.lambda[lambda.len()..].fill(T::zero());
     }
@@ -122,7 +121,7 @@ impl<T: Real> Ledger<T> {
     /// What may fail, before the step is accepted: the forces of the supports.
     pub(crate) fn prepare(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) -> Result<()> {
         if !system.prescribed().is_empty() {
-            balance_residual(system, books.t, books.motion, books.contacts, books.g, &mut self.residual)?;
+            balance_residual(system, books.t, books.motion, &books.contacts.lambda, books.g, &mut self.residual)?;
         }
         Ok(())
     }
@@ -179,11 +178,15 @@ pub(crate) fn energy<T: Real>(system: &mut dyn System<T>, state: &State<T>, ledg
 pub(crate) fn reactions<T: Real>(
     system: &mut dyn System<T>,
     state: &State<T>,
-    g: &ContactJacobian<T>,
+    (constraints, g): Rows<'_, '_, T>,
 ) -> Result<Vec<T>> {
+    let mut forces = vec![T::zero(); constraints.len()];
+    for (contact, row) in constraints.rows_of(&state.contacts) {
+        forces[row] = state.contacts.lambda[contact];
+    }
     let mut residual = vec![T::zero(); system.dofs()];
     let motion = [state.displacement(), state.velocity(), state.acceleration()];
-    balance_residual(system, state.time(), motion, &state.contacts, g, &mut residual)?;
+    balance_residual(system, state.time(), motion, &forces, g, &mut residual)?;
     Ok(system.prescribed().iter().map(|&dof| residual[dof]).collect())
 }
 
@@ -192,12 +195,12 @@ fn balance_residual<T: Real>(
     system: &mut dyn System<T>,
     t: f64,
     [u, v, a]: [&[T]; 3],
-    contacts: &ContactState<T>,
+    forces: &[T],
     g: &ContactJacobian<T>,
     residual: &mut [T],
 ) -> Result<()> {
     system.force(t, u, v, residual)?;
-    for (row, &force) in contacts.lambda.iter().enumerate() {
+    for (row, &force) in forces.iter().enumerate() {
         g.scatter(row, force, residual);
     }
     for r in residual.iter_mut() {

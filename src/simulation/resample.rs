@@ -100,9 +100,9 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         conserve_momentum(scheme, state, history, h, &mut past);
-        let closed: Vec<usize> = (0..constraints.len())
-            .filter(|&row| state.contacts.closed[row] && !constraints.law(row).is_compliant())
-            .collect();
+        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
+        let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).is_compliant());
+        let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
             projection.close(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
@@ -156,7 +156,7 @@ impl<T: Real> Simulation<'_, T> {
             *startup = None;
         }
         if let Some(ledger) = &mut self.ledger {
-            ledger.restart(&mut **system, &begun.0, g)?;
+            ledger.restart(&mut **system, &begun.0, (constraints, g))?;
         }
         let pace = history.pace;
         (*state, *history) = begun;

@@ -32,12 +32,12 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Tries a step of the present size.
     pub(super) fn attempt(&mut self) -> Result<Verdict> {
-        if let Some(ledger) = &mut self.ledger {
-            ledger.begin(&self.state);
-        }
-        let Self { constraints, g, state, history, work, .. } = self;
+        let Self { constraints, g, state, history, work, ledger, .. } = self;
         constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
         work.trial.carry_over(&state.contacts, &constraints.ids);
+        if let Some(ledger) = ledger {
+            ledger.begin(state, &work.trial);
+        }
         work.closed_at_start.clone_from(&work.trial.closed);
         work.backup.begin();
         work.correction_energy = T::zero();

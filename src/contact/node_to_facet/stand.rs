@@ -25,6 +25,8 @@ pub(super) struct Stand {
     pub(super) weights: [f64; 4],
     pub(super) normal: Point,
     pub(super) gap: f64,
+    /// How often the normal has jumped since the search.
+    pub(super) jumps: u8,
 }
 
 /// The nodes of a pass and what they may stand on, at the positions now.
@@ -87,7 +89,7 @@ impl Ground<'_> {
         }
         let p = self.positions[self.nodes[place]];
         let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
-        Some(Stand { place, facet, location, weights, normal, gap })
+        Some(Stand { place, facet, location, weights, normal, gap, jumps: 0 })
     }
 }
 
@@ -98,6 +100,16 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
+    /// Where the node stands now, as the stand that follows this one; nothing if its normal has jumped too often: between
+    /// two facets, or around an edge that it touches, a node has no normal to converge to.
+    pub(super) fn followed_by(&self, next: Self) -> Option<Self> {
+        /// Cosine of the angle that is a jump, and jumps that are followed.
+        const TURN: f64 = 1.0 - 1e-5;
+        const PATIENCE: u8 = 4;
+        let jumps = self.jumps + u8::from(dot(self.normal, next.normal) < TURN);
+        (jumps <= PATIENCE).then_some(Self { jumps, ..next })
+    }
+
     /// d²g/ds² along x + s v, with the node at x of velocity v, and the facet and its vertices' velocities as shapes.
     ///
     /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet's
