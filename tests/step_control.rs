@@ -1,13 +1,15 @@
 //! Step-size control: refused steps, judgement, growth, and landing on a time.
 
+use contact_dynamics::contact::{Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, Control, Error, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, Linearity, Mass,
-    Newmark, PersistencyCorrection, Result, Simulation, StepControl, StepView, System, TangentWeights, TimeIntegrator,
-    analysis,
+    Newmark, NodesOnObstacle, PersistencyCorrection, Result, Simulation, StepControl, StepView, System, TangentWeights,
+    TimeIntegrator, analysis,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::solids::{Material, Solid};
 use std::sync::{Arc, Mutex};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
@@ -73,6 +75,36 @@ impl System<f64> for Reluctant {
     fn commit(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<()> {
         self.last = t;
         Ok(())
+    }
+}
+
+/// The same with the supports of the system inside.
+struct Held(Reluctant);
+
+impl System<f64> for Held {
+    fn dofs(&self) -> usize {
+        self.0.dofs()
+    }
+    fn linearity(&self) -> Linearity {
+        Linearity::Linear
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        self.0.mass()
+    }
+    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.0.force(t, u, v, out)
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.0.pattern()
+    }
+    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        self.0.tangent(t, u, v, weights, out)
+    }
+    fn prescribed(&self) -> &[usize] {
+        self.0.inner.prescribed()
+    }
+    fn commit(&mut self, t: f64, u: &[f64], v: &[f64]) -> Result<()> {
+        self.0.commit(t, u, v)
     }
 }
 
@@ -243,6 +275,57 @@ fn a_restart_keeps_the_place_in_the_nominal_grid() {
     run.restart().unwrap();
     run.run_until(0.25, &mut ()).unwrap();
     assert!((run.step_size() - H).abs() < 1e-15 && ((run.time() / H).round() * H - run.time()).abs() < 1e-12);
+}
+
+#[test]
+fn a_refused_step_may_have_found_other_contacts() {
+    // A ball rolls over a block: candidates come and go with every search, that of a refused step included.
+    let block = Solid::rectangle([1.0; 2], [8; 2], Material { young: 100.0, poisson: 0.3, density: 1.0 });
+    let top: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][1] > 0.99).collect();
+    let bottom: Vec<usize> = (0..block.nodes.len()).filter(|&n| block.nodes[n][1] < 0.01).collect();
+    let h = 0.02;
+    let run = |rule: Rule, control: Option<StepControl>| {
+        let ball = Sphere::new([-0.3, 1.45], 0.5, Side::Outside).unwrap();
+        let contact = NodesOnObstacle::new(ball, &block.nodes, &block.node_dofs(), &top).unwrap();
+        let contact = contact.reach(0.04).unwrap().moving(|t| [[t, 0.0], [1.0, 0.0], [0.0; 2]]);
+        let inner = bottom.iter().fold(block.system(), |system, &n| {
+            [0, 1]
+                .into_iter()
+                .fold(system, |system: LinearSystem<'static, f64>, axis| system.fix(2 * n + axis).unwrap())
+        });
+        let shared = Arc::new(Mutex::new(rule));
+        let builder =
+            Simulation::builder(Held(Reluctant { inner, last: 0.0, rule: Arc::clone(&shared) }), Composite, h)
+                .constraint(contact)
+                .corrector(PersistencyCorrection::with_history_projection());
+        let builder = match control {
+            Some(control) => builder.step_control(control),
+            None => builder,
+        };
+        (builder.build().unwrap(), shared)
+    };
+    let always = |t: f64| Rule { window: [t, 2.0], limit: h / 8.0, recoverable: true };
+    let (mut by_hand, rule) = run(NEVER, None);
+    let mut found = 0;
+    for _ in 0..40 {
+        let before = (seen(&by_hand), by_hand.reactions().unwrap(), by_hand.gaps().len());
+        *rule.lock().unwrap() = always(0.0);
+        by_hand.step().unwrap_err();
+        assert_eq!((seen(&by_hand), by_hand.gaps().len()), (before.0, before.2));
+        for (x, y) in by_hand.reactions().unwrap().iter().zip(&before.1) {
+            assert!((x - y).abs() < 1e-9, "{x} {y}");
+        }
+        // Another size and back, with the contacts of a search that is not that of the state.
+        by_hand.set_step_size(h / 2.0).unwrap();
+        by_hand.set_step_size(h).unwrap();
+        *rule.lock().unwrap() = NEVER;
+        by_hand.step().unwrap();
+        found += usize::from(by_hand.gaps().len() != before.2);
+    }
+    assert!(found > 5, "{found}");
+    let (mut controlled, _) = run(always(0.1), Some(StepControl::halving(h / 8.0).unwrap()));
+    controlled.run_until(0.5, &mut ()).unwrap();
+    assert!(controlled.statistics().refused_steps > 2);
 }
 
 #[test]

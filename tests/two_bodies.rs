@@ -301,3 +301,53 @@ fn facets_pass_the_check_that_hosts_run_on_their_own_constraints() {
     assert!(error.rows >= 9 && error.jacobian < 1e-6, "{error:?}");
     assert!(error.acceleration < 1e-3, "{error:?}");
 }
+
+#[test]
+fn blocks_that_fall_on_blocks_by_their_corners_never_lose_a_step() {
+    // Edges and corners on faces and over rims: normals jump between facets, within a step too.
+    let material = Material { young: 1.0, ..MATERIAL };
+    let mut seed = 77_u64;
+    let mut random = move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for drop in 0..24 {
+        let axis: [f64; 3] = std::array::from_fn(|_| random() - 0.5);
+        let (angle, speed, courant) = (3.0 * random(), 0.02 + 0.2 * random(), 0.5 + random());
+        let beside = [0.6 * (random() - 0.5), 0.6 * (random() - 0.5), 0.0];
+        let lower = Solid::block([1.5, 1.5, 1.0], [4, 4, 3], material).moved([-0.75, -0.75, -1.0]);
+        let split = lower.nodes.len();
+        let upper = Solid::block([1.0; 3], [3; 3], material).moved([-0.5; 3]).rotated(axis, angle).lifted(0.05);
+        let solid = lower.with(upper.moved(beside));
+        let (below, _) = side(&solid, |n, _| n < split);
+        let (above, nodes) = side(&solid, |n, _| n >= split);
+        let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), &nodes, quads(&below), 0.2).unwrap();
+        let contact = match drop % 2 {
+            0 => contact.facing(quads(&above)).unwrap(),
+            _ => contact.two_pass(quads(&above)).unwrap(),
+        };
+        let v: Vec<f64> =
+            (0..solid.dofs()).map(|dof| if dof % 3 == 2 && dof >= 3 * split { -speed } else { 0.0 }).collect();
+        let h = courant / 3.0 / material.wave_speed();
+        let mut run = Simulation::builder(Hyperelastic::new(&solid, Law::NeoHookean), Composite, h)
+            .velocity(v)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .step_control(StepControl::halving(h / 256.0).unwrap())
+            .build()
+            .unwrap();
+        let up: Vec<f64> = (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == 2))).collect();
+        let momentum = run.momentum(&up).unwrap();
+        while run.time() < 8.0 {
+            let before = *run.statistics();
+            run.step().unwrap_or_else(|error| panic!("drop {drop}: {error}"));
+            let after = *run.statistics();
+            let iterations = after.newton_iterations - before.newton_iterations;
+            assert!(after.refused_steps > before.refused_steps || iterations <= 8, "drop {drop}: {iterations}");
+        }
+        assert!((run.momentum(&up).unwrap() / momentum - 1.0).abs() < 1e-10, "drop {drop}");
+        assert!(run.statistics().refused_steps <= 4, "drop {drop}: {:?}", run.statistics());
+    }
+}

@@ -24,8 +24,8 @@ pub(super) enum TangentUpdate {
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
 /// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of the
-/// whole or within rounding of u, and the residual has fallen by `force` or falls no more. Tolerances below 64 ε of the
-/// scalar are raised to it.
+/// whole, and the residual has fallen by `force` or falls no more; or when they are below the resolution of u, ε ‖u‖.
+/// Tolerances below 64 ε of the scalar are raised to it.
 ///
 /// ```
 /// use contact_dynamics::Newton;

@@ -166,10 +166,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
         // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more, or has
-        // fallen far.
-        let weight = self.stage.recovery.weights()[0].value().abs();
-        let small = size <= displacement * whole || weight * size <= 1e4 * T::epsilon().value() * norm(&new.u);
-        met || small && (contraction >= 0.5 || norms.residual <= force * first)
+        // fallen far; or no force can tell the displacements before from those after.
+        let [in_u, in_v, _] = self.stage.balance.as_ref().unwrap_or(&self.stage.recovery).weights();
+        let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
+        let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));
+        let small = size <= displacement * whole || moved <= 1e4 * resolution;
+        met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first)
     }
 
     /// Completes the prediction by accelerations.
