@@ -6,6 +6,7 @@
 mod local_error;
 mod order;
 mod overshoot;
+mod period;
 mod report;
 mod series;
 mod stability;
@@ -13,6 +14,7 @@ mod stability;
 pub use local_error::{LocalError, local_error};
 pub use order::{Order, order};
 pub use overshoot::{Overshoot, overshoot, overshoot_growth};
+pub use period::period_elongation;
 pub use report::{Report, report};
 pub use stability::{ZeroStability, critical_omega, radius_at_infinity, zero_stability};
 

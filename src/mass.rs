@@ -1,4 +1,13 @@
-//! Mass matrices: lumping, and M⁻¹ on the degrees of freedom that are free to move.
+//! Mass matrices: lumping, blending, the Courant numbers of a mesh, and M⁻¹ on the degrees of freedom that are free to
+//! move.
+
+mod blend;
+mod courant;
+mod lump;
+
+pub use blend::{blend, optimal_weight};
+pub use courant::courant;
+pub use lump::{lump, lump_diagonal};
 
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};
@@ -26,31 +35,6 @@ impl<T: Real> Mass<'_, T> {
             }
             Self::Consistent(m) => T::symmetric_product(c, m, x, y),
         }
-    }
-}
-
-/// Row-sum lumping: the diagonal matrix with the same row sums, hence the same total mass.
-///
-/// # Errors
-///
-/// [`Error::Mass`] if a row sum is not positive (quadratic elements can do that), with the dof and the sum.
-///
-/// ```
-/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// // One linear bar element of mass 6: consistent [2 1; 1 2].
-/// let m = SparseColMat::try_new_from_triplets(
-///     2, 2, &[Triplet::new(0, 0, 2.0), Triplet::new(0, 1, 1.0), Triplet::new(1, 0, 1.0), Triplet::new(1, 1, 2.0)],
-/// )?;
-/// assert_eq!(contact_dynamics::mass::lump(m.as_ref())?, [3.0, 3.0]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn lump<T: Real>(mass: SparseColMatRef<'_, usize, T>) -> Result<Vec<T>> {
-    sparse::square("mass", mass)?;
-    let mut lumped = vec![T::zero(); mass.nrows()];
-    T::product(T::one(), mass, &vec![T::one(); mass.ncols()], &mut lumped);
-    match lumped.iter().position(|&m| !(m > T::zero() && m.is_finite())) {
-        Some(dof) => Err(Error::Mass { dof, value: lumped[dof].value() }),
-        None => Ok(lumped),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 
 /// The size of a square matrix.
 pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<usize> {
@@ -191,6 +191,11 @@ impl Combination {
         SparseColMatRef::new(self.pattern.as_ref(), values)
     }
 
+    /// The matrix with these values.
+    pub(crate) fn into_matrix<T: Real>(self, values: Vec<T>) -> SparseColMat<usize, T> {
+        SparseColMat::new(self.pattern, values)
+    }
+
     /// `out = Σ weight · source (+ weight · diag)`, identity on the rows left out.
     pub(crate) fn fill<T: Real>(&self, sources: &[(T, &[T])], diagonal: Option<(T, &[T])>, out: &mut [T]) {
         out.fill(T::zero());
@@ -215,7 +220,7 @@ impl Combination {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faer::sparse::{SparseColMat, Triplet};
+    use faer::sparse::Triplet;
 
     #[test]
     fn every_asymmetric_entry_is_found() {

@@ -48,7 +48,9 @@ const TEST: [f64; 2] = [0.731, 1.273];
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub fn order(tableau: &Tableau) -> Order {
-    let Some([displacement, velocity, acceleration]) = response(tableau) else { return Order::NONE };
+    let Some([displacement, velocity, acceleration]) = response(tableau, TEST, 1.0 + TEST[0] + TEST[1]) else {
+        return Order::NONE;
+    };
     let one = Series::monomial(1.0, 0);
     // What the stored values should be: 1, h, h².
     let relative = |stored: &Series, power: i32| stored.over(&Series::monomial(1.0, power));
@@ -77,11 +79,11 @@ pub fn order(tableau: &Tableau) -> Order {
     }
 }
 
-/// The series η, φ, ψ for which (U, V, A)_k = (η, φ, ψ) e^{−kh} is reproduced by the steps of the forced test equation.
-fn response(tableau: &Tableau) -> Option<[Series; 3]> {
+/// The series η, φ, ψ for which (U, V, A)_k = (η, φ, ψ) e^{−kh} is reproduced by the steps of u″ + c u′ + k u = F eᵗ,
+/// with [c, k] and F given.
+pub(super) fn response(tableau: &Tableau, [damping, stiffness]: [f64; 2], force: f64) -> Option<[Series; 3]> {
     let stages = tableau.stages.len();
     let unknowns = stages + 3;
-    let [damping, stiffness] = TEST;
     let unit = |index: usize, value: Series| -> Vec<Series> {
         (0..unknowns).map(|i| if i == index { value.clone() } else { Series::zero() }).collect()
     };
@@ -105,7 +107,7 @@ fn response(tableau: &Tableau) -> Option<[Series; 3]> {
         add(&mut balance, damping, &v, 1);
         add(&mut balance, stiffness, &u, 2);
         matrix.push(balance);
-        right.push(Series::monomial(1.0 + damping + stiffness, 2).times(&Series::exponential(stage.load)));
+        right.push(Series::monomial(force, 2).times(&Series::exponential(stage.load)));
         let new = stage.recovery.each().map(combine);
         past.insert(0, new);
     }

@@ -340,6 +340,22 @@ impl<const D: usize> Solid<D> {
         mass.into_iter().map(T::of).collect()
     }
 
+    /// The consistent M.
+    pub fn consistent_mass(&self) -> SparseColMat<usize, f64> {
+        let mut triplets = Vec::new();
+        for element in &self.elements {
+            for (shapes, _, volume) in self.gauss_points(element) {
+                for (&row, x) in element.iter().zip(&shapes) {
+                    for (&column, y) in element.iter().zip(&shapes) {
+                        let m = self.material.density * volume * x * y;
+                        triplets.extend((0..D).map(|axis| Triplet::new(D * row + axis, D * column + axis, m)));
+                    }
+                }
+            }
+        }
+        SparseColMat::try_new_from_triplets(self.dofs(), self.dofs(), &triplets).unwrap()
+    }
+
     /// The free system with lumped mass.
     pub fn system<T: Real>(&self) -> LinearSystem<'static, T> {
         LinearSystem::lumped(self.lumped_mass(), self.stiffness()).unwrap()
