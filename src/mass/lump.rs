@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 ///
 /// # Errors
 ///
-/// [`Error::Mass`] if a row sum is not positive (quadratic elements can do that: [`lump_diagonal`] cannot), with the dof
+/// [`Error::Mass`] if a row sum is not positive (those of quadratic elements; [`lump_diagonal`] takes them), with the dof
 /// and the sum.
 ///
 /// ```
