@@ -162,7 +162,9 @@ struct Pass {
 /// node's own normal than [`facing`](Self::facing) lets a search find it, so that a node that slides off a table or
 /// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
 /// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
-/// reach where it was last linearized, it is open, and the row stays as it was.
+/// reach where it was last linearized, it is open, and the row stays as it was. A row whose normal has jumped more than
+/// four times since the search, between two facets or around an edge that its node touches, stays as it was too: there is
+/// no normal that an iteration could converge to.
 ///
 /// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and
 /// are those of the facet.

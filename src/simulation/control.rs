@@ -70,8 +70,8 @@ impl StepControl {
     /// the tableau says ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or
     /// opens it is not scaled, for the motion is not smooth there, and is about the distance that the contact moves in the
     /// step with the velocity it lost: so uncertain is the instant of impact. Corrections do not hide it, since velocities
-    /// are compared as well. Schemes that impose contact ahead of the state show an impact one step late and are
-    /// refused by `build`.
+    /// are compared as well. Schemes that impose contact ahead of the state show an impact one step late, and some of first
+    /// order show nothing of what they err in velocity: `build` refuses both.
     ///
     /// # Errors
     ///
