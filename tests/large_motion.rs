@@ -7,6 +7,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::{MATERIAL, Scene, Swing, Throw};
+use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
@@ -126,16 +127,6 @@ fn a_spinning_bar_keeps_energy_and_angular_momentum_until_it_hits_and_loses_ener
         let fine = Scene { h: 0.5 * spinning_bar().h, ..spinning_bar() }.fly(make(), 8.0).unwrap();
         let ratio = coarse.angular / fine.angular;
         assert!(coarse.angular > 1e-7 && ratio > 3.0, "{}: {ratio}", make().name());
-    }
-}
-
-/// A generator of numbers in [0, 1).
-fn xorshift(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        (seed >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 

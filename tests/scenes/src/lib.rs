@@ -8,6 +8,7 @@ pub mod measure;
 pub mod output;
 pub mod particles;
 pub mod plot;
+pub mod random;
 pub mod schemes;
 pub mod solids;
 pub mod springs;
