@@ -16,16 +16,8 @@ pub use node_to_facet::{Facet, NodeToFacet};
 pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Plane, Side, Sphere};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
-
-/// Refuses lengths, stiffnesses and the like that are not positive and finite.
-fn positive(name: &'static str, value: f64) -> Result<f64> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(value),
-        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
-    }
-}
 
 /// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not have.
 fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D]], nodes: &[usize]) -> Result<()> {

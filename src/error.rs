@@ -322,6 +322,14 @@ pub enum Error {
 /// Result with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Refuses lengths, times, stiffnesses and the like that are not positive and finite.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
+    match value > 0.0 && value.is_finite() {
+        true => Ok(value),
+        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
+    }
+}
+
 impl Error {
     /// Whether a smaller step may help (a failed step, not a wrong input).
     ///

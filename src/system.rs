@@ -4,9 +4,10 @@ mod linear;
 
 pub use linear::LinearSystem;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
+use crate::sparse;
 use faer::sparse::SymbolicSparseColMatRef;
 
 /// Weights of the tangent that a stage asks for: `stiffness · K + damping · C`.
@@ -221,6 +222,41 @@ pub trait System<T: Real>: Send {
     fn commit(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
         let _ = (t, u, v);
         Ok(())
+    }
+}
+
+/// Refuses a system whose mass or pattern do not fit its number of dofs, which is returned.
+pub(crate) fn check_sizes<T: Real>(system: &dyn System<T>) -> Result<usize> {
+    let dofs = system.dofs();
+    if dofs == 0 {
+        return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
+    }
+    let size = |what, found| match found == dofs {
+        true => Ok(()),
+        false => Err(Error::Dimension { what, expected: dofs, found }),
+    };
+    match system.mass() {
+        Mass::Lumped(mass) => size("the mass", mass.len())?,
+        Mass::Consistent(mass) => {
+            size("the mass matrix", mass.nrows())?;
+            size("the mass matrix", mass.ncols())?;
+            sparse::check_symmetric("mass", mass)?;
+        }
+    }
+    size("the pattern of the tangent", system.pattern().nrows())?;
+    size("the pattern of the tangent", system.pattern().ncols())?;
+    sparse::check_pattern("tangent", system.pattern())?;
+    Ok(dofs)
+}
+
+/// Refuses a vector of another length than `dofs`, and NaN or infinity in it.
+pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
+    if values.len() != dofs {
+        return Err(Error::Dimension { what, expected: dofs, found: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
+        None => Ok(()),
     }
 }
 

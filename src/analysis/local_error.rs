@@ -1,7 +1,7 @@
 //! The local error of a scheme, from what a step shows of it.
 
 use super::amplification;
-use super::order::order;
+use super::order::{Order, order};
 use crate::tableau::Tableau;
 use faer::c64;
 
@@ -37,14 +37,14 @@ pub struct LocalError {
 /// assert!(error.power == 3 && (error.factor - 1.0 / 6.0).abs() < 1e-3);
 /// ```
 pub fn local_error(tableau: &Tableau) -> Option<LocalError> {
-    let [factor, finer] = [factor(tableau, OMEGA)?, factor(tableau, 0.5 * OMEGA)?];
-    let error = LocalError { power: order(tableau).displacement + 1, factor };
+    let order = order(tableau);
+    let [factor, finer] = [factor(tableau, &order, OMEGA)?, factor(tableau, &order, 0.5 * OMEGA)?];
+    let error = LocalError { power: order.displacement + 1, factor };
     (factor > 0.0 && (finer / factor - 1.0).abs() < 0.05).then_some(error)
 }
 
 /// Error over distance at Ω.
-fn factor(tableau: &Tableau, omega: f64) -> Option<f64> {
-    let order = order(tableau);
+fn factor(tableau: &Tableau, order: &Order, omega: f64) -> Option<f64> {
     let eigen = amplification(tableau, omega, 0.0).eigen().ok()?;
     let (roots, vectors) = (eigen.S(), eigen.U());
     let exact = c64::new(omega.cos(), omega.sin());

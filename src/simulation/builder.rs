@@ -20,9 +20,8 @@ use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass::Mass;
 use crate::real::Real;
-use crate::sparse;
 use crate::state::{ContactState, History, Motion, State};
-use crate::system::{Damping, Linearity, Path, PathForce, System};
+use crate::system::{self, Damping, Linearity, Path, PathForce, System, check_vector};
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
@@ -274,7 +273,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let judge = match self.control {
             None => None,
-            Some(control) => Some(Judge::new(control, local_error(&scheme, control, rows)?, dofs)),
+            Some(control) => {
+                let local = if control.estimates() { Some(local_error(&scheme, rows)?) } else { None };
+                Some(Judge::new(control, local, dofs))
+            }
         };
         Ok(Simulation {
             system,
@@ -415,21 +417,20 @@ fn check_corrections<T: Real>(
 }
 
 /// What the local error of a scheme follows from; refused where contact would not show in it.
-fn local_error(scheme: &Scheme<'_>, control: StepControl, rows: usize) -> Result<LocalError> {
+fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError> {
     let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
     let refuse = |reason| {
         let part = format!("an estimate of the local error with {}", scheme.integrator.name());
         Err(Error::Incompatible { part, reason })
     };
-    if control.estimates() && rows > 0 && ahead {
+    if rows > 0 && ahead {
         return refuse(
             "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
         );
     }
     match analysis::local_error(&scheme.tableau) {
         Some(error) => Ok(error),
-        None if control.estimates() => refuse("what it errs in velocity does not show in one step"),
-        None => Ok(LocalError { power: 1, factor: 1.0 }),
+        None => refuse("what it errs in velocity does not show in one step"),
     }
 }
 
@@ -469,25 +470,7 @@ fn check_lagged_damping<T: Real>(
 
 /// Sizes and supports of a host's system.
 fn check_system<T: Real>(system: &dyn System<T>) -> Result<usize> {
-    let dofs = system.dofs();
-    if dofs == 0 {
-        return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
-    }
-    let size = |what, found| match found == dofs {
-        true => Ok(()),
-        false => Err(Error::Dimension { what, expected: dofs, found }),
-    };
-    match system.mass() {
-        Mass::Lumped(mass) => size("the mass", mass.len())?,
-        Mass::Consistent(mass) => {
-            size("the mass matrix", mass.nrows())?;
-            size("the mass matrix", mass.ncols())?;
-            sparse::check_symmetric("mass", mass)?;
-        }
-    }
-    size("the pattern of the tangent", system.pattern().nrows())?;
-    size("the pattern of the tangent", system.pattern().ncols())?;
-    sparse::check_pattern("tangent", system.pattern())?;
+    let dofs = system::check_sizes(system)?;
     let prescribed = system.prescribed();
     if let Some(&dof) = prescribed.iter().find(|&&dof| dof >= dofs) {
         return Err(Error::MissingDof { what: "a support", dof, dofs });
@@ -496,15 +479,5 @@ fn check_system<T: Real>(system: &dyn System<T>) -> Result<usize> {
         Some(pair) if pair[0] == pair[1] => Err(Error::PrescribedTwice { dof: pair[0] }),
         Some(_) => Err(Error::Incompatible { part: "the system".into(), reason: "its prescribed dofs must ascend" }),
         None => Ok(dofs),
-    }
-}
-
-fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
-    if values.len() != dofs {
-        return Err(Error::Dimension { what, expected: dofs, found: values.len() });
-    }
-    match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
-        None => Ok(()),
     }
 }

@@ -109,11 +109,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             // Remembered beyond an error of a later part: the rows are read again by the next search that succeeds.
             self.stale |= part.search(t, u, v)? == Candidates::Changed;
         }
-        if !self.stale {
-            return Ok(Candidates::Unchanged);
-        }
-        self.read_rows(jacobian)?;
-        Ok(Candidates::Changed)
+        self.read_stale(jacobian)
     }
 
     /// Moves the linearization of the rows to u.
@@ -132,16 +128,21 @@ impl<'a, T: Real> Constraints<'a, T> {
             };
             moved?;
         }
-        if !self.stale {
-            return Ok(Candidates::Unchanged);
-        }
-        self.read_rows(jacobian)?;
-        Ok(Candidates::Changed)
+        self.read_stale(jacobian)
     }
 
     /// The version of the rows: responses to those of another one are not theirs.
     pub(crate) fn version(&self) -> u64 {
         self.version
+    }
+
+    /// Reads the rows if they may have changed.
+    fn read_stale(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+        if !self.stale {
+            return Ok(Candidates::Unchanged);
+        }
+        self.read_rows(jacobian)?;
+        Ok(Candidates::Changed)
     }
 
     /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.

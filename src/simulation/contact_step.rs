@@ -148,6 +148,13 @@ pub(super) fn keep<T: Real>(dofs: &[usize], values: &[T], kept: &mut [T]) {
     }
 }
 
+/// Puts back what [`keep`] has kept.
+pub(super) fn restore<T: Real>(dofs: &[usize], kept: &[T], values: &mut [T]) {
+    for (&dof, &kept) in dofs.iter().zip(kept) {
+        values[dof] = kept;
+    }
+}
+
 /// Where a stage imposes contact.
 pub(super) struct Level<'s, T> {
     pub(super) target: Option<&'s ContactTarget<T>>,
@@ -207,9 +214,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             Err(error) => Err(error),
         };
         let interface = &work.interface;
-        for (&dof, &u) in self.constraints.interface().iter().zip(&interface.displacement) {
-            new.u[dof] = u;
-        }
+        restore(self.constraints.interface(), &interface.displacement, &mut new.u);
         if let Some(target) = &self.stage.contact {
             let dofs = self.constraints.interface();
             advance(dofs, &interface.target, target.row.weight, &interface.increment, &mut work.rows.target);

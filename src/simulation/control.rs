@@ -3,7 +3,7 @@
 use super::Simulation;
 use super::operator::At;
 use crate::analysis::LocalError;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::observer::Observer;
 use crate::real::Real;
 use crate::simulation::Outcome;
@@ -98,13 +98,6 @@ impl StepControl {
     }
 }
 
-fn positive(name: &'static str, value: f64) -> Result<()> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(()),
-        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
-    }
-}
-
 /// What became of a step that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
@@ -116,7 +109,8 @@ pub(super) enum Verdict {
 /// What a step is judged by, and memory for it.
 pub(super) struct Judge<T> {
     pub(super) control: StepControl,
-    local: LocalError,
+    /// What errors are estimated from, if they are.
+    local: Option<LocalError>,
     /// u, v and a where the step starts, as they were shown; empty if errors are not estimated.
     start: Motion<T>,
     /// Whether judgement is suspended: the step cannot be smaller.
@@ -129,14 +123,14 @@ pub(super) struct Judge<T> {
 }
 
 impl<T: Real> Judge<T> {
-    pub(super) fn new(control: StepControl, local: LocalError, dofs: usize) -> Self {
-        let start = Motion::zero(if control.estimates() { dofs } else { 0 });
+    pub(super) fn new(control: StepControl, local: Option<LocalError>, dofs: usize) -> Self {
+        let start = Motion::zero(if local.is_some() { dofs } else { 0 });
         Self { control, local, start, suspended: false, estimate: 0.0, excess: 0.0, coarse: false }
     }
 
     /// Remembers the state that a step starts from.
     pub(super) fn begin(&mut self, state: &State<T>) {
-        if self.control.estimates() {
+        if self.local.is_some() {
             self.start.u.copy_from_slice(state.displacement());
             self.start.v.copy_from_slice(state.velocity());
             self.start.a.copy_from_slice(state.acceleration());
@@ -146,8 +140,8 @@ impl<T: Real> Judge<T> {
     /// Judges a step that ends with u and v after `changes` of contact.
     pub(super) fn judge(&mut self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64, changes: usize) -> Verdict {
         self.excess = 0.0;
-        if let Some(tolerance) = self.control.tolerance {
-            let factor = if changes > 0 { 1.0 } else { self.local.factor };
+        if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
+            let factor = if changes > 0 { 1.0 } else { local.factor };
             self.estimate = factor * self.distance([u, v], prescribed, h);
             self.excess = self.estimate / tolerance;
         }
@@ -182,7 +176,7 @@ impl<T: Real> Judge<T> {
 
     /// Whether a step twice as large promises to be fine, with some reserve.
     fn may_grow(&self) -> bool {
-        self.excess * 2.0_f64.powi(i32::try_from(self.local.power).unwrap_or(3)) <= 0.5
+        self.local.is_none_or(|local| self.excess * f64::from(1_u32 << local.power) <= 0.5)
     }
 }
 
@@ -260,7 +254,7 @@ impl<T: Real> Simulation<'_, T> {
     /// The estimate of the local error of the last step (length), for runs that
     /// [control it](StepControl::local_error).
     pub fn local_error(&self) -> Option<f64> {
-        self.judge.as_ref().filter(|judge| judge.control.estimates()).map(|judge| judge.estimate)
+        self.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
     }
 
     /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it was.

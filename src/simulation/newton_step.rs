@@ -1,7 +1,7 @@
 //! A stage of a nonlinear system, solved by Newton's method.
 
 use super::Workspace;
-use super::contact_step::{Level, advance, keep};
+use super::contact_step::{Level, advance, keep, restore};
 use super::newton::{Iteration, Newton, TangentUpdate};
 use super::operator::At;
 use super::path::PathWork;
@@ -303,9 +303,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             self.contact(Some(&newton.d), new, past, work)?;
             if let (Some(_), Some(balance)) = (&self.stage.balance, &mut work.balance) {
-                for (&dof, &u) in self.constraints.interface().iter().zip(&newton.balance) {
-                    balance.u[dof] = u;
-                }
+                restore(self.constraints.interface(), &newton.balance, &mut balance.u);
             }
             if self.follow(newton, new, work)? {
                 return Ok(true);
@@ -359,9 +357,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             newton.unsettled = if settled { change } else { change.max(1.0) };
             settled &= miss <= force * size;
         }
-        for (&dof, &u) in constraints.interface().iter().zip(&interface.displacement) {
-            new.u[dof] = u;
-        }
+        restore(constraints.interface(), &interface.displacement, &mut new.u);
         moved?;
         Ok(settled)
     }

@@ -1,10 +1,8 @@
 //! Tangent, damping force and potential of a system against differences of its force.
 
 use crate::error::{Error, Result};
-use crate::mass::Mass;
 use crate::real::Real;
-use crate::sparse;
-use crate::system::{Damping, System, TangentWeights};
+use crate::system::{self, Damping, System, TangentWeights};
 
 /// How far the parts of a system are from the derivatives of its force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,7 +123,9 @@ pub fn tangent<T: Real>(
     step: f64,
     velocity_step: f64,
 ) -> Result<TangentError> {
-    check(system, u, v)?;
+    let dofs = system::check_sizes(system)?;
+    system::check_vector("the displacement", u, dofs)?;
+    system::check_vector("the velocity", v, dofs)?;
     let mut matrix = Matrix::of(system);
     let mut force = |u: &[T], v: &[T], out: &mut [T]| {
         out.fill(T::nan());
@@ -171,35 +171,6 @@ pub fn tangent<T: Real>(
         potential = Some(worst.force());
     }
     Ok(TangentError { stiffness, damping, damping_force: damping_force.force(), potential })
-}
-
-/// Sizes of a system and of a state.
-fn check<T: Real>(system: &dyn System<T>, u: &[T], v: &[T]) -> Result<()> {
-    let expected = system.dofs();
-    if expected == 0 {
-        return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
-    }
-    let size = |what, found| match found == expected {
-        true => Ok(()),
-        false => Err(Error::Dimension { what, expected, found }),
-    };
-    for (what, values) in [("the displacement", u), ("the velocity", v)] {
-        size(what, values.len())?;
-        if let Some(index) = values.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NotFinite { what, index, value: values[index].value() });
-        }
-    }
-    match system.mass() {
-        Mass::Lumped(mass) => size("the mass", mass.len())?,
-        Mass::Consistent(mass) => {
-            size("the mass matrix", mass.nrows())?;
-            size("the mass matrix", mass.ncols())?;
-            sparse::check_symmetric("mass", mass)?;
-        }
-    }
-    size("the pattern of the tangent", system.pattern().nrows())?;
-    size("the pattern of the tangent", system.pattern().ncols())?;
-    sparse::check_pattern("tangent", system.pattern())
 }
 
 /// A vector whose entries are varied one at a time.
