@@ -4,6 +4,7 @@
 //! Ω = ω h, so they hold for a scheme of one's own as well.
 
 mod local_error;
+mod massless;
 mod order;
 mod overshoot;
 mod period;
@@ -12,6 +13,7 @@ mod series;
 mod stability;
 
 pub use local_error::{LocalError, local_error};
+pub use massless::massless_factor;
 pub use order::{Order, order};
 pub use overshoot::{Overshoot, overshoot, overshoot_growth};
 pub use period::period_elongation;

@@ -284,6 +284,11 @@ impl<T: Real> ContactJacobian<T> {
         self.row(row).map(|(dof, weight)| weight * x[dof]).sum()
     }
 
+    /// Whether a row acts on any of the dofs given (ascending).
+    pub(crate) fn acts_on(&self, row: usize, dofs: &[usize]) -> bool {
+        self.row(row).any(|(dof, weight)| weight != T::zero() && dofs.binary_search(&dof).is_ok())
+    }
+
     /// `Σ_j |G_row,j| |x_j|`: the scale of the rounding in [`product`](Self::product).
     pub(crate) fn magnitude(&self, row: usize, x: &[T]) -> T {
         self.row(row).map(|(dof, weight)| (weight * x[dof]).abs()).sum()

@@ -38,13 +38,26 @@ impl<T: Real> Mass<'_, T> {
     }
 }
 
-/// M⁻¹ on the free dofs: prescribed dofs have no response, their rows and columns are left out of M.
+/// The free dofs without mass, ascending: those whose rows of M are zero.
+pub(crate) fn massless<T: Real>(mass: Mass<'_, T>, prescribed: &[usize]) -> Vec<usize> {
+    let is_massless = |dof: usize| match mass {
+        Mass::Lumped(mass) => mass[dof] == T::zero(),
+        Mass::Consistent(mass) => mass.val_of_col(dof).iter().all(|&m| m == T::zero()),
+    };
+    let dofs = match mass {
+        Mass::Lumped(mass) => mass.len(),
+        Mass::Consistent(mass) => mass.ncols(),
+    };
+    (0..dofs).filter(|dof| prescribed.binary_search(dof).is_err() && is_massless(*dof)).collect()
+}
+
+/// M⁻¹ on the free dofs that have a mass: the others have no response, their rows and columns are left out of M.
 #[derive(Debug)]
 pub(crate) enum InverseMass<T> {
-    /// 1/m, zero on prescribed dofs.
+    /// 1/m, zero on dofs without response.
     Lumped(Vec<T>),
-    /// A factor of M with identity on the prescribed dofs.
-    Consistent { factor: Box<dyn Factorization<T>>, prescribed: Vec<usize> },
+    /// A factor of M with identity on the dofs without response, and these.
+    Consistent { factor: Box<dyn Factorization<T>>, fixed: Vec<usize> },
 }
 
 impl<T: Real> InverseMass<T> {
@@ -54,15 +67,18 @@ impl<T: Real> InverseMass<T> {
                 let mut inverse = Vec::with_capacity(mass.len());
                 for (dof, &m) in mass.iter().enumerate() {
                     let free = prescribed.binary_search(&dof).is_err();
-                    if free && !(m > T::zero() && m.is_finite()) {
+                    if free && !(m >= T::zero() && m.is_finite()) {
                         return Err(Error::Mass { dof, value: m.value() });
                     }
-                    inverse.push(if free { m.recip() } else { T::zero() });
+                    inverse.push(if free && m > T::zero() { m.recip() } else { T::zero() });
                 }
                 Ok(Self::Lumped(inverse))
             }
             Mass::Consistent(mass) => {
-                let reduced = sparse::Combination::new(mass.ncols(), prescribed, &[mass.symbolic()])?;
+                let mut fixed = massless(Mass::Consistent(mass), prescribed);
+                fixed.extend_from_slice(prescribed);
+                fixed.sort_unstable();
+                let reduced = sparse::Combination::new(mass.ncols(), &fixed, &[mass.symbolic()])?;
                 let mut values = vec![T::zero(); reduced.len()];
                 reduced.fill(&[(T::one(), mass.val())], None, &mut values);
                 let mut factor = Automatic.analyze(reduced.pattern(), &[])?;
@@ -70,17 +86,17 @@ impl<T: Real> InverseMass<T> {
                     Error::Singular { dof, .. } => Error::Singular { matrix: "mass matrix", dof },
                     other => other,
                 })?;
-                Ok(Self::Consistent { factor, prescribed: prescribed.to_vec() })
+                Ok(Self::Consistent { factor, fixed })
             }
         }
     }
 
-    /// `x ← M⁻¹ x`, zero on prescribed dofs.
+    /// `x ← M⁻¹ x`, zero on dofs without response.
     pub(crate) fn apply(&mut self, x: &mut [T]) {
         match self {
             Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
-            Self::Consistent { factor, prescribed } => {
-                for &dof in prescribed.iter() {
+            Self::Consistent { factor, fixed } => {
+                for &dof in fixed.iter() {
                     x[dof] = T::zero();
                 }
                 factor.solve(x);

@@ -119,6 +119,8 @@ struct Workspace<T: Real> {
     /// ū, v̄, ā where the balance does not hold at the recovered state.
     balance: Option<Motion<T>>,
     prescribed: Vec<usize>,
+    /// Free dofs without mass.
+    massless: Vec<usize>,
     /// Prescribed u, v, a at the time of the state and at that of the balance.
     supports: Vec<[T; 3]>,
     balance_supports: Vec<[T; 3]>,

@@ -233,6 +233,8 @@ pub struct History<T> {
     /// v and a of the current state as they were computed, if a change of the step size has moved the stored ones to
     /// another time.
     pub(crate) unmoved: [Vec<T>; 2],
+    /// (u_n − u_{n−1})/h on the dofs without mass: their velocity is differenced over two steps.
+    pub(crate) slopes: Vec<T>,
     /// Name of the integrator: another one would read other things out of the same states.
     pub(crate) scheme: String,
 }
@@ -303,8 +305,11 @@ impl<T: Real> History<T> {
         Some((&motion.u, &motion.v, &motion.a))
     }
 
-    pub(crate) fn check(&self, dofs: usize, slots: usize) -> Result<()> {
+    pub(crate) fn check(&self, dofs: usize, slots: usize, massless: usize) -> Result<()> {
         let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });
+        if self.slopes.len() != massless {
+            return wrong("the history (dofs without mass)", massless, self.slopes.len());
+        }
         if self.slots.len() != slots {
             return wrong("the history (states)", slots, self.slots.len());
         }

@@ -5,8 +5,8 @@ use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{Row, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
-    Cholesky, Composite, Diagonal, Error, LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection,
-    Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
+    CentralDifference, Cholesky, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem, Newmark,
+    PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
 };
 use contact_dynamics_scenes::{Bars, MassKind};
 
@@ -114,10 +114,18 @@ fn asymmetric_matrices_are_refused_with_the_worst_entry() {
 #[test]
 fn masses_must_be_positive() {
     refused!(LinearSystem::lumped(vec![1.0, -2.0], spring()), Error::Mass { dof: 1, .. }, "dof 1", "-2e0");
-    // No mass is needed where the motion is given, and nowhere else.
+    // No mass is needed where the motion is given, nor where a scheme finds displacements without it.
     let massless = || LinearSystem::lumped(vec![0.0, 1.0], spring()).unwrap();
-    refused!(Simulation::builder(massless(), Composite, 0.01).build(), Error::Mass { dof: 0, .. }, "dof 0");
-    assert!(Simulation::builder(massless().fix(0).unwrap(), Composite, 0.01).build().is_ok());
+    assert!(Simulation::builder(massless(), Composite, 0.01).build().is_ok());
+    refused!(
+        Simulation::builder(massless(), CentralDifference, 0.01).build(),
+        Error::Incompatible { .. },
+        "dof 0",
+        "does not determine"
+    );
+    let midpoint = Gssss::new(1.0, 1.0, 1.0).unwrap();
+    refused!(Simulation::builder(massless(), midpoint, 0.01).build(), Error::Incompatible { .. }, "alternates");
+    assert!(Simulation::builder(massless().fix(0).unwrap(), CentralDifference, 0.01).build().is_ok());
     refused!(LinearSystem::lumped(vec![f64::NAN, 1.0], spring()), Error::Mass { dof: 0, .. }, "NaN");
     let m = matrix(2, &[(0, 0, 1.0), (0, 1, 0.1), (1, 0, 0.1), (1, 1, -1.0)]);
     refused!(LinearSystem::new(m, spring()), Error::Mass { dof: 1, .. }, "dof 1");

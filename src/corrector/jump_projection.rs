@@ -56,12 +56,13 @@ pub struct JumpProjection<T: Real> {
 }
 
 impl<T: Real> JumpProjection<T> {
-    /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond.
+    /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those without
+    /// mass.
     ///
     /// # Errors
     ///
-    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is not positive on the
-    /// free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is negative or
+    /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),

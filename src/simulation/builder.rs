@@ -18,7 +18,7 @@ use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
-use crate::mass::Mass;
+use crate::mass::{self, Mass};
 use crate::real::Real;
 use crate::state::{ContactState, History, Motion, State};
 use crate::system::{self, Damping, Linearity, Path, PathForce, System, check_vector};
@@ -228,15 +228,18 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
+        let massless = mass::massless(system.mass(), system.prescribed());
+        check_massless(&scheme, massless.first())?;
         let mut projection = start::projection(&*system, dofs, rows)?;
         let (state, history) = if let Some((state, history)) = self.resumed {
             let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
-            check_resumed(&state, &history, &scheme, (own, h), dofs)?;
+            check_resumed(&state, &history, &scheme, (own, h), [dofs, massless.len()])?;
             constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
             (state, history)
         } else {
-            let start = Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme: &scheme, h, t };
+            let (solver, massless) = (&mut *contact_solver, &massless[..]);
+            let start = Start { system: &mut *system, contact_solver: solver, scheme: &scheme, h, t, massless };
             start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Refused)?
         };
         contact_solver.reserve(rows);
@@ -254,6 +257,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let slots = history.slots.len();
         let interface = constraints.interface().len();
         let mut work = workspace(&mut *system, &program, &self.correctors, projection, (rows, interface), slots);
+        work.massless = massless;
         work.newton = match (self.newton, system.linearity()) {
             (None, Linearity::Linear) => None,
             (settings, linearity) => {
@@ -304,9 +308,9 @@ fn check_resumed<T: Real>(
     history: &History<T>,
     scheme: &Scheme<'_>,
     (own, h): (f64, f64),
-    dofs: usize,
+    [dofs, massless]: [usize; 2],
 ) -> Result<()> {
-    history.check(dofs, scheme.depth + scheme.tableau.stages.len())?;
+    history.check(dofs, scheme.depth + scheme.tableau.stages.len(), massless)?;
     check_vector("the resumed displacement", &state.motion.u, dofs)?;
     check_vector("the resumed velocity", &state.motion.v, dofs)?;
     check_vector("the resumed acceleration", &state.motion.a, dofs)?;
@@ -349,6 +353,7 @@ fn workspace<T: Real>(
         balance_supports: vec![[T::zero(); 3]; prescribed.len()],
         coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
         prescribed,
+        massless: Vec::new(),
         newton: None,
         trial: ContactState::with_capacity(rows),
         shown: [Vec::new(), Vec::new()],
@@ -391,6 +396,23 @@ fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
         }
     }
     admitted
+}
+
+/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive.
+fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<()> {
+    let Some(dof) = dof else { return Ok(()) };
+    let reason = match analysis::massless_factor(&scheme.tableau) {
+        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(()),
+        Some(_) => {
+            "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
+             choose a scheme that damps high frequencies, or give the dof a mass"
+        }
+        None => {
+            "its balance does not determine the displacement of a dof without mass; choose an implicit scheme, or give \
+             the dof a mass"
+        }
+    };
+    Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
 }
 
 /// Refuses corrections of contact that is not imposed on the displacements of the state.

@@ -548,7 +548,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn close(&mut self, new: &Motion<T>, impulse_weight: f64, work: &mut Workspace<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let first = work.backup.rotations == 1;
-        let Workspace { trial, rows, buffers, was_closed, .. } = work;
+        let Workspace { trial, rows, buffers, was_closed, massless, .. } = work;
         let level = Level { target: stage.contact.as_ref(), clock: *clock };
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
         match level.target {
@@ -565,8 +565,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
-            // A compliant contact leaves no jump to correct.
-            if closed && !law.is_compliant() {
+            // A compliant contact leaves no jump to correct, nor does one that moves dofs without mass.
+            if closed && !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
                 buffers.closed.push(row);
             }
             trial.lambda[row] = raw;

@@ -137,10 +137,11 @@ impl<T: Real> Simulation<'_, T> {
     /// Those of building a simulation from this state. The simulation is then as it was.
     pub fn restart(&mut self) -> Result<()> {
         let (h, t) = (self.history.clock.h, self.time());
-        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, .. } = self;
+        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
+        let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
         let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
-        let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t };
+        let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
         let begun = start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
         let rows = constraints.capacity();
         contact_solver.reserve(rows);

@@ -20,6 +20,8 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) scheme: &'s Scheme<'s>,
     pub(super) h: f64,
     pub(super) t: f64,
+    /// Free dofs without mass.
+    pub(super) massless: &'s [usize],
 }
 
 /// Whether a motion may start inside an obstacle.
@@ -75,6 +77,7 @@ impl<T: Real> Start<'_, T> {
             made_with: h,
             trail: Trail::default(),
             unmoved: [Vec::new(), Vec::new()],
+            slopes: self.massless.iter().map(|&dof| motion.v[dof]).collect(),
             scheme: scheme.integrator.name(),
         };
         Ok((State { motion, shown, contacts }, history))
@@ -90,7 +93,7 @@ impl<T: Real> Start<'_, T> {
         projection: &mut JumpProjection<T>,
         violation: Violation,
     ) -> Result<(Motion<T>, ContactState<T>)> {
-        let Self { system, contact_solver, scheme, h, t } = self;
+        let Self { system, contact_solver, scheme, h, t, massless } = self;
         let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
@@ -111,6 +114,7 @@ impl<T: Real> Start<'_, T> {
         let mut force = vec![T::zero(); dofs];
         system.force(t, &motion.u, &motion.v, &mut force)?;
         system.mass().product(-T::one(), &motion.a, &mut force);
+        let unbalanced: Vec<T> = massless.iter().map(|&dof| force[dof]).collect();
         projection.apply_inverse(&mut force);
         for (&dof, support) in prescribed.iter().zip(&supports) {
             force[dof] = support[2];
@@ -137,19 +141,31 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
+        let mut solved = Vec::new();
+        if !massless.is_empty() {
+            // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
+            let mut forces = vec![T::zero(); dofs];
+            let mut unit = forces.clone();
+            for (&dof, &force) in massless.iter().zip(&unbalanced) {
+                (forces[dof], unit[dof]) = (force, T::one());
+            }
+            let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
+            let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching);
+            problem.rows.retain(|&row| g.acts_on(row, massless));
+            problem.offset = (0..constraints.len()).map(|row| g.product(row, &forces)).collect();
+            problem.tolerance = (0..constraints.len()).map(|row| rounding(g.magnitude(row, &forces))).collect();
+            problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
+            solved.append(&mut problem.press(g, projection, &mut motion, &mut contacts));
+        }
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let mut problem = match contact.lead() > 0.0 {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
             false => StartProblem::at_rest(constraints, g, &motion, h, &touching),
         };
         problem.add_inertial(constraints, g, &motion, &contacts.gap);
+        problem.rows.retain(|row| !solved.contains(row));
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
-        for (&row, &lambda) in problem.rows.iter().zip(&problem.lambda) {
-            projection.push(g, row, lambda, &mut motion.a);
-            contacts.lambda[row] = lambda;
-            contacts.lambda_raw[row] = lambda;
-            contacts.closed[row] = true;
-        }
+        problem.press(g, projection, &mut motion, &mut contacts);
         Ok((motion, contacts))
     }
 }
@@ -294,6 +310,24 @@ impl<T: Real> StartProblem<T> {
         let (rows, waiting) = (0..constraints.len()).filter(rigid).partition(takes_part);
         let compliance = vec![T::zero(); constraints.len()];
         Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })
+    }
+
+    /// Applies the multipliers and closes their contacts; returns the rows.
+    fn press(
+        self,
+        g: &ContactJacobian<T>,
+        projection: &mut JumpProjection<T>,
+        motion: &mut Motion<T>,
+        contacts: &mut ContactState<T>,
+    ) -> Vec<usize> {
+        projection.prepare(g, &self.rows);
+        for (&row, &lambda) in self.rows.iter().zip(&self.lambda) {
+            projection.push(g, row, lambda, &mut motion.a);
+            contacts.lambda[row] = lambda;
+            contacts.lambda_raw[row] = lambda;
+            contacts.closed[row] = true;
+        }
+        self.rows
     }
 
     fn solve(

@@ -102,6 +102,10 @@ impl<T: Real> Simulation<'_, T> {
                 }
             }
         }
+        let (now, before) = (&state.motion.u, &history.slots[1].u);
+        for (slope, &dof) in history.slopes.iter_mut().zip(&work.massless) {
+            *slope = (now[dof] - before[dof]) / T::of(history.clock.h);
+        }
         history.made_with = history.clock.h;
         history.clock.steps += 1;
         statistics.contact_changes += changes as u64;
@@ -121,7 +125,7 @@ impl<T: Real> Simulation<'_, T> {
             None => (&mut self.program, None),
         };
         let clock = history.clock;
-        for stage in &program.stages {
+        for (stages_before, stage) in program.stages.iter().enumerate() {
             let covector = start_covector.unwrap_or(&stage.covector);
             history.slots.rotate_right(1);
             work.backup.rotations += 1;
@@ -140,6 +144,10 @@ impl<T: Real> Simulation<'_, T> {
             }
             for (&dof, support) in work.prescribed.iter().zip(&work.supports) {
                 new.a[dof] = support[2];
+            }
+            if let (Some(start), false) = (past.get(stages_before), work.massless.is_empty()) {
+                let intervals = [clock.h * stage.end, history.made_with];
+                difference(&work.massless, &history.slopes, &start.u, intervals, new);
             }
             if constraints.len() > 0 {
                 let solver = &mut **contact_solver;
@@ -179,6 +187,18 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         Ok(())
+    }
+}
+
+/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. The rows of a scheme
+/// find v from a, which such dofs do not have; it stays zero.
+///
+/// `slopes` are those of the interval before the `start` of the step, the second of the `intervals`.
+fn difference<T: Real>(massless: &[usize], slopes: &[T], start: &[T], [now, before]: [f64; 2], new: &mut Motion<T>) {
+    let curve = T::of(now / (now + before));
+    for (&dof, &slope) in massless.iter().zip(slopes) {
+        let newest = (new.u[dof] - start[dof]) / T::of(now);
+        (new.v[dof], new.a[dof]) = (newest + curve * (newest - slope), T::zero());
     }
 }
 

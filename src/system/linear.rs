@@ -74,7 +74,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// # Errors
     ///
     /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`]
-    /// for a diagonal mass that is negative (zero is allowed on dofs that are fixed or driven).
+    /// for a diagonal mass that is negative (zero is allowed: on dofs that are fixed or
+    /// driven, and elsewhere with schemes that take [dofs without mass](crate::analysis::massless_factor)).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
         sparse::check_symmetric("mass", mass.as_ref())?;
         let n = mass.nrows();
@@ -210,7 +211,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     }
 }
 
-/// (Zero is refused when a simulation is built, unless the dof is prescribed.)
+/// (Zero is refused when a simulation is built, where the scheme cannot do without.)
 fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
     match mass.iter().position(|&m| !(m >= T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
