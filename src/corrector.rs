@@ -1,16 +1,27 @@
 //! Correctors: what must be mended so that velocity and acceleration agree with the contact.
 
+mod contact_implicit;
 mod correction;
 mod jump_projection;
+mod laursen_love;
 mod persistency;
+mod prediction;
+mod release;
+mod zero_acceleration;
 
+pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
 pub(crate) use correction::{Backup, Buffers, Erased, ErasedGaps, Gaps, Scheme, contact_error, no_response, rounding};
 pub use jump_projection::JumpProjection;
+pub use laursen_love::LaursenLove;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
+pub use prediction::{Extent, Prediction};
+pub use release::{Release, TaylorPapadopoulos};
+pub use zero_acceleration::ZeroAcceleration;
 
 use crate::error::Result;
 use crate::real::Real;
+use crate::tableau::Tableau;
 
 /// Changes the result of a stage after its contact problem was solved; several act in the order given.
 ///
@@ -44,7 +55,33 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Edits::NewState
     }
 
-    /// Corrects the stage. Called for every stage with at least one closed contact.
+    /// Whether it can act with a scheme, or why not; asked once, at build. Default: it can.
+    ///
+    /// # Errors
+    ///
+    /// The reason, for the [`Error::Incompatible`](crate::Error::Incompatible) that a builder returns.
+    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        let _ = tableau;
+        Ok(())
+    }
+
+    /// Whether [`predict`](Self::predict) does anything; memory for it is reserved only then.
+    fn predicts(&self) -> bool {
+        false
+    }
+
+    /// Acts before a stage is solved, on what the scheme predicts. Called for every stage of a run with contacts, if
+    /// [`predicts`](Self::predicts) says so. Default: nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`correct`](Self::correct).
+    fn predict(&self, step: &mut Prediction<'_, T>) -> Result<()> {
+        let _ = step;
+        Ok(())
+    }
+
+    /// Corrects the stage. Called for every stage with at least one closed contact, or one that has opened in it.
     ///
     /// # Errors
     ///
@@ -68,6 +105,15 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn edits(&self) -> Edits {
         (**self).edits()
+    }
+    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        (**self).check(tableau)
+    }
+    fn predicts(&self) -> bool {
+        (**self).predicts()
+    }
+    fn predict(&self, step: &mut Prediction<'_, T>) -> Result<()> {
+        (**self).predict(step)
     }
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         (**self).correct(step)

@@ -138,6 +138,8 @@ struct Workspace<T: Real> {
     rows: ContactRowsWork<T>,
     buffers: Buffers<T>,
     projection: Option<JumpProjection<T>>,
+    /// For correctors that act on the prediction, one entry a dof.
+    shifted: Vec<T>,
     /// Version of the rows that the projection knows.
     projected_rows: u64,
     backup: Backup<T>,

@@ -117,6 +117,7 @@ pub struct ContactState<T> {
     pub(crate) impulse: Vec<T>,
     pub(crate) lambda_v: Vec<T>,
     pub(crate) lambda_a: Vec<T>,
+    pub(crate) dissipated: Vec<T>,
 }
 
 impl<T: Real> ContactState<T> {
@@ -131,6 +132,7 @@ impl<T: Real> ContactState<T> {
             impulse: reals(),
             lambda_v: reals(),
             lambda_a: reals(),
+            dissipated: reals(),
         }
     }
 
@@ -139,8 +141,8 @@ impl<T: Real> ContactState<T> {
         let n = ids.len();
         self.ids.clear();
         self.ids.extend_from_slice(ids);
-        let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, .. } = self;
-        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a] {
+        let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
+        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated] {
             reals.clear();
             reals.resize(n, T::zero());
         }
@@ -169,6 +171,7 @@ impl<T: Real> ContactState<T> {
                 self.impulse[i] = old.impulse[j];
                 self.lambda_v[i] = old.lambda_v[j];
                 self.lambda_a[i] = old.lambda_a[j];
+                self.dissipated[i] = old.dissipated[j];
             }
         }
     }
@@ -212,6 +215,11 @@ impl<T: Real> ContactState<T> {
     /// The paper's λ_a of the last correction (kg m): it corrected the velocity; zero without correction.
     pub fn lambda_a(&self) -> &[T] {
         &self.lambda_a
+    }
+
+    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back.
+    pub fn dissipated(&self) -> &[T] {
+        &self.dissipated
     }
 }
 

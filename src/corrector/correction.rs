@@ -39,6 +39,8 @@ pub struct Correction<'a, T: Real> {
 /// The numbers of the scheme that a correction needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scheme<'a> {
+    /// Change of (u, h v, h² a) by a unit multiplier on a unit mass, in units of h².
+    pub(crate) response: [f64; 3],
     /// z-weight of the acceleration row.
     pub(crate) acceleration: f64,
     /// z-weight of the acceleration row of the balance.
@@ -141,18 +143,22 @@ pub(crate) struct Buffers<T> {
     /// Closed rows.
     pub(crate) closed: Vec<usize>,
     /// Engaged rows, a subset of `closed`.
-    engaged: Vec<usize>,
-    bounds: Vec<Bound>,
-    jump: Vec<T>,
-    tolerance: Vec<T>,
+    pub(super) engaged: Vec<usize>,
+    /// Rows that have opened in this stage.
+    pub(crate) opened: Vec<usize>,
+    /// Reported forces before this stage, one a candidate.
+    pub(crate) reported: Vec<T>,
+    pub(super) bounds: Vec<Bound>,
+    pub(super) jump: Vec<T>,
+    pub(super) tolerance: Vec<T>,
     /// Impulses that remove the velocity jumps, one a closed row.
-    impulses: Vec<T>,
+    pub(super) impulses: Vec<T>,
     /// Forces that remove the acceleration jumps, one an engaged row.
     forces: Vec<T>,
-    s: Vec<T>,
+    pub(super) s: Vec<T>,
     /// One a candidate.
     rates: Vec<GapRates<T>>,
-    gaps: Vec<T>,
+    pub(super) gaps: Vec<T>,
     /// Change of v and the damping force it makes (and that of before), one a dof; empty without damping.
     change: Vec<T>,
     damping: Vec<T>,
@@ -166,6 +172,8 @@ impl<T: Real> Buffers<T> {
         Self {
             closed: Vec::with_capacity(rows),
             engaged: Vec::with_capacity(rows),
+            opened: Vec::with_capacity(rows),
+            reported: reals(rows),
             bounds: Vec::with_capacity(rows),
             jump: reals(rows),
             tolerance: reals(rows),
@@ -200,6 +208,16 @@ impl<T: Real> Correction<'_, T> {
     /// Engaged rows; valid after [`solve_velocity_jumps`](Self::solve_velocity_jumps).
     pub fn engaged(&self) -> &[usize] {
         &self.buffers.engaged
+    }
+
+    /// Rows that were closed before this stage and are open now.
+    pub fn opened(&self) -> &[usize] {
+        &self.buffers.opened
+    }
+
+    /// Reported force of a row before this stage.
+    pub fn previous_force(&self, row: usize) -> T {
+        self.buffers.reported[row]
     }
 
     /// Displacements of the stage.
@@ -279,25 +297,41 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping
     /// forces to a.
     pub fn push_velocity(&mut self) {
-        let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
-        let Buffers { closed, impulses, jump, rates, change, damping, before, .. } = &mut **buffers;
+        let rows = std::mem::take(&mut self.buffers.closed);
+        let impulses = std::mem::take(&mut self.buffers.impulses);
+        self.apply_impulses(&rows, &impulses);
+        for (&row, &impulse) in rows.iter().zip(&impulses).filter(|(_, impulse)| **impulse != T::zero()) {
+            self.contacts.lambda_a[row] = -T::of(self.h) * impulse;
+        }
+        self.buffers.closed = rows;
+        self.buffers.impulses = impulses;
+    }
+
+    /// Applies impulses to v along rows, v ← v + M⁻¹ Gᵀ impulses, and the change of damping forces to a. They are booked as
+    /// impulses of their contacts, and the energy they take as dissipated by these.
+    pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return;
         }
-        for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
+        self.projection.prepare(self.g, rows);
+        let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
+        let Buffers { jump, change, damping, before, .. } = &mut **buffers;
+        jump.clear();
+        jump.extend(rows.iter().map(|&row| g.product(row, &new.v)));
+        for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
             projection.push(g, row, impulse, &mut new.v);
-            contacts.lambda_a[row] = -T::of(self.h) * impulse;
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
         // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
         // obstacle's.
-        for ((&row, &impulse), &jump) in closed.iter().zip(impulses.iter()).zip(jump.iter()) {
-            let (before, after) = (jump - rates[row].rate, g.product(row, &new.v));
-            **energy += impulse * T::of(0.5) * (before + after);
+        for ((&row, &impulse), &before) in rows.iter().zip(impulses.iter()).zip(jump.iter()) {
+            let gain = impulse * T::of(0.5) * (before + g.product(row, &new.v));
+            **energy += gain;
+            contacts.dissipated[row] -= gain;
         }
         if !change.is_empty() {
             change.fill(T::zero());
-            for (&row, &impulse) in closed.iter().zip(impulses.iter()) {
+            for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
                 projection.push(g, row, impulse, change);
             }
             // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
@@ -346,6 +380,110 @@ impl<T: Real> Correction<'_, T> {
             contacts.lambda[row] += share * force;
             contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;
             contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
+        }
+    }
+
+    /// S of one row: the change of its gap rate by a unit impulse along it.
+    pub fn compliance(&mut self, row: usize) -> T {
+        let mut s = std::mem::take(&mut self.buffers.s);
+        self.projection.assemble(self.g, &[row], &mut s);
+        let compliance = s.first().copied().unwrap_or(T::zero());
+        self.buffers.s = s;
+        compliance
+    }
+
+    /// The gap rate of the bodies along a row, without that of the obstacle.
+    pub fn rate(&self, row: usize) -> T {
+        self.g.product(row, &self.new.v)
+    }
+
+    /// Applies an impulse along a row that changes the kinetic energy by `energy`, as far as there is one: the bodies leave
+    /// each other faster, or with a negative energy slower.
+    pub fn exchange_energy(&mut self, row: usize, energy: T) {
+        let (s, rate) = (self.compliance(row), self.rate(row));
+        if s > T::zero() && energy != T::zero() && energy.is_finite() {
+            // ½ S j² + rate j = energy; beyond what the rate holds, all of it.
+            let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
+            self.apply_impulses(&[row], &[(root - rate) / s]);
+        }
+    }
+
+    /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
+    /// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
+    /// (u, h v, h² a) to a multiplier.
+    pub(super) fn act_implicitly(&mut self) {
+        let rows = std::mem::take(&mut self.buffers.closed);
+        let mut impulses = std::mem::take(&mut self.buffers.impulses);
+        self.projection.prepare(self.g, &rows);
+        let [u, v, a] = self.scheme.response;
+        impulses.clear();
+        for &row in &rows {
+            let lambda = self.contacts.lambda_raw[row];
+            self.projection.push(self.g, row, -T::of(a) * lambda, &mut self.new.a);
+            self.contacts.impulse[row] -= T::of(self.scheme.covector[0][2] * self.h * a) * lambda;
+            self.contacts.lambda[row] = T::of(2.0 * u) * lambda;
+            impulses.push(T::of(self.h * (2.0 * u - v)) * lambda);
+        }
+        self.apply_impulses(&rows, &impulses);
+        self.buffers.closed = rows;
+        self.buffers.impulses = impulses;
+    }
+
+    /// Zeroes the accelerations of all dofs that engaged rows act on, and takes their inertia out of the reported forces;
+    /// after [`solve_acceleration_jumps`](Self::solve_acceleration_jumps).
+    pub(super) fn stop_accelerations(&mut self) {
+        let Self { buffers, contacts, new, g, scheme, h, .. } = self;
+        let share = T::of(scheme.balance / scheme.acceleration);
+        for (&row, &force) in buffers.engaged.iter().zip(&buffers.forces) {
+            contacts.lambda[row] += share * force;
+            contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
+            for (dof, weight) in g.row(row) {
+                if weight != T::zero() {
+                    new.a[dof] = T::zero();
+                }
+            }
+        }
+    }
+
+    /// Work of the raw multipliers over the stage, each times the change of its gap.
+    pub(super) fn contact_work(&mut self) -> T {
+        let Self { buffers, contacts, constraints, past, .. } = self;
+        let Buffers { closed, gaps, .. } = &mut **buffers;
+        let Some(start) = past.first() else { return T::zero() };
+        constraints.0.gap(start.t, &start.u, gaps);
+        closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum()
+    }
+
+    /// Changes the kinetic energy by `energy` through impulses in proportion to the raw multipliers of the closed rows, as far
+    /// as there is any.
+    pub(super) fn exchange_by_forces(&mut self, energy: T) {
+        let rows = std::mem::take(&mut self.buffers.closed);
+        let mut impulses = std::mem::take(&mut self.buffers.impulses);
+        impulses.clear();
+        impulses.extend(rows.iter().map(|&row| self.contacts.lambda_raw[row].max(T::zero())));
+        self.projection.assemble(self.g, &rows, &mut self.buffers.s);
+        let size = rows.len();
+        let (mut square, mut rate) = (T::zero(), T::zero());
+        for (i, (&row, &x)) in rows.iter().zip(&impulses).enumerate() {
+            rate += x * self.rate(row);
+            let column = &self.buffers.s[i * size..(i + 1) * size];
+            square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
+        }
+        if square > T::zero() {
+            let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
+            let factor = (root - rate) / square;
+            impulses.iter_mut().for_each(|x| *x *= factor);
+            self.apply_impulses(&rows, &impulses);
+        }
+        self.buffers.closed = rows;
+        self.buffers.impulses = impulses;
+    }
+
+    /// Calls a function with every row that has opened.
+    pub fn each_opened(&mut self, mut each: impl FnMut(&mut Self, usize)) {
+        for i in 0..self.buffers.opened.len() {
+            let row = self.buffers.opened[i];
+            each(self, row);
         }
     }
 

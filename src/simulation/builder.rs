@@ -363,6 +363,7 @@ fn workspace<T: Real>(
         rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
+        shifted: vec![T::zero(); room(correctors.iter().any(|corrector| corrector.predicts()))],
         projected_rows: 0,
         backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         correction_energy: T::zero(),
@@ -421,6 +422,10 @@ fn check_corrections<T: Real>(
     tableau: &Tableau,
     correctors: &[Box<dyn Corrector<T> + '_>],
 ) -> Result<()> {
+    let refuse = |corrector: &dyn Corrector<T>, reason| {
+        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
     let Some(corrector) = correctors.first() else { return Ok(()) };
     for stage in &tableau.stages {
         let reason = match stage.contact {
@@ -432,8 +437,12 @@ fn check_corrections<T: Real>(
                 "the scheme imposes contact on velocities, which leaves no jump to correct"
             }
         };
-        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
-        return Err(Error::Incompatible { part, reason });
+        return refuse(&**corrector, reason);
+    }
+    for corrector in correctors {
+        if let Err(reason) = corrector.check(tableau) {
+            return refuse(&**corrector, reason);
+        }
     }
     Ok(())
 }

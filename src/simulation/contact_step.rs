@@ -558,6 +558,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();
+        buffers.opened.clear();
         let impulse_weight = T::of(clock.h * impulse_weight);
         for row in 0..constraints.len() {
             let raw = trial.lambda_raw[row];
@@ -566,8 +567,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
             // A compliant contact leaves no jump to correct, nor does one that moves dofs without mass.
-            if closed && !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
-                buffers.closed.push(row);
+            if !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
+                match (closed, was_closed[row]) {
+                    (true, _) => buffers.closed.push(row),
+                    (false, true) => buffers.opened.push(row),
+                    (false, false) => {}
+                }
+            }
+            if closed && !was_closed[row] {
+                trial.dissipated[row] = T::zero();
             }
             trial.lambda[row] = raw;
             (trial.lambda_v[row], trial.lambda_a[row]) = (T::zero(), T::zero());

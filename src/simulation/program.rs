@@ -173,7 +173,13 @@ pub(crate) struct CompiledStage<T> {
     pub(crate) read: Vec<[bool; 3]>,
 }
 
-impl<T> CompiledStage<T> {
+impl<T: Real> CompiledStage<T> {
+    /// Weights of the unknown in the displacements of the state and of the balance.
+    pub(crate) fn displacement_weights(&self) -> [T; 2] {
+        let balance = self.balance.as_ref().unwrap_or(&self.recovery);
+        [self.recovery.weights()[0], balance.weights()[0]]
+    }
+
     /// β: a raw multiplier λ of the stage changes the momentum by h β λ.
     pub(crate) fn impulse_weight(&self, covector: &[[f64; 3]]) -> f64 {
         self.response.iter().zip(&covector[0]).map(|(response, psi)| response * psi).sum()

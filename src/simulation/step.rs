@@ -8,7 +8,7 @@ use super::program::CompiledStage;
 use super::{Constraints, Simulation, Statistics, Workspace};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Correction, Erased, ErasedGaps, Scheme};
+use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{Clock, Motion};
@@ -136,6 +136,33 @@ impl<T: Real> Simulation<'_, T> {
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());
             predict(stage, clock.at(stage.load), &mut **system, new, past, work)?;
+            if let Some(projection) = &mut work.projection {
+                refresh(projection, &mut work.projected_rows, constraints.version());
+                work.buffers.reported.clone_from(&work.trial.lambda);
+                if !work.shifted.is_empty() {
+                    let mut prediction = Prediction {
+                        h: clock.h * stage.end,
+                        t: new.t,
+                        weights: stage.displacement_weights(),
+                        g,
+                        projection,
+                        solver: &mut **contact_solver,
+                        constraints: ErasedGaps(constraints),
+                        start: &past[0],
+                        new,
+                        balance: work.balance.as_mut().filter(|_| stage.balance.is_some()),
+                        was_closed: &work.trial.closed,
+                        massless: &work.massless,
+                        prescribed: &work.prescribed,
+                        ids: &work.trial.ids,
+                        buffers: &mut work.buffers,
+                        shifted: &mut work.shifted,
+                    };
+                    for corrector in correctors.iter() {
+                        corrector.predict(&mut prediction)?;
+                    }
+                }
+            }
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let mut solve = StageSolve { stage, clock, system: parts, operator, constraints, g, solver, statistics };
             match work.newton {
@@ -153,15 +180,14 @@ impl<T: Real> Simulation<'_, T> {
                 let solver = &mut **contact_solver;
                 let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
                 contact.close(new, stage.impulse_weight(covector), work)?;
-                if let Some(projection) = work.projection.as_mut().filter(|_| !work.buffers.closed.is_empty()) {
-                    if work.projected_rows != constraints.version() {
-                        work.projected_rows = constraints.version();
-                        projection.reset();
-                    }
+                let touched = !work.buffers.closed.is_empty() || !work.buffers.opened.is_empty();
+                if let Some(projection) = work.projection.as_mut().filter(|_| touched) {
+                    refresh(projection, &mut work.projected_rows, constraints.version());
                     let mut correction = Correction {
                         h: clock.h,
                         t: new.t,
                         scheme: Scheme {
+                            response: stage.response,
                             acceleration: stage.acceleration,
                             balance: stage.balance_acceleration,
                             covector,
@@ -187,6 +213,14 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         Ok(())
+    }
+}
+
+/// Makes a projection forget rows of another version.
+fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version: u64) {
+    if *known != version {
+        *known = version;
+        projection.reset();
     }
 }
 

@@ -1,0 +1,138 @@
+//! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the contact
+//! conditions.
+
+use super::correction::{ErasedGaps, contact_error, rounding};
+use super::{Buffers, JumpProjection};
+use crate::contact::{ContactId, ContactJacobian};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::Motion;
+
+/// One stage before it is solved, in the hands of [`Corrector::predict`](super::Corrector::predict).
+#[derive(Debug)]
+pub struct Prediction<'a, T: Real> {
+    /// Time from the state before to that of the stage.
+    pub(crate) h: f64,
+    pub(crate) t: f64,
+    /// Weights of the unknown in the displacements of the state and of the balance.
+    pub(crate) weights: [T; 2],
+    pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) projection: &'a mut JumpProjection<T>,
+    pub(crate) solver: &'a mut dyn ContactSolver<T>,
+    pub(crate) constraints: ErasedGaps<'a, T>,
+    /// The state before.
+    pub(crate) start: &'a Motion<T>,
+    pub(crate) new: &'a mut Motion<T>,
+    pub(crate) balance: Option<&'a mut Motion<T>>,
+    pub(crate) was_closed: &'a [bool],
+    pub(crate) massless: &'a [usize],
+    pub(crate) prescribed: &'a [usize],
+    pub(crate) ids: &'a [ContactId],
+    pub(crate) buffers: &'a mut Buffers<T>,
+    /// u + h v, one entry a dof.
+    pub(crate) shifted: &'a mut [T],
+}
+
+/// On which contacts a prediction is projected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Extent {
+    /// All that it violates.
+    #[default]
+    All,
+    /// Those that were closed before.
+    Closed,
+}
+
+impl<T: Real> Prediction<'_, T> {
+    /// Time of the stage.
+    pub fn time(&self) -> f64 {
+        self.t
+    }
+
+    /// Moves u + h v to the nearest point, in the norm of the mass, that no contact forbids, and shifts the displacements
+    /// that the stage starts from by as much: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts of dofs without mass
+    /// and compliant ones are left out.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Contact`](crate::Error::Contact), [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
+    pub fn project(&mut self, extent: Extent) -> Result<()> {
+        let count = self.ids.len();
+        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| !constraints.0.law(row).is_compliant();
+        let mut rows = std::mem::take(&mut self.buffers.closed);
+        let mut mu = std::mem::take(&mut self.buffers.impulses);
+        rows.clear();
+        mu.clear();
+        let mut result = Ok(());
+        loop {
+            self.advance(&rows, &mu);
+            self.constraints.0.gap(self.t, self.shifted, &mut self.buffers.gaps);
+            let before = rows.len();
+            for row in 0..count {
+                let takes_part = rigid(&self.constraints, row)
+                    && (extent == Extent::All || self.was_closed[row])
+                    && (self.massless.is_empty() || !self.g.acts_on(row, self.massless));
+                let gap = self.buffers.gaps[row];
+                let violated = gap < -rounding(self.g.magnitude(row, self.shifted) + gap.abs());
+                if takes_part && (violated || self.constraints.0.law(row).is_equality()) && !rows.contains(&row) {
+                    rows.push(row);
+                }
+            }
+            if rows.len() == before {
+                break;
+            }
+            rows.sort_unstable();
+            result = self.solve(&rows, &mut mu);
+            if result.is_err() {
+                break;
+            }
+        }
+        if result.is_ok() {
+            let [state, balance] = self.weights;
+            for (&row, &mu) in rows.iter().zip(&mu) {
+                self.projection.push(self.g, row, state * mu, &mut self.new.u);
+                if let Some(motion) = &mut self.balance {
+                    self.projection.push(self.g, row, balance * mu, &mut motion.u);
+                }
+            }
+        }
+        self.buffers.closed = rows;
+        self.buffers.impulses = mu;
+        result
+    }
+
+    /// u + h v + M⁻¹ Gᵀ μ, with supports where they will be.
+    fn advance(&mut self, rows: &[usize], mu: &[T]) {
+        self.shifted.copy_from_slice(&self.start.u);
+        T::axpy(T::of(self.h), &self.start.v, self.shifted);
+        for &dof in self.prescribed {
+            self.shifted[dof] = self.new.u[dof];
+        }
+        for (&row, &mu) in rows.iter().zip(mu) {
+            self.projection.push(self.g, row, mu, self.shifted);
+        }
+    }
+
+    /// μ of the rows, for the gaps at u + h v.
+    fn solve(&mut self, rows: &[usize], mu: &mut Vec<T>) -> Result<()> {
+        self.advance(&[], &[]);
+        self.constraints.0.gap(self.t, self.shifted, &mut self.buffers.gaps);
+        let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
+        let Buffers { s, jump, tolerance, bounds, gaps, .. } = &mut **buffers;
+        projection.assemble(g, rows, s);
+        jump.clear();
+        tolerance.clear();
+        bounds.clear();
+        for &row in rows {
+            jump.push(gaps[row]);
+            tolerance.push(rounding(g.magnitude(row, shifted) + gaps[row].abs()));
+            bounds.push(Bound::from(constraints.0.law(row)));
+        }
+        mu.clear();
+        mu.resize(rows.len(), T::zero());
+        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance, version: 0 };
+        let (t, ids) = (self.t, self.ids);
+        solver.solve(&problem, mu).map_err(|failure| contact_error(t, failure, |row| ids[rows[row]])).map(drop)
+    }
+}

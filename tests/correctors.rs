@@ -1,0 +1,293 @@
+//! The correctors beside λ_v/λ_a: against their papers' formulas written out by hand, and for what they conserve.
+
+use contact_dynamics::corrector::{
+    ContactImplicit, ContactStabilized, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
+};
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{
+    Composite, Corrector, EnergyMomentum, Error, Gssss, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
+    Simulation, SimulationBuilder, TimeIntegrator,
+};
+use contact_dynamics_scenes::measure::{Figures, figures, record_run};
+use contact_dynamics_scenes::{Bars, MassKind, Record};
+
+const H: f64 = 1e-3;
+
+type Correctors = Vec<Box<dyn Corrector<f64>>>;
+
+fn list<const N: usize>(correctors: [Box<dyn Corrector<f64>>; N]) -> Correctors {
+    correctors.into()
+}
+
+fn builder(
+    bars: &Bars,
+    integrator: impl TimeIntegrator + 'static,
+    correctors: Correctors,
+) -> SimulationBuilder<'static, f64> {
+    Simulation::builder(bars.system::<f64>(), integrator, H)
+        .velocity(bars.velocities())
+        .constraint(bars.contact())
+        .correctors(correctors)
+}
+
+fn run(bars: &Bars, integrator: impl TimeIntegrator + 'static, correctors: Correctors) -> (Record, Figures) {
+    let mut run = builder(bars, integrator, correctors).build().unwrap();
+    let record = record_run(bars, &mut run, 0.4);
+    let figures = figures(bars, &record, H);
+    (record, figures)
+}
+
+/// The paper's bars with the impact at a fraction of a step after 0.1 s.
+fn bars(n: usize, phase: f64) -> Bars {
+    let bars = Bars::paper(n);
+    Bars { gap: (0.1 + phase * H) * (bars.velocity[0] - bars.velocity[1]), ..bars }
+}
+
+const PHASES: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
+
+/// Two masses on a spring above a floor, by Newmark's rows with the forces of contact fully implicit, written out; the
+/// prediction projected or not. Returns u, v and λ of every step.
+fn by_hand(steps: usize, [beta, gamma]: [f64; 2], projected: bool) -> Vec<[f64; 5]> {
+    let (m, k, gap, weight) = ([0.5, 2.0], 40.0, 0.1, 3.0);
+    let h = 0.05;
+    let (mut u, mut v) = ([0.0_f64; 2], [-1.0_f64; 2]);
+    let force = |u: [f64; 2]| [-k * (u[0] - u[1]), -k * (u[1] - u[0]) - weight];
+    let f = force(u);
+    let mut a = [f[0] / m[0], f[1] / m[1]];
+    let mut out = Vec::new();
+    for _ in 0..steps {
+        let mut predicted = [u[0] + h * v[0], u[1] + h * v[1]];
+        if projected {
+            predicted[0] = predicted[0].max(-gap);
+        }
+        let base: [f64; 2] = std::array::from_fn(|i| predicted[i] + h * h * (0.5 - beta) * a[i]);
+        // u' = base + β h² M⁻¹ f(u') + ½ h² λ_K/m₀ e₀, as a 2 × 2 system.
+        let [s0, s1] = [beta * h * h / m[0], beta * h * h / m[1]];
+        let solve = |pushed: f64| {
+            let (b0, b1) = (base[0] + 0.5 * h * h * pushed / m[0], base[1] - s1 * weight);
+            let determinant = (1.0 + s0 * k) * (1.0 + s1 * k) - s0 * k * s1 * k;
+            [(b0 * (1.0 + s1 * k) + s0 * k * b1) / determinant, (b1 * (1.0 + s0 * k) + s1 * k * b0) / determinant]
+        };
+        let (free, unit) = (solve(0.0), solve(1.0)[0] - solve(0.0)[0]);
+        let lambda = ((-gap - free[0]) / unit).max(0.0);
+        u = solve(lambda);
+        let f = force(u);
+        let new = [f[0] / m[0], f[1] / m[1]];
+        for i in 0..2 {
+            v[i] += h * ((1.0 - gamma) * a[i] + gamma * new[i]);
+        }
+        v[0] += h * lambda / m[0];
+        a = new;
+        out.push([u[0], u[1], v[0], v[1], lambda]);
+    }
+    out
+}
+
+#[test]
+fn contact_implicit_steps_are_those_of_the_papers() {
+    for [beta, gamma] in [[0.25, 0.5], [0.3025, 0.6]] {
+        for (projected, corrector) in
+            [(false, Box::new(ContactImplicit) as Box<dyn Corrector<f64>>), (true, Box::new(ContactStabilized::new()))]
+        {
+            let k = [(0, 0, 40.0), (1, 1, 40.0), (0, 1, -40.0), (1, 0, -40.0)].map(|(i, j, k)| Triplet::new(i, j, k));
+            let k = SparseColMat::try_new_from_triplets(2, 2, &k).unwrap();
+            let system = LinearSystem::lumped(vec![0.5, 2.0], k).unwrap().load(|_, f| f[1] = -3.0);
+            let mut run = Simulation::builder(system, Newmark::new(beta, gamma).unwrap(), 0.05)
+                .velocity(vec![-1.0; 2])
+                .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.1))
+                .corrector(corrector)
+                .build()
+                .unwrap();
+            let mut touched = 0;
+            for [u0, u1, v0, v1, lambda] in by_hand(70, [beta, gamma], projected) {
+                run.step().unwrap();
+                let (u, v) = (run.state().displacement(), run.state().velocity());
+                let found = [u[0], u[1], v[0], v[1], run.state().contacts().forces()[0]];
+                for (x, y) in found.into_iter().zip([u0, u1, v0, v1, lambda]) {
+                    // (Impacts amplify rounding.)
+                    assert!((x - y).abs() < 1e-8 * (1.0 + y.abs()), "{projected}: {found:?} {lambda}");
+                }
+                touched += u32::from(lambda > 0.0);
+            }
+            assert!(touched > 5);
+        }
+    }
+}
+
+#[test]
+fn contact_implicit_steps_never_raise_the_energy() {
+    for phase in PHASES {
+        for corrector in [
+            Box::new(ContactImplicit) as Box<dyn Corrector<f64>>,
+            Box::new(ContactStabilized::new()),
+            Box::new(ContactStabilized::improved()),
+        ] {
+            let name = corrector.name();
+            let (record, figures) = run(&bars(50, phase), Newmark::trapezoidal(), list([corrector]));
+            let energies: Vec<f64> = (0..record.t.len()).map(|i| record.energy(i) / record.start_energy).collect();
+            assert!(energies.windows(2).all(|pair| pair[1] < pair[0] + 1e-12), "{name}");
+            assert!(figures.energy > 0.98 && figures.closure < 1e-10 && figures.drift < 1e-10, "{name}: {figures:?}");
+        }
+    }
+}
+
+#[test]
+fn a_projected_prediction_makes_the_force_smooth() {
+    // Force RMS, largest force and energy of the two bars in the literature's trials.
+    for (n, rms, max, energy) in [(20, 0.128, 1.09, 0.974), (50, 0.083, 1.10, 0.989), (100, 0.064, 1.12, 0.994)] {
+        let (_, found) = run(&bars(n, 0.0), Newmark::trapezoidal(), list([Box::new(ContactStabilized::new())]));
+        assert!((found.force_rms - rms).abs() < 0.15 * rms, "{n}: {found:?}");
+        assert!(found.force_max < max + 0.06 && (found.energy - energy).abs() < 4e-3, "{n}: {found:?}");
+        let (_, raw) = run(&bars(n, 0.0), Newmark::trapezoidal(), list([Box::new(ContactImplicit)]));
+        assert!(raw.force_rms > 3.0 * found.force_rms, "{n}: {raw:?}");
+    }
+}
+
+#[test]
+fn velocity_jumps_give_the_work_of_contact_back() {
+    for phase in PHASES {
+        for n in [20, 50] {
+            for integrator in
+                [Box::new(Gssss::new(1.0, 1.0, 1.0).unwrap()) as Box<dyn TimeIntegrator>, Box::new(EnergyMomentum)]
+            {
+                let name = integrator.name();
+                let (record, found) = run(&bars(n, phase), integrator, list([Box::new(LaursenLove)]));
+                // In every step, not only at the end.
+                let miss = (0..record.t.len()).map(|i| (record.energy(i) / record.start_energy - 1.0).abs());
+                let miss = miss.fold(0.0, f64::max);
+                assert!(miss < 1e-12, "{n}, {phase}: {miss:e}");
+                assert!(found.closure < 1e-9 && found.drift < 1e-9, "{name}: {found:?}");
+                // What it is known for.
+                assert!(found.velocity_rms > 0.4, "{name}, {n}, {phase}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn release_returns_what_the_impact_took() {
+    for phase in PHASES {
+        for (n, mass) in [(20, MassKind::Lumped), (50, MassKind::Lumped), (50, MassKind::Consistent)] {
+            let bars = bars(n, phase).with_mass(mass);
+            let correctors = || list([Box::new(PersistencyCorrection::new()), Box::new(Release)]);
+            let (_, without) = run(&bars, Newmark::trapezoidal(), list([Box::new(PersistencyCorrection::new())]));
+            let (_, with) = run(&bars, Newmark::trapezoidal(), correctors());
+            assert!(with.energy > without.energy + 1e-4, "{n} {mass:?}: {} {}", with.energy, without.energy);
+            assert!(with.energy < 1.0 + 1e-9 && with.closure < 1e-9 && with.drift < 1e-9, "{with:?}");
+
+            let mut run = builder(&bars, Newmark::trapezoidal(), correctors()).build().unwrap();
+            let (mut stored, mut returned) = (0.0, None);
+            while run.time() < 0.4 {
+                let (before, closed) = (run.energy().total(), run.state().contacts().closed()[0]);
+                run.step().unwrap();
+                let contacts = run.state().contacts();
+                if closed && !contacts.closed()[0] && returned.is_none() {
+                    // In the step that opens, energy rises by what had been taken, if contact works no more.
+                    assert!(contacts.dissipated()[0].abs() < 1e-12 * before, "{}", contacts.dissipated()[0]);
+                    let expected = stored;
+                    let gain = run.energy().total() - before;
+                    returned = Some((gain, expected));
+                }
+                stored = run.state().contacts().dissipated()[0];
+            }
+            let (gain, expected) = returned.unwrap();
+            assert!(expected > 0.0 && (gain / expected - 1.0).abs() < 0.5, "{gain} {expected}");
+        }
+    }
+}
+
+#[test]
+fn books_close_with_every_corrector() {
+    let dissimilar = Bars { young: [49.0, 100.0], elements: [35, 50], ..bars(50, 0.3) };
+    let transit = 0.2 / 100.0;
+    let correctors: [fn(f64) -> Correctors; 5] = [
+        |_| list([Box::new(ContactImplicit)]),
+        |_| list([Box::new(ContactStabilized::new())]),
+        |_| list([Box::new(ContactStabilized::improved())]),
+        |_| list([Box::new(PersistencyCorrection::new()), Box::new(Release)]),
+        |transit| list([Box::new(TaylorPapadopoulos::new(transit).unwrap())]),
+    ];
+    for make in correctors {
+        for mass in [MassKind::Lumped, MassKind::Consistent] {
+            for integrator in [Newmark::trapezoidal(), Newmark::new(0.3025, 0.6).unwrap()] {
+                let bars = dissimilar.with_mass(mass);
+                let name = make(transit)[0].name();
+                let (_, found) = run(&bars, integrator, make(transit));
+                assert!(found.closure < 1e-9 && found.drift < 1e-9, "{name}, {mass:?}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn zero_acceleration_is_the_acceleration_part_between_equal_bars_alone() {
+    let zero = |bars: &Bars| run(bars, Newmark::trapezoidal(), list([Box::new(ZeroAcceleration)]));
+    let part = |bars: &Bars| {
+        let correction = PersistencyCorrection::new().parts(Parts::Acceleration);
+        run(bars, Newmark::trapezoidal(), list([Box::new(correction)]))
+    };
+    let equal = bars(50, 0.3);
+    let (found, expected) = (zero(&equal).0, part(&equal).0);
+    for (x, y) in found.force.iter().zip(&expected.force) {
+        assert!((x - y).abs() < 1e-9 * 0.0125, "{x} {y}");
+    }
+    // Elsewhere it takes momentum away.
+    let unequal = Bars { young: [49.0, 100.0], ..equal };
+    assert!(zero(&unequal).1.drift > 1e-6 && part(&unequal).1.drift < 1e-10);
+}
+
+#[test]
+fn wave_release_is_the_impulse_of_the_last_force() {
+    // One mass on the floor that a load presses down, then pulls up: S and λ are known.
+    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let system = LinearSystem::lumped(vec![2.0], k).unwrap();
+    let system = system.load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
+    let path = |corrector: Box<dyn Corrector<f64>>| {
+        let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let system = LinearSystem::lumped(vec![2.0], k).unwrap();
+        let system = system.load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
+        let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0).unwrap(), 0.01)
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.0))
+            .corrector(corrector)
+            .build()
+            .unwrap();
+        run.run_until(0.1, &mut ()).unwrap();
+        run.state().velocity()[0]
+    };
+    drop(system);
+    let jump = path(Box::new(TaylorPapadopoulos::new(0.04).unwrap())) - path(Box::new(PersistencyCorrection::new()));
+    assert!((jump - 0.5 * 0.04 * 7.0 / 2.0).abs() < 1e-12, "{jump}");
+}
+
+#[test]
+fn runs_with_memory_in_their_contacts_resume_bit_for_bit() {
+    let bars = bars(20, 0.3);
+    let correctors = || list([Box::new(PersistencyCorrection::new()), Box::new(Release)]);
+    let mut whole = builder(&bars, Newmark::trapezoidal(), correctors()).build().unwrap();
+    whole.run_until(0.2, &mut ()).unwrap();
+    assert!(whole.state().contacts().dissipated()[0] > 0.0);
+    let (state, history) = (whole.state().clone(), whole.history().clone());
+    let mut resumed = builder(&bars, Newmark::trapezoidal(), correctors()).resume(state, history).build().unwrap();
+    whole.run_until(0.4, &mut ()).unwrap();
+    resumed.run_until(0.4, &mut ()).unwrap();
+    assert_eq!(whole.state(), resumed.state());
+}
+
+#[test]
+fn schemes_that_cannot_be_corrected_so_are_refused() {
+    let bars = bars(20, 0.0);
+    for corrector in [Box::new(ContactImplicit) as Box<dyn Corrector<f64>>, Box::new(ContactStabilized::new())] {
+        match builder(&bars, Composite, list([corrector])).build() {
+            Err(Error::Incompatible { part, reason }) => {
+                assert!(part.contains("composite") && reason.contains("last state alone"), "{part}: {reason}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    match builder(&bars, Newmark::trapezoidal(), list([Box::new(LaursenLove)])).build() {
+        Err(Error::Incompatible { reason, .. }) => assert!(reason.contains("middle of the step"), "{reason}"),
+        other => panic!("{other:?}"),
+    }
+    assert!(matches!(TaylorPapadopoulos::new(-1.0), Err(Error::Parameter { .. })));
+    assert!(matches!(TaylorPapadopoulos::new(f64::NAN), Err(Error::Parameter { .. })));
+}
