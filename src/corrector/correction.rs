@@ -472,7 +472,9 @@ impl<T: Real> Correction<'_, T> {
         if square > T::zero() {
             let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
             let factor = (root - rate) / square;
-            impulses.iter_mut().for_each(|x| *x *= factor);
+            for x in &mut impulses {
+                *x *= factor;
+            }
             self.apply_impulses(&rows, &impulses);
         }
         self.buffers.closed = rows;

@@ -35,7 +35,7 @@ impl<T: Real> Corrector<T> for LaursenLove {
 
     fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
         one_step(tableau)?;
-        match tableau.stages.iter().all(|stage| stage.load == 0.5) {
+        match tableau.stages.iter().all(|stage| (stage.load - 0.5).abs() < 1e-12) {
             true => Ok(()),
             false => Err("it needs a scheme whose balance, with the force of contact, holds in the middle of the step"),
         }

@@ -363,7 +363,7 @@ fn workspace<T: Real>(
         rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
-        shifted: vec![T::zero(); room(correctors.iter().any(|corrector| corrector.predicts()))],
+        shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
         projected_rows: 0,
         backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         correction_energy: T::zero(),

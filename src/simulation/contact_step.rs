@@ -560,7 +560,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         buffers.closed.clear();
         buffers.opened.clear();
         let impulse_weight = T::of(clock.h * impulse_weight);
-        for row in 0..constraints.len() {
+        for (row, &was_closed) in was_closed.iter().enumerate() {
             let raw = trial.lambda_raw[row];
             let law = constraints.law(row);
             let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
@@ -568,13 +568,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
             trial.closed[row] = closed;
             // A compliant contact leaves no jump to correct, nor does one that moves dofs without mass.
             if !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
-                match (closed, was_closed[row]) {
+                match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),
                     (false, true) => buffers.opened.push(row),
                     (false, false) => {}
                 }
             }
-            if closed && !was_closed[row] {
+            if closed && !was_closed {
                 trial.dissipated[row] = T::zero();
             }
             trial.lambda[row] = raw;
