@@ -1,10 +1,12 @@
 //! Mass matrices: lumping, blending, the Courant numbers of a mesh, and M⁻¹ on the degrees of freedom that are free to
 //! move.
 
+mod bipenalty;
 mod blend;
 mod courant;
 mod lump;
 
+pub use bipenalty::bipenalty;
 pub use blend::{blend, optimal_weight};
 pub use courant::courant;
 pub use lump::{lump, lump_diagonal};
