@@ -5,11 +5,13 @@ mod bipenalty;
 mod blend;
 mod courant;
 mod lump;
+mod redistribute;
 
 pub use bipenalty::bipenalty;
 pub use blend::{blend, optimal_weight};
 pub use courant::courant;
 pub use lump::{lump, lump_diagonal};
+pub use redistribute::{Redistribution, affine_motions, redistribute, redistribute_consistent};
 
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};

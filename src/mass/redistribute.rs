@@ -1,0 +1,485 @@
+//! Mass redistribution: contact dofs without mass, their mass on others.
+
+use super::{InverseMass, Mass};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::sparse;
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
+use std::collections::BTreeMap;
+
+/// Who takes over the mass of the dofs that [`redistribute`] and [`redistribute_consistent`] make massless.
+///
+/// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, that meets its conditions
+/// (theory, section 14); they differ in how far mass may go and in what is kept besides the total.
+#[derive(Clone, Copy, Debug)]
+pub enum Redistribution<'a> {
+    /// The neighbors of each massless dof that keep mass, in proportion to their mass (Hager, Hüeber, Wohlmuth, Int. J.
+    /// Numer. Methods Eng. 73, 2008, do the like by quadrature in the elements at the contact boundary).
+    ///
+    /// Neighbors are the dofs of the same group in the dof's column of this pattern, usually that of the stiffness
+    /// matrix; stored zeros count. Each group keeps its total. Its center of mass moves inward by the order of h_e², and
+    /// its inertia changes as much; frequencies change by the order of h_e³. The end of a uniform bar gives its
+    /// neighbor 3/2 of its mass.
+    Neighbors(SymbolicSparseColMatRef<'a, usize>),
+    /// All dofs of the group that keep mass, in proportion to their mass: the body becomes denser.
+    ///
+    /// Each group keeps its total. Centers of mass, inertia and frequencies change by the order of h_e.
+    Uniform,
+    /// The smallest change that keeps ψᵀ M ψ′ for every pair of some motions, in each group (Khenous, Laborde, Renard
+    /// 2008, with the mass norm in place of that of the entries of M).
+    ///
+    /// With the [`affine_motions`] 1, x, y, z these are total mass, center of mass and all second moments: momentum and
+    /// kinetic energy of every rigid and every affine motion stay. Frequencies still change by the order of h_e if the
+    /// whole body takes part, because mass has to come from afar (theory, section 14).
+    ///
+    /// On coarse meshes a mass would become negative, which is refused: a block needs 4 layers of elements for a whole
+    /// side of it to be massless.
+    LeastSquares {
+        /// Motions ψ, each one value a dof. Only values within a group are multiplied with each other.
+        motions: &'a [Vec<f64>],
+        /// Dofs that may take mass, in any order; massless ones among them are skipped. `None`: all of the group.
+        ///
+        /// Receivers near the massless dofs leave the rest of the body as it is. The fewer they are, the sooner a mass
+        /// becomes negative.
+        receivers: Option<&'a [usize]>,
+    },
+}
+
+/// Takes the mass of some dofs and gives it to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech. A/Solids
+/// 27, 2008).
+///
+/// Without mass at contact dofs the contact force has nothing to make jump: a semi-discrete solution has bounded
+/// accelerations and conserves energy, and impact costs none. The balance of such a dof is static, and M has no inverse.
+///
+/// `massless` lists dofs in any order: the contact nodes' in the normal direction if that is along an axis, otherwise in
+/// all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass stays among dofs
+/// with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Dofs with another number yet,
+/// such as supports, which would take mass out of the motion, take no part.
+///
+/// The result is zero on massless dofs, positive on all others. Where only normal directions are massless the masses of
+/// a node differ from direction to direction: each direction keeps its own inertia, but for a node that turns far that is no
+/// longer the inertia of a body. For large rotations make all directions massless.
+///
+/// # Errors
+///
+/// [`Error::Dimension`] for sizes that do not agree, [`Error::MissingDof`] for listed dofs out of range; [`Error::Mass`]
+/// for a mass that is not positive (zero is admitted on massless dofs) or would not be in the end, with the dof and that
+/// mass; [`Error::Incompatible`] if no dof is left to take the mass of another one, or none that could keep the motions;
+/// [`Error::Empty`], [`Error::NotFinite`] for the motions.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::mass::{self, Redistribution};
+/// // A bar of three elements of mass 4 that touches with its first node.
+/// let k = [(0, 0, 1.0), (1, 1, 2.0), (2, 2, 2.0), (3, 3, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 2, -1.0), (2, 1, -1.0),
+///     (2, 3, -1.0), (3, 2, -1.0)];
+/// let k = SparseColMat::<usize, f64>::try_new_from_triplets(4, 4, &k.map(|(i, j, k)| Triplet::new(i, j, k)))?;
+/// let lumped = [2.0, 4.0, 4.0, 2.0];
+/// let near = mass::redistribute(&lumped, &[0], &[0; 4], Redistribution::Neighbors(k.symbolic()))?;
+/// assert_eq!(near, [0.0, 6.0, 4.0, 2.0]);
+/// let far = mass::redistribute(&lumped, &[0], &[0; 4], Redistribution::Uniform)?;
+/// assert_eq!(far, [0.0, 4.8, 4.8, 2.4]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn redistribute<T: Real>(
+    mass: &[T],
+    massless: &[usize],
+    groups: &[usize],
+    by: Redistribution<'_>,
+) -> Result<Vec<T>> {
+    let mut loss = Loss::new(mass, massless, groups)?;
+    for (dof, &m) in loss.mass.iter().enumerate() {
+        if loss.massless[dof] { &mut loss.lost } else { &mut loss.kept }.push((dof, dof, m));
+    }
+    let change = loss.returned(by, T::epsilon().value())?;
+    let redistributed: Vec<T> = loss.diagonal(&change);
+    loss.check(&redistributed)?;
+    Ok(redistributed)
+}
+
+/// As [`redistribute`] for a consistent or blended mass matrix, both triangles stored.
+///
+/// Rows and columns of the massless dofs are left out. What another dof loses with them it gets back on its own diagonal,
+/// so that its row sum stays; the row sums of the massless dofs, which are their lumped masses, are then given away. Neighbors
+/// get their shares on the diagonal, in proportion to that of M. The other two options change the density,
+/// Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix stays like one of a consistent mass, and a lumped mass is a special case.
+///
+/// With [`Redistribution::Uniform`], lumping of the result gives what [`redistribute`] makes of the lumped mass; with
+/// neighbors, too, if the diagonal is in one proportion to the row sums (one kind of linear element with constant Jacobian).
+/// Least squares keep the inertia of this matrix, which is not that of the lumped one.
+///
+/// Shares of neighbors that are not negative leave M positive definite on the dofs that keep mass, if it was. In all other
+/// cases (couplings of quadratic elements are negative, density may fall) the result is factorized once to make sure.
+/// Entries between dofs of different groups belong to no group; those of massless dofs are lost.
+///
+/// Nothing is stored in the rows and columns of massless dofs, nor zeros elsewhere: a diagonal result has a diagonal pattern.
+///
+/// # Errors
+///
+/// As [`redistribute`]; [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for the matrix, [`Error::Singular`] if
+/// the result is not positive definite on the dofs that keep mass.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::mass::{self, Redistribution};
+/// // Two linear bar elements of mass 6.
+/// let m = [(0, 0, 2.0), (1, 1, 4.0), (2, 2, 2.0), (0, 1, 1.0), (1, 0, 1.0), (1, 2, 1.0), (2, 1, 1.0)];
+/// let m = SparseColMat::try_new_from_triplets(3, 3, &m.map(|(i, j, m)| Triplet::new(i, j, m)))?;
+/// let near = Redistribution::Neighbors(m.symbolic());
+/// let cut = mass::redistribute_consistent(m.as_ref(), &[0], &[0; 3], near)?;
+/// // [8 1; 1 2] on the last two dofs: 4 + 1 lost with the coupling + 3 of the first node.
+/// assert_eq!(cut.val(), [8.0, 1.0, 1.0, 2.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn redistribute_consistent<T: Real>(
+    mass: SparseColMatRef<'_, usize, T>,
+    massless: &[usize],
+    groups: &[usize],
+    by: Redistribution<'_>,
+) -> Result<SparseColMat<usize, T>> {
+    sparse::check_symmetric("mass", mass)?;
+    let n = mass.ncols();
+    let diagonal: Vec<T> = (0..n).map(|dof| sparse::entry(mass, dof, dof)).collect();
+    let mut loss = Loss::new(&diagonal, massless, groups)?;
+    for column in 0..n {
+        for (&row, &value) in mass.row_idx_of_col_raw(column).iter().zip(mass.val_of_col(column)) {
+            if groups[row] == groups[column] {
+                let lost = loss.massless[row] || loss.massless[column];
+                if lost { &mut loss.lost } else { &mut loss.kept }.push((row, column, value.value()));
+            }
+        }
+    }
+    let change = loss.returned(by, T::epsilon().value())?;
+    let diagonal: Vec<T> = loss.diagonal(&change);
+    loss.check(&diagonal)?;
+    let keeps = |dof: &usize| !loss.massless[*dof];
+    let mut entries: Vec<(usize, usize, T)> = (0..n).filter(keeps).map(|dof| (dof, dof, diagonal[dof])).collect();
+    for column in (0..n).filter(keeps) {
+        for (&row, &value) in mass.row_idx_of_col_raw(column).iter().zip(mass.val_of_col(column)) {
+            if row != column && keeps(&row) && value != T::zero() {
+                let density = 1.0 + 0.5 * (change.density[row] + change.density[column]);
+                entries.push((row, column, T::of(density * value.value())));
+            }
+        }
+    }
+    let result = assembled(n, entries)?;
+    if change.added.iter().any(|&m| m < 0.0) || change.density.iter().any(|&p| p != 0.0) {
+        let massless: Vec<usize> = (0..n).filter(|&dof| loss.massless[dof]).collect();
+        InverseMass::new(Mass::Consistent(result.as_ref()), &massless)?;
+    }
+    Ok(result)
+}
+
+/// The motions 1, x, y, z of [`Redistribution::LeastSquares`]: one value a dof, coordinates from their mean, the same in each
+/// direction of a node.
+///
+/// `coordinates` and `dofs` by node; `size` is the number of dofs of the system. Dofs of no node have zeros: they take no mass.
+///
+/// A rigid motion moves direction x by a + ω_y z − ω_z y: for rigid motions alone the coordinates **across** a direction would
+/// do. All of them are kept so that nothing depends on the axes, and because it is no harder.
+///
+/// # Errors
+///
+/// [`Error::Dimension`] unless there are dofs for each node, [`Error::MissingDof`] for dofs out of range,
+/// [`Error::NotFinite`] for coordinates.
+///
+/// ```
+/// use contact_dynamics::mass::{self, Redistribution};
+/// // A bar of eight elements of mass 2; its first node becomes massless.
+/// let lumped = [1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0];
+/// let x: [[f64; 1]; 9] = std::array::from_fn(|node| [node as f64]);
+/// let motions = mass::affine_motions(9, &x, &std::array::from_fn::<_, 9, _>(|node| [node]))?;
+/// let by = Redistribution::LeastSquares { motions: &motions, receivers: None };
+/// let m = mass::redistribute(&lumped, &[0], &[0; 9], by)?;
+/// let moment = |m: &[f64], k: i32| m.iter().zip(&x).map(|(m, [x])| m * x.powi(k)).sum::<f64>();
+/// assert!((0..3).all(|k| (moment(&m, k) / moment(&lumped, k) - 1.0).abs() < 1e-14));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+pub fn affine_motions<T: Real, const D: usize>(
+    size: usize,
+    coordinates: &[[T; D]],
+    dofs: &[[usize; D]],
+) -> Result<Vec<Vec<f64>>> {
+    if dofs.len() != coordinates.len() {
+        let what = "dofs of the nodes";
+        return Err(Error::Dimension { what, expected: coordinates.len(), found: dofs.len() });
+    }
+    let values = coordinates.as_flattened();
+    if let Some(index) = values.iter().position(|x| !x.is_finite()) {
+        return Err(Error::NotFinite { what: "coordinates of the nodes", index, value: values[index].value() });
+    }
+    check_dofs("the dofs of the nodes", dofs.as_flattened(), size)?;
+    let mut motions = vec![vec![0.0; size]; D + 1];
+    for axis in 0..D {
+        let mean = coordinates.iter().map(|x| x[axis].value() / coordinates.len() as f64).sum::<f64>();
+        for (x, dofs) in coordinates.iter().zip(dofs) {
+            for &dof in dofs {
+                motions[0][dof] = 1.0;
+                motions[axis + 1][dof] = x[axis].value() - mean;
+            }
+        }
+    }
+    Ok(motions)
+}
+
+/// A mass matrix that is to lose the rows and columns of its massless dofs.
+struct Loss<'a> {
+    groups: &'a [usize],
+    massless: Vec<bool>,
+    /// The diagonal of the matrix.
+    mass: Vec<f64>,
+    /// Row, column and value of the entries that go and that stay, those between groups left out.
+    lost: Vec<(usize, usize, f64)>,
+    kept: Vec<(usize, usize, f64)>,
+}
+
+/// What becomes of what is kept: Mᵢⱼ ← (Mᵢⱼ + δᵢⱼ addedᵢ)(1 + ½ densityᵢ + ½ densityⱼ).
+struct Change {
+    added: Vec<f64>,
+    density: Vec<f64>,
+}
+
+impl<'a> Loss<'a> {
+    /// With no entries yet.
+    fn new<T: Real>(mass: &[T], massless: &[usize], groups: &'a [usize]) -> Result<Self> {
+        let n = mass.len();
+        if groups.len() != n {
+            return Err(Error::Dimension { what: "groups of the mass matrix", expected: n, found: groups.len() });
+        }
+        let massless = flags("the list of massless dofs", massless, n)?;
+        let values = mass.iter().map(|m| m.value()).collect();
+        let loss = Self { groups, massless, mass: values, lost: Vec::new(), kept: Vec::new() };
+        loss.check(mass)?;
+        Ok(loss)
+    }
+
+    /// The diagonal of the result, zero on massless dofs.
+    fn diagonal<T: Real>(&self, change: &Change) -> Vec<T> {
+        let new = |dof: usize| match self.massless[dof] {
+            true => 0.0,
+            false => (self.mass[dof] + change.added[dof]) * (1.0 + change.density[dof]),
+        };
+        (0..self.mass.len()).map(|dof| T::of(new(dof))).collect()
+    }
+
+    /// Refuses masses that are not positive, but zero where it belongs.
+    fn check<T: Real>(&self, mass: &[T]) -> Result<()> {
+        let wrong = |(&m, &massless): (&T, &bool)| !((m > T::zero() || massless && m == T::zero()) && m.is_finite());
+        match mass.iter().zip(&self.massless).position(wrong) {
+            Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
+            None => Ok(()),
+        }
+    }
+
+    /// What gives the mass back; `epsilon` is that of the input.
+    fn returned(&self, by: Redistribution<'_>, epsilon: f64) -> Result<Change> {
+        let n = self.mass.len();
+        // A row that only loses couplings gets them back, the sum of a row that is lost goes to others.
+        let (mut change, mut given) = (Change { added: vec![0.0; n], density: vec![0.0; n] }, vec![0.0; n]);
+        for &(row, _, value) in &self.lost {
+            let sums = if self.massless[row] { &mut given } else { &mut change.added };
+            sums[row] += value;
+        }
+        match by {
+            Redistribution::Neighbors(graph) => {
+                for found in [graph.nrows(), graph.ncols()] {
+                    if found != n {
+                        return Err(Error::Dimension { what: "pattern of the neighbors", expected: n, found });
+                    }
+                }
+                sparse::check_pattern("neighbors", graph)?;
+                for dof in (0..n).filter(|&dof| given[dof] != 0.0) {
+                    let of_group = |other: &&usize| !self.massless[**other] && self.groups[**other] == self.groups[dof];
+                    let neighbors = || graph.row_idx_of_col_raw(dof).iter().filter(of_group);
+                    let total: f64 = neighbors().map(|&other| self.mass[other]).sum();
+                    check_takers(dof, total)?;
+                    neighbors().for_each(|&other| change.added[other] += given[dof] * self.mass[other] / total);
+                }
+            }
+            Redistribution::Uniform => {
+                for group in self.by_group(|_| true) {
+                    let kept = group.kept.iter().map(|entry| entry.2).sum::<f64>();
+                    let total = kept + group.receivers.iter().map(|&dof| change.added[dof]).sum::<f64>();
+                    check_takers(group.massless[0], total)?;
+                    let sum: f64 = group.massless.iter().map(|&dof| given[dof]).sum();
+                    group.receivers.iter().for_each(|&dof| change.density[dof] = sum / total);
+                }
+            }
+            Redistribution::LeastSquares { motions, receivers } => {
+                check_motions(motions, n)?;
+                let listed = receivers.map(|list| flags("the list of receivers", list, n)).transpose()?;
+                for group in self.by_group(|dof| listed.as_ref().is_none_or(|listed| listed[dof])) {
+                    check_takers(group.massless[0], group.receivers.len() as f64)?;
+                    self.least_squares(&group, motions, epsilon, &mut change)?;
+                }
+            }
+        }
+        Ok(change)
+    }
+
+    /// The groups that lose mass, with those of their dofs that keep theirs and may `take` more.
+    fn by_group(&self, take: impl Fn(usize) -> bool) -> Vec<Group> {
+        let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
+        for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| self.massless[*dof]) {
+            groups.entry(*group).or_default().massless.push(dof);
+        }
+        for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| !self.massless[*dof] && take(*dof)) {
+            if let Some(group) = groups.get_mut(group) {
+                group.receivers.push(dof);
+            }
+        }
+        for &entry in &self.lost {
+            if let Some(group) = groups.get_mut(&self.groups[entry.0]) {
+                group.lost.push(entry);
+            }
+        }
+        for &entry in &self.kept {
+            if let Some(group) = groups.get_mut(&self.groups[entry.0]) {
+                group.kept.push(entry);
+            }
+        }
+        groups.into_values().collect()
+    }
+
+    /// Writes the density p of least Σ mᵢ pᵢ² that makes up for what ψᵀ M ψ′ has lost, for all pairs ψ, ψ′.
+    ///
+    /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) of the matrix B that is kept. With the
+    /// weights mᵢ the functions aᵢ/mᵢ are made orthonormal one after the other (Gram and Schmidt, twice), and the b with
+    /// them; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start far away.
+    fn least_squares(&self, group: &Group, motions: &[Vec<f64>], epsilon: f64, change: &mut Change) -> Result<()> {
+        let tolerance = 1e3 * epsilon;
+        let mass: Vec<f64> = group.receivers.iter().map(|&dof| self.mass[dof]).collect();
+        let dot = |x: &[f64], y: &[f64]| -> f64 { mass.iter().zip(x.iter().zip(y)).map(|(m, (x, y))| m * x * y).sum() };
+        let momentum = |motion: &Vec<f64>| {
+            let mut momentum: Vec<f64> = motion.iter().zip(&change.added).map(|(x, m)| m * x).collect();
+            group.kept.iter().for_each(|&(row, column, value)| momentum[row] += value * motion[column]);
+            momentum
+        };
+        let momenta: Vec<Vec<f64>> = motions.iter().map(momentum).collect();
+        let mut basis: Vec<(Vec<f64>, f64)> = Vec::new();
+        for (k, first) in motions.iter().enumerate() {
+            for (second, second_momentum) in motions[k..].iter().zip(&momenta[k..]) {
+                let mean = |&dof: &usize| 0.5 * (first[dof] * second_momentum[dof] + second[dof] * momenta[k][dof]);
+                let mut function: Vec<f64> =
+                    group.receivers.iter().zip(&mass).map(|(dof, mass)| mean(dof) / mass).collect();
+                let (mut loss, mut size) = (0.0, 0.0);
+                for &(row, column, value) in &group.lost {
+                    // A coupling that is lost has come back to the diagonal of its row.
+                    let back = if self.massless[row] { 0.0 } else { second[row] };
+                    loss += value * first[row] * (second[column] - back);
+                    size += (value * first[row]).abs() * (second[column].abs() + back.abs());
+                }
+                let norm = dot(&function, &function).sqrt();
+                for _ in 0..2 {
+                    for (vector, of_vector) in &basis {
+                        let part = dot(vector, &function);
+                        function.iter_mut().zip(vector).for_each(|(x, y)| *x -= part * y);
+                        loss -= part * of_vector;
+                        size += (part * of_vector).abs();
+                    }
+                }
+                let rest = dot(&function, &function).sqrt();
+                if rest > tolerance * norm {
+                    for x in &mut function {
+                        *x /= rest;
+                    }
+                    basis.push((function, loss / rest));
+                } else if loss.abs() > tolerance * size {
+                    return Err(refused(
+                        group.massless[0],
+                        "the dofs that may take it cannot keep these motions; let more of them, or keep fewer motions",
+                    ));
+                }
+            }
+        }
+        for (vector, loss) in &basis {
+            group.receivers.iter().zip(vector).for_each(|(&dof, x)| change.density[dof] += loss * x);
+        }
+        Ok(())
+    }
+}
+
+/// A group that loses mass.
+#[derive(Default)]
+struct Group {
+    /// At least one.
+    massless: Vec<usize>,
+    receivers: Vec<usize>,
+    /// Those of the matrix.
+    lost: Vec<(usize, usize, f64)>,
+    kept: Vec<(usize, usize, f64)>,
+}
+
+fn refused(dof: usize, reason: &'static str) -> Error {
+    Error::Incompatible { part: format!("redistribution of the mass of dof {dof}"), reason }
+}
+
+/// Refuses to take the mass of a dof if nobody is there for it: `weight` is their mass or number.
+fn check_takers(dof: usize, weight: f64) -> Result<()> {
+    match weight > 0.0 {
+        true => Ok(()),
+        false => Err(refused(dof, "no dof of its group that keeps mass may take it")),
+    }
+}
+
+/// Refuses dofs the system does not have.
+pub(super) fn check_dofs(what: &'static str, dofs: &[usize], size: usize) -> Result<()> {
+    match dofs.iter().find(|dof| **dof >= size) {
+        Some(&dof) => Err(Error::MissingDof { what, dof, dofs: size }),
+        None => Ok(()),
+    }
+}
+
+/// Which of all dofs are listed.
+pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<Vec<bool>> {
+    check_dofs(what, list, size)?;
+    let mut flags = vec![false; size];
+    for &dof in list {
+        flags[dof] = true;
+    }
+    Ok(flags)
+}
+
+fn check_motions(motions: &[Vec<f64>], size: usize) -> Result<()> {
+    let what = "motion kept by the redistribution";
+    if motions.is_empty() {
+        return Err(Error::Empty {
+            what: "the list of motions",
+            remedy: "take `affine_motions`, or at least all ones",
+        });
+    }
+    for motion in motions {
+        if motion.len() != size {
+            return Err(Error::Dimension { what, expected: size, found: motion.len() });
+        }
+        if let Some(index) = motion.iter().position(|x| !x.is_finite()) {
+            return Err(Error::NotFinite { what, index, value: motion[index] });
+        }
+    }
+    Ok(())
+}
+
+/// The square matrix of these entries (row, column, value), those in the same place added in their order.
+pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
+    entries.sort_by_key(|&(row, column, _)| (column, row));
+    let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());
+    let mut last = None;
+    for (row, column, value) in entries {
+        match values.last_mut() {
+            Some(sum) if last == Some((row, column)) => *sum += value,
+            _ => {
+                rows.push(row);
+                values.push(value);
+                pointers[column + 1] += 1;
+            }
+        }
+        last = Some((row, column));
+    }
+    for column in 0..size {
+        pointers[column + 1] += pointers[column];
+    }
+    let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
+        .to_owned()
+        .map_err(|_| Error::OutOfMemory { what: "the pattern of a singular mass matrix" })?;
+    Ok(SparseColMat::new(pattern, values))
+}
