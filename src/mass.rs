@@ -6,12 +6,14 @@ mod blend;
 mod courant;
 mod lump;
 mod redistribute;
+mod singular;
 
 pub use bipenalty::bipenalty;
 pub use blend::{blend, optimal_weight};
 pub use courant::courant;
 pub use lump::{lump, lump_diagonal};
 pub use redistribute::{Redistribution, affine_motions, redistribute, redistribute_consistent};
+pub use singular::{mixed, singular};
 
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};
