@@ -379,6 +379,8 @@ fn frequencies_of_a_bar_with_a_massless_end() {
     for (coarse, fine) in coarse.into_iter().zip(fine) {
         assert!(coarse / fine > 7.0, "{coarse} {fine}");
     }
+    close(&fine, &[-2.8e-6, -4.0e-5, -1.84e-4], 1e-6);
+    close(&cut(80, 0, None), &[1.2e-6, 1.08e-5, 3.0e-5], 1e-7);
 }
 
 #[test]
