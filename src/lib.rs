@@ -17,6 +17,7 @@ pub mod linear_solver;
 pub mod mass;
 mod memory;
 pub mod observer;
+mod preset;
 mod real;
 pub mod reference;
 mod simulation;
@@ -35,6 +36,7 @@ pub use integrator::*;
 pub use linear_solver::{Automatic, Cholesky, Condensation, Diagonal, Factorization, LinearSolver};
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};
+pub use preset::Preset;
 pub use real::Real;
 pub use simulation::{
     Energy, Iteration, Newton, Outcome, Simulation, SimulationBuilder, Statistics, StepControl, Works,

@@ -125,6 +125,32 @@ fn the_end_of_a_bar_gives_its_mass_to_its_neighbor_or_to_all() {
 
 /// 3 × 3 nodes, the lowest massless upward: shares 1/3 and 2/3 of a corner, 1/4, 1/2, 1/4 of the middle.
 #[test]
+fn a_tapered_end_gives_more_of_its_mass_to_all() {
+    // Five elements of mass 1: the first node gives ½, its neighbor a fifth of 1, to the 4.5 that are kept, less the fifth.
+    let lumped = [0.5, 1.0, 1.0, 1.0, 1.0, 0.5];
+    let m = bar(&[1.0; 5]);
+    let by = Redistribution::Tapered { neighbors: m.symbolic(), fraction: 0.2 };
+    let expected = [0.0, 0.8, 1.0, 1.0, 1.0, 0.5].map(|m: f64| m * 5.0 / 4.3);
+    close(&mass::redistribute(&lumped, &[0], &[0; 6], by).unwrap(), &expected, 1e-14);
+    // The consistent mass: its row sums do the same, and both ends may give.
+    let cut = mass::redistribute_consistent(m.as_ref(), &[0], &[0; 6], by).unwrap();
+    close(&row_sums(&cut), &expected, 1e-14);
+    check_singular(&cut, &[0]);
+    let both = mass::redistribute(&lumped, &[5, 0], &[0; 6], by).unwrap();
+    close(&both, &[0.0, 0.8, 1.0, 1.0, 0.8, 0.0].map(|m: f64| m * 5.0 / 3.6), 1e-14);
+    // A neighbor of two gives once, and a fraction of nothing is the uniform option.
+    let two = mass::redistribute(&lumped, &[1, 3], &[0; 6], by).unwrap();
+    close(&two, &[0.4, 0.0, 0.8, 0.0, 0.8, 0.5].map(|m: f64| m * 5.0 / 2.5), 1e-14);
+    let none = Redistribution::Tapered { neighbors: m.symbolic(), fraction: 0.0 };
+    let uniform = mass::redistribute(&lumped, &[0], &[0; 6], Redistribution::Uniform).unwrap();
+    close(&mass::redistribute(&lumped, &[0], &[0; 6], none).unwrap(), &uniform, 1e-15);
+    for fraction in [1.0, -0.1, f64::NAN] {
+        let by = Redistribution::Tapered { neighbors: m.symbolic(), fraction };
+        assert!(matches!(mass::redistribute(&lumped, &[0], &[0; 6], by), Err(Error::Parameter { .. })));
+    }
+}
+
+#[test]
 fn neighbors_in_a_plate_share_by_mass_within_their_direction() {
     let plate = Solid::rectangle([2.0, 2.0], [2, 2], Material { density: 1.0, ..MATERIAL });
     let (lumped, k) = (plate.lumped_mass::<f64>(), plate.stiffness::<f64>());

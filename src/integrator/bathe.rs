@@ -50,9 +50,13 @@ impl Bathe {
     ///
     /// [`Error::Parameter`](crate::Error::Parameter) unless ρ∞ is in [0, 1].
     pub fn with_radius(rho: f64) -> Result<Self> {
-        let rho = within("ρ∞ of Bathe's scheme", rho, 0.0..=1.0, "in [0, 1]")?;
+        within("ρ∞ of Bathe's scheme", rho, 0.0..=1.0, "in [0, 1]").map(Self::of_radius)
+    }
+
+    /// The ρ∞ scheme for a radius that is known to be in range.
+    pub(crate) fn of_radius(rho: f64) -> Self {
         // (2 − √(2 + 2ρ))/(1 − ρ) without its removable singularity.
-        Ok(Self { gamma: 2.0 / (2.0 + (2.0 + 2.0 * rho).sqrt()), rho })
+        Self { gamma: 2.0 / (2.0 + (2.0 + 2.0 * rho).sqrt()), rho }
     }
 }
 

@@ -53,8 +53,12 @@ impl GeneralizedAlpha {
     ///
     /// [`Error::Parameter`](crate::Error::Parameter) if ρ∞ is outside its range.
     pub fn chung_hulbert(rho: f64) -> Result<Self> {
-        let rho = within("ρ∞ of Chung and Hulbert's scheme", rho, 0.0..=1.0, "in [0, 1]")?;
-        Ok(Self::optimal("Chung–Hulbert", rho, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)))
+        within("ρ∞ of Chung and Hulbert's scheme", rho, 0.0..=1.0, "in [0, 1]").map(Self::of_radius)
+    }
+
+    /// The scheme of Chung and Hulbert for a radius that is known to be in range.
+    pub(crate) fn of_radius(rho: f64) -> Self {
+        Self::optimal("Chung–Hulbert", rho, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
     }
 
     /// HHT-α with spectral radius ρ∞ in [½, 1].
