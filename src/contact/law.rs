@@ -34,6 +34,53 @@ pub enum ContactLaw {
         /// e, from 0 (plastic, the same as `Rigid`) to 1 (elastic).
         coefficient: f64,
     },
+    /// The rate condition of Laursen and Chawla (Int. J. Numer. Meth. Eng. 40, 1997): a row that is closed at the start of
+    /// the stage, gₙ ≤ 0, has 0 ≤ (g′ − gₙ)/h ⊥ λ ≥ 0; an open one takes no part. For schemes that impose contact on the
+    /// displacements of the state.
+    ///
+    /// * λ (g′ − gₙ) = 0. With the balance in the middle of the step, and the mean of v as the change of u (the midpoint
+    ///   rule, [`Gssss::new(1, 1, 1)`](crate::Gssss), and [`EnergyMomentum`](crate::EnergyMomentum)), contact with fixed rows
+    ///   does no work, and energy is conserved. Linear momentum is, with every scheme.
+    /// * Known failures: bodies penetrate by up to one step's approach, and stay there while they are pressed (so a run
+    ///   may start inside). Contact nodes rebound elastically, and contact chatters. With the balance elsewhere contact does
+    ///   work: a mass leaves three times as fast as it came by the trapezoidal rule. Rows of curved surfaces that are
+    ///   not followed drift by (h v)²/(2R) a step.
+    /// * [`Works::contact`](crate::Works::contact) takes the mean of the forces of two steps and shows work that
+    ///   is none; its remainder takes that back.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::ContactLaw;
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Gssss, LinearRows, LinearSystem, Simulation};
+    ///
+    /// // A ball flies with speed 2 at a wall 0.99 away, 0.02 a step.
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let wall = LinearRows::new().row(ContactLaw::RateCondition, &[(0, 1.0)], 0.99);
+    /// let midpoint = Gssss::new(1.0, 1.0, 1.0)?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, midpoint, 0.01)
+    ///     .velocity(vec![-2.0])
+    ///     .constraint(wall)
+    ///     .build()?;
+    /// run.run_until(0.5, &mut ())?;
+    /// assert!((run.gaps()[0] + 0.01).abs() < 1e-12); // half a step's approach inside
+    /// run.run_until(1.0, &mut ())?;
+    /// assert!((run.state().velocity()[0] - 2.0).abs() < 1e-12); // and out again, as fast as it came
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    RateCondition,
+    /// The dynamic persistency switch (as in the mechanical contact of MOOSE): a row that is open at the start of the
+    /// stage, gₙ > 0, has 0 ≤ g′ ⊥ λ ≥ 0, a closed one 0 ≤ ġ′ ⊥ λ ≥ 0, with ġ′ from the velocities that the scheme
+    /// recovers. For schemes that impose contact on the displacements of the state, if their velocities contain the unknown.
+    ///
+    /// * From the second step on the rate of a pressed contact is zero: it persists. With the midpoint rule,
+    ///   [`Gssss::new(1, 1, 1)`](crate::Gssss), and a fine mesh the force is smooth without a corrector (figures in
+    ///   `docs/contact.md`). Linear momentum is conserved.
+    /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open behind it.
+    ///   The second one leaves a gap that is not mended while contact lasts, up to half a step's approach where the
+    ///   change of u is the mean of v (so a run may start inside). Accelerations are free to alternate: by the
+    ///   trapezoidal rule forces do, and energy may rise. Rows of curved surfaces that are not followed drift as
+    ///   under `RateCondition`.
+    PersistencySwitch,
     /// λ = k ⟨−g⟩: a linear spring in compression.
     Penalty {
         /// k (force/length).
@@ -77,7 +124,9 @@ impl ContactLaw {
     /// Whether the force follows from the gap alone (and its acceleration): the gap may be negative.
     pub fn is_compliant(&self) -> bool {
         match self {
-            Self::Rigid | Self::Equality | Self::Restitution { .. } => false,
+            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
+                false
+            }
             Self::Penalty { .. }
             | Self::PowerLaw { .. }
             | Self::Bipenalty { .. }
@@ -90,6 +139,11 @@ impl ContactLaw {
         *self == Self::Equality
     }
 
+    /// Whether the condition depends on the gap at the start of the stage. The gap of a closed row may then be negative.
+    pub(crate) fn reads_start(&self) -> bool {
+        matches!(self, Self::RateCondition | Self::PersistencySwitch)
+    }
+
     /// Refuses parameters out of range.
     pub(crate) fn check(&self) -> Result<()> {
         let inside = |name, value: f64, ok: bool, range| match ok {
@@ -98,7 +152,7 @@ impl ContactLaw {
         };
         let stiff = |stiffness| positive("the contact stiffness", stiffness).map(|_| ());
         match *self {
-            Self::Rigid | Self::Equality => Ok(()),
+            Self::Rigid | Self::Equality | Self::RateCondition | Self::PersistencySwitch => Ok(()),
             Self::Restitution { coefficient: e } => {
                 inside("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
             }
@@ -131,7 +185,9 @@ impl ContactLaw {
             | Self::Bipenalty { stiffness, .. }
             | Self::AugmentedLagrangian { stiffness, .. } => T::of(stiffness) * depth,
             Self::PowerLaw { stiffness, exponent } => T::of(stiffness) * depth.powf(T::of(exponent)),
-            Self::Rigid | Self::Equality | Self::Restitution { .. } => T::zero(),
+            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
+                T::zero()
+            }
         }
     }
 
@@ -140,7 +196,9 @@ impl ContactLaw {
     /// `depth` is where a power law is linearized (positive), `augmented` the multiplier λ̂ of an augmented Lagrangian.
     pub(crate) fn linearized<T: Real>(&self, depth: T, augmented: T) -> (T, T) {
         match *self {
-            Self::Rigid | Self::Equality | Self::Restitution { .. } => (T::zero(), T::zero()),
+            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
+                (T::zero(), T::zero())
+            }
             Self::Penalty { stiffness } | Self::Bipenalty { stiffness, .. } => (T::of(stiffness).recip(), T::zero()),
             Self::AugmentedLagrangian { stiffness, .. } => {
                 let compliance = T::of(stiffness).recip();

@@ -490,7 +490,8 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
-    /// all past values that later rows read (`docs/theory.md`, history projection).
+    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the law
+    /// reads the gap at the start of a stage.
     ///
     /// # Errors
     ///
@@ -529,7 +530,12 @@ impl<T: Real> Correction<'_, T> {
         match field {
             0 => {
                 constraints.0.gap(motion.t, &motion.u, gaps);
-                jump.extend(rows.iter().map(|&row| gaps[row]));
+                // Where it is held, under a law that reads the gap where a stage starts.
+                let held = |row: usize| match constraints.0.law(row).reads_start() {
+                    true => contacts.gap[row],
+                    false => T::zero(),
+                };
+                jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
             }
             1 => {
                 constraints.0.rates(motion.t, &motion.u, &motion.v, rates);

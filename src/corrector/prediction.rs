@@ -3,7 +3,7 @@
 
 use super::correction::{ErasedGaps, contact_error, rounding};
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian};
+use crate::contact::{ContactId, ContactJacobian, ContactLaw};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
@@ -52,14 +52,16 @@ impl<T: Real> Prediction<'_, T> {
 
     /// Moves u + h v to the nearest point, in the norm of the mass, that no contact forbids, and shifts the displacements
     /// that the stage starts from by as much: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts of dofs without mass
-    /// and compliant ones are left out.
+    /// are left out, and all under other laws than rigid ones.
     ///
     /// # Errors
     ///
     /// [`Error::Contact`](crate::Error::Contact), [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
     pub fn project(&mut self, extent: Extent) -> Result<()> {
         let count = self.ids.len();
-        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| !constraints.0.law(row).is_compliant();
+        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| {
+            matches!(constraints.0.law(row), ContactLaw::Rigid | ContactLaw::Equality)
+        };
         let mut rows = std::mem::take(&mut self.buffers.closed);
         let mut mu = std::mem::take(&mut self.buffers.impulses);
         rows.clear();

@@ -372,8 +372,29 @@ fn workspace<T: Real>(
 
 /// The contact laws that a scheme can serve.
 fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
-    let mut admitted = Admitted { integrator: integrator.name(), no_rigid: None, no_restitution: None };
+    let mut admitted = Admitted { integrator: integrator.name(), ..Admitted::default() };
     for stage in &tableau.stages {
+        match stage.contact {
+            ContactLevel::POSITION => {}
+            ContactLevel::Position { .. } => {
+                admitted.no_start = Some(
+                    "it imposes contact ahead of the state, and the gap at the start of a step says nothing of that; \
+                     choose a scheme that imposes it on the displacements of the state",
+                );
+            }
+            ContactLevel::Velocity { .. } => {
+                admitted.no_start = Some(
+                    "it imposes contact on velocities already; choose `ContactLaw::Rigid`, or a scheme that imposes it on \
+                     the displacements of the state",
+                );
+            }
+        }
+        if stage.recovery.v.z <= 0.0 {
+            admitted.no_switch = Some(
+                "its velocities do not contain the unknown, so a multiplier cannot hold the rate of a closed contact; \
+                 choose another contact law",
+            );
+        }
         match stage.contact {
             ContactLevel::Position { .. } => {
                 admitted.no_restitution = Some(

@@ -32,16 +32,20 @@ pub(crate) struct Admitted {
     pub(crate) no_rigid: Option<&'static str>,
     /// Why not restitution above zero, if not.
     pub(crate) no_restitution: Option<&'static str>,
+    /// Why not those that read the gap at the start of a stage, if not, and why not the persistency switch among them.
+    pub(crate) no_start: Option<&'static str>,
+    pub(crate) no_switch: Option<&'static str>,
 }
 
 impl Admitted {
     fn check(&self, law: ContactLaw) -> Result<()> {
-        let restores = matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
-        let refused = match law.is_compliant() {
-            true => None,
-            false => self.no_rigid.or(self.no_restitution.filter(|_| restores)),
+        let own = match law {
+            ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
+            ContactLaw::RateCondition => self.no_start,
+            ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
+            _ => None,
         };
-        match refused {
+        match self.no_rigid.or(own).filter(|_| !law.is_compliant()) {
             None => Ok(()),
             Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
         }
@@ -208,6 +212,11 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// What of a gap is rounding, if the terms of G u have this magnitude.
     pub(crate) fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
         rounding(magnitude + gap.abs() + self.magnitudes[row])
+    }
+
+    /// Whether the condition of any row depends on the gap at the start of the stage.
+    pub(crate) fn reads_start(&self) -> bool {
+        self.laws.iter().any(ContactLaw::reads_start)
     }
 
     /// Whether any row is compliant.

@@ -12,6 +12,21 @@ use crate::real::Real;
 use crate::state::{Clock, Motion};
 use crate::system::System;
 
+/// What a row constrains in a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Measure {
+    /// What the scheme asks for: the gap, or h times its rate.
+    AsScheme,
+    /// The gap less that at the start of the stage.
+    Increment,
+    /// h times the rate of the gap, by a scheme that asks for the gap.
+    Rate,
+    /// Nothing.
+    Nothing,
+    /// Not known before the free motion of the stage is.
+    Undecided,
+}
+
 /// Buffers of the contact problem, one entry a candidate unless said otherwise.
 pub(super) struct ContactRowsWork<T> {
     pub(super) rates: Vec<GapRates<T>>,
@@ -25,6 +40,11 @@ pub(super) struct ContactRowsWork<T> {
     shift: Vec<T>,
     /// Gaps where the balance holds, for compliant laws.
     balance_gap: Vec<T>,
+    /// What each row constrains in this stage; for rows whose law reads it the gap where the stage starts, and what of it
+    /// is none.
+    measure: Vec<Measure>,
+    start_gap: Vec<T>,
+    start_tolerance: Vec<T>,
     /// Rows that may press in this stage; at velocity level those whose gap is forecast to be closed.
     pub(super) enabled: Vec<bool>,
     pub(super) in_problem: Vec<bool>,
@@ -58,6 +78,9 @@ impl<T: Real> ContactRowsWork<T> {
             compliance: zero(),
             shift: zero(),
             balance_gap: zero(),
+            measure: vec![Measure::AsScheme; rows],
+            start_gap: zero(),
+            start_tolerance: zero(),
             enabled: vec![true; rows],
             in_problem: vec![false; rows],
             problem: Vec::with_capacity(rows),
@@ -70,6 +93,86 @@ impl<T: Real> ContactRowsWork<T> {
             forecast: vec![T::zero(); forecast_dofs],
             supports: vec![[T::zero(); 3]; supports],
         }
+    }
+
+    /// Takes the gaps where a stage starts, and where the rows are linearized now, if a law reads them.
+    pub(super) fn read_start(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        past: &[Motion<T>],
+        h: f64,
+    ) -> Result<()> {
+        let Self { measure, start_gap, start_tolerance, rates, .. } = self;
+        measure.fill(Measure::AsScheme);
+        let (Some(start), true) = (past.first(), constraints.reads_start()) else { return Ok(()) };
+        constraints.finite_gaps(start.t, &start.u, start_gap)?;
+        constraints.rates(start.t, &start.u, &start.v, rates);
+        for row in (0..constraints.len()).filter(|&row| constraints.law(row).reads_start()) {
+            let approach = T::of(h) * (g.product(row, &start.v) + rates[row].rate).abs();
+            let rounded = constraints.gap_rounding(row, g.magnitude(row, &start.u), start_gap[row]);
+            start_tolerance[row] = rounded + sliver(approach);
+            measure[row] = Measure::Undecided;
+        }
+        Ok(())
+    }
+
+    /// Says what rows constrain whose law reads the start of the stage, once y holds the gaps of its free motion.
+    fn decide(&mut self, constraints: &Constraints<'_, T>) {
+        let Self { y, measure, start_gap, start_tolerance, .. } = self;
+        for (row, measure) in measure[..constraints.len()].iter_mut().enumerate() {
+            if *measure != Measure::Undecided {
+                continue;
+            }
+            // At rest the gap is what the force has left of the way it prevents.
+            let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
+            *measure = match (constraints.law(row), closed) {
+                (ContactLaw::RateCondition, true) => Measure::Increment,
+                (ContactLaw::RateCondition, false) => Measure::Nothing,
+                (ContactLaw::PersistencySwitch, true) => Measure::Rate,
+                _ => Measure::AsScheme,
+            };
+        }
+    }
+
+    /// Makes of the gaps in y, and of their tolerances, what rows constrain whose law reads the start of the stage.
+    /// `lacking` is the part of d that the velocities do not contain yet, on the interface.
+    pub(super) fn measure(
+        &mut self,
+        stage: &CompiledStage<T>,
+        h: f64,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        new: &Motion<T>,
+        lacking: Option<&[T]>,
+    ) {
+        if !constraints.reads_start() {
+            return;
+        }
+        let Self { rates, y, tolerance, measure, start_gap, .. } = self;
+        constraints.rates(new.t, &new.u, &new.v, rates);
+        let (h, weight) = (T::of(h), stage.recovery.weights()[1]);
+        for row in 0..constraints.len() {
+            match measure[row] {
+                Measure::AsScheme | Measure::Nothing | Measure::Undecided => {}
+                Measure::Increment => y[row] -= start_gap[row],
+                Measure::Rate => {
+                    let [part, size] = lacking.map_or([T::zero(); 2], |d| {
+                        [weight * g.interface_product(row, d), weight * g.interface_magnitude(row, d)]
+                    });
+                    let own = rates[row].rate;
+                    y[row] = h * (g.product(row, &new.v) + part + own);
+                    // Velocities that are differences of displacements have the rounding of those.
+                    let known = if stage.recovery.subtracts(1) { g.magnitude(row, &new.u) } else { T::zero() };
+                    tolerance[row] = rounding(known + h * (g.magnitude(row, &new.v) + size + own.abs()));
+                }
+            }
+        }
+    }
+
+    /// The weight of d in what a row constrains, if it is not that of the scheme.
+    pub(super) fn own_weight(&self, stage: &CompiledStage<T>, h: f64, row: usize) -> Option<T> {
+        (self.measure[row] == Measure::Rate).then(|| T::of(h) * stage.recovery.weights()[1])
     }
 
     /// Evaluates y of all rows at the target, and the tolerance for what rounding makes of it plus `approach` (a
@@ -132,6 +235,11 @@ impl<T: Real> InterfaceWork<T> {
         let zero = || vec![T::zero(); size];
         Self { increment: zero(), forces: zero(), displacement: zero(), target: zero(), response: zero() }
     }
+}
+
+/// What of a gap counts as none beside a way of this size, made in one step: a sliver of it, and its rounding.
+fn sliver<T: Real>(way: T) -> T {
+    T::of(1e-10) * way + rounding(way)
 }
 
 /// `values[dof] = base + weight · increment` on the interface.
@@ -262,8 +370,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
         }
         let Self { stage, clock, constraints, g, .. } = self;
-        let Workspace { trial, rows, .. } = work;
+        let Workspace { trial, rows, interface, .. } = work;
         rows.evaluate(&Level { target: stage.contact.as_ref(), clock: *clock }, constraints, g, new, 0.0)?;
+        rows.decide(constraints);
+        rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
+        let (stage, h) = (*stage, clock.h);
         self.restitution(past, rows);
         let constraints = &self.constraints;
         let mut needed = false;
@@ -276,6 +387,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {
                 (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
+                rows.weight[row] = rows.own_weight(stage, h, row).unwrap_or(rows.weight[row]);
+                rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
             }
             let coupled = rows.weight[row] > T::zero();
             let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || law.is_equality();
@@ -555,6 +668,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             None => trial.gap.copy_from_slice(&rows.y[..constraints.len()]),
             Some(_) => constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?,
         }
+        rows.measure(stage, clock.h, constraints, g, new, None);
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();

@@ -329,20 +329,26 @@ impl<T: Real> StageSolve<'_, '_, T> {
             &mut new.u,
         );
         let (t, values) = level.place(new, &rows.target);
-        constraints.gap(t, values, &mut newton.gaps);
+        constraints.gap(t, values, &mut rows.y);
+        rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
+        std::mem::swap(&mut rows.y, &mut newton.gaps);
+        let (_, values) = level.place(new, &rows.target);
         let moved = constraints.follow(t, values, g);
         let mut settled = true;
         if let Ok(Candidates::Changed) = moved {
             operator.follow(constraints.version());
             constraints.finite_gaps(t, values, &mut rows.y)?;
+            rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
+            let (_, values) = level.place(new, &rows.target);
             let [force, displacement] = newton.settings.bounds::<T>();
             interface.response.fill(T::zero());
             for row in 0..constraints.len() {
                 let lambda = trial.lambda_raw[row];
                 g.interface_scatter(row, lambda, &mut interface.response);
                 let advance = g.interface_magnitude(row, &interface.increment);
+                let weight = rows.own_weight(stage, clock.h, row).unwrap_or(stage.recovery.weights()[0]);
                 let tolerance = constraints.gap_rounding(row, g.magnitude(row, values), rows.y[row])
-                    + T::of(displacement) * stage.recovery.weights()[0].abs() * advance;
+                    + T::of(displacement) * weight.abs() * advance;
                 let miss = rows.y[row] - newton.gaps[row];
                 settled &= match lambda > T::zero() || constraints.law(row).is_equality() {
                     true => miss.abs() <= tolerance,

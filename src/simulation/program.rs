@@ -114,6 +114,11 @@ impl<T: Real> ScaledRows<T> {
         !self.0[field].terms.is_empty()
     }
 
+    /// Whether u, v or a is made of differences of displacements.
+    pub(crate) fn subtracts(&self, field: usize) -> bool {
+        self.0[field].terms.iter().any(Term::is_difference)
+    }
+
     /// Writes the parts that come from the past, block by block; fields without a term are left as they are.
     pub(crate) fn predict(&self, past: &[Motion<T>], outputs: &mut [&mut [T]; 3]) {
         for block in blocks(outputs[0].len()) {

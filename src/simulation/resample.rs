@@ -5,7 +5,7 @@ use super::program::Compiler;
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation, taylor};
 use super::{Constraints, Simulation};
-use crate::contact::{ContactJacobian, GapRates};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -101,7 +101,9 @@ impl<T: Real> Simulation<'_, T> {
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).is_compliant());
+        // Rows whose law reads the gap where a stage starts may hold it anywhere.
+        let elsewhere = |law: ContactLaw| law.is_compliant() || law.reads_start();
+        let rigid = closed.map(|(_, row)| row).filter(|&row| !elsewhere(constraints.law(row)));
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;

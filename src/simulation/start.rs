@@ -403,7 +403,8 @@ fn touching_contacts<T: Real>(
         let rounded = constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
         let tolerance = rounded + T::of(1e-10 * h) * rate.abs();
         let law = constraints.law(row);
-        let violated = !law.is_compliant() && gap < -tolerance || law.is_equality() && gap > tolerance;
+        let may_be_inside = law.is_compliant() || law.reads_start();
+        let violated = !may_be_inside && gap < -tolerance || law.is_equality() && gap > tolerance;
         if violated && violation == Violation::Refused {
             let contact = constraints.ids[row];
             return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });

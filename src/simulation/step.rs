@@ -163,6 +163,7 @@ impl<T: Real> Simulation<'_, T> {
                     }
                 }
             }
+            work.rows.read_start(constraints, g, past, clock.h)?;
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let mut solve = StageSolve { stage, clock, system: parts, operator, constraints, g, solver, statistics };
             match work.newton {
