@@ -7,7 +7,7 @@ use crate::real::Real;
 /// Gives back at release what corrections took at impact: the release counterpart of the λ_v/λ_a correction, to be added
 /// after it.
 ///
-/// An impact stops the mass m_c of the contact nodes, and their energy ½ m_c ġ² is gone (theory, section 16). Nothing in the bodies
+/// An impact stops the mass m_c of the contact nodes, and their energy ½ m_c ġ² is gone (theory, sections 10 and 16). Nothing in the bodies
 /// has lost it: the exact solution has no such mass. In the first step in which the contact is open its nodes get the
 /// impulse that restores [`dissipated`](crate::ContactState::dissipated) to the kinetic energy,
 ///
