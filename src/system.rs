@@ -121,7 +121,8 @@ pub trait System<T: Real>: Send {
         Linearity::Nonlinear
     }
 
-    /// The mass matrix (constant), positive on dofs that are free to move; prescribed dofs may have none.
+    /// The mass matrix (constant), not negative. Prescribed dofs may have none, other dofs with schemes that take it
+    /// ([`massless_factor`](crate::analysis::massless_factor)).
     fn mass(&self) -> Mass<'_, T>;
 
     /// `out = f(t, u, v)`: external minus internal force, `out` holding anything on entry.

@@ -1,14 +1,18 @@
 //! Degrees of freedom without mass: which schemes take them, and what they do in contact.
 
 use contact_dynamics::analysis::massless_factor;
+use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
-    Bathe, Bdf2, Composite, Error, GeneralizedAlpha, LinearRows, LinearSystem, MoreauJean, Newmark, Newton,
-    PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
+    Bathe, Bdf2, Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, MoreauJean, Newmark, Newton,
+    NodesOnObstacle, PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::measure::{figures, record_run};
 use contact_dynamics_scenes::schemes::all;
+use contact_dynamics_scenes::solids::{Material, Solid};
 
 const STIFFNESS: f64 = 400.0;
 const SPEED: f64 = 2.0;
@@ -275,5 +279,79 @@ fn damping_at_such_dofs_does_not_ring() {
         let figures = figures(&bars, &record, 1e-3);
         assert!(figures.force_max < 1.3 && figures.variation < 3.5, "{name}: {figures:?}");
         assert!(figures.energy < 1.0 && figures.closure < 1e-8, "{name}: {figures:?}");
+    }
+}
+
+const RUBBER: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
+
+/// Lumped masses of a plane solid whose bottom nodes have none, and these nodes.
+fn without_bottom(solid: &Solid<2>) -> (Vec<f64>, Vec<usize>) {
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < 1e-9).collect();
+    let massless: Vec<usize> = bottom.iter().flat_map(|n| [2 * n, 2 * n + 1]).collect();
+    let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 2).collect();
+    let stiffness = solid.stiffness::<f64>();
+    let by = Redistribution::Neighbors(stiffness.symbolic());
+    (redistribute(&solid.lumped_mass(), &massless, &groups, by).unwrap(), bottom)
+}
+
+#[test]
+fn a_block_lands_on_nodes_without_mass_and_keeps_its_energy() {
+    let solid = Solid::rectangle([1.0, 0.6], [10, 6], RUBBER);
+    let floor = || Plane::new([0.0, -0.0123], [0.0, 1.0]).unwrap();
+    let (light, bottom) = without_bottom(&solid);
+    let speed = 0.5;
+    let h = 0.5 * 0.1 / RUBBER.wave_speed();
+    let energy = |mass: Vec<f64>, corrected: bool| {
+        let correction = corrected.then(|| Box::new(PersistencyCorrection::new()) as Box<dyn Corrector<f64>>);
+        let rows = NodesOnObstacle::new(floor(), &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let mut run =
+            Simulation::builder(LinearSystem::lumped(mass, solid.stiffness()).unwrap(), Newmark::trapezoidal(), h)
+                .velocity(solid.uniform([0.1, -speed]))
+                .constraint(rows)
+                .correctors(correction)
+                .build()
+                .unwrap();
+        let before = run.energy().total();
+        run.run_until(1.0, &mut ()).unwrap();
+        assert!(run.state().contacts().closed().iter().all(|closed| !closed));
+        run.energy().total() / before - 1.0
+    };
+    let (kept, lost) = (energy(light, false), energy(solid.lumped_mass(), true));
+    // A layer of nodes, a twelfth of the mass, stops at once if it has one.
+    assert!(lost < -0.07 && kept.abs() < 0.01, "{kept} {lost}");
+}
+
+#[test]
+fn newtons_method_finds_dofs_without_mass_at_large_strains() {
+    let solid = Solid::rectangle([1.0, 0.6], [6, 4], RUBBER);
+    let (light, bottom) = without_bottom(&solid);
+    let ball = Sphere::new([0.5, -1.02], 1.0, Side::Outside).unwrap();
+    let h = 0.5 * 0.15 / RUBBER.wave_speed();
+    for integrator in [
+        Box::new(Newmark::trapezoidal()) as Box<dyn TimeIntegrator>,
+        Box::new(Composite),
+        Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+        Box::new(Bathe::default()),
+    ] {
+        let name = integrator.name();
+        let body = Hyperelastic::new(&solid, Law::NeoHookean).masses(light.clone());
+        let rows = NodesOnObstacle::new(ball, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let mut run = Simulation::builder(body, integrator, h)
+            .velocity(solid.uniform([0.0, -1.0]))
+            .constraint(rows)
+            .build()
+            .unwrap();
+        let before = run.energy().total();
+        let (mut iterations, mut pressed, mut depth) = (0, 0, 0.0_f64);
+        while run.time() < 1.0 {
+            run.step().unwrap();
+            iterations = iterations.max(run.convergence().len());
+            let contacts = run.state().contacts();
+            pressed = pressed.max(contacts.closed().iter().filter(|closed| **closed).count());
+            depth = depth.max(contacts.gaps().iter().fold(0.0, |d: f64, g| d.max(-g)));
+        }
+        assert!(iterations <= 6 && pressed >= 3 && depth < 1e-8, "{name}: {iterations} {pressed} {depth:e}");
+        let energy = run.energy().total() / before;
+        assert!(energy > 0.8 && energy < 1.01, "{name}: {energy}");
     }
 }

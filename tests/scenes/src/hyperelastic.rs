@@ -118,6 +118,13 @@ impl<const D: usize> Hyperelastic<D> {
         }
     }
 
+    /// With other lumped masses.
+    #[must_use]
+    pub fn masses(mut self, mass: Vec<f64>) -> Self {
+        self.particles.mass = mass;
+        self
+    }
+
     #[must_use]
     pub fn gravity(mut self, gravity: [f64; D]) -> Self {
         self.particles.weigh(gravity);
