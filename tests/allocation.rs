@@ -1,9 +1,12 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
 use contact_dynamics::contact::{ContactLaw, Side, Sphere};
+use contact_dynamics::corrector::{
+    ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
+};
 use contact_dynamics::{
-    Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
-    TimeIntegrator,
+    Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearSystem, Newmark, Newton, NodesOnObstacle,
+    PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
@@ -14,6 +17,7 @@ use contact_dynamics_scenes::{Bars, MassKind};
 #[test]
 fn steps_do_not_allocate() {
     bars();
+    correctors();
     solids();
     large_motion();
 }
@@ -114,6 +118,53 @@ fn bars() {
             });
             assert!(changes >= 2, "the run must contain an impact and a release");
             assert_eq!(counted.count_total, 0, "{}, {mass:?}", scheme.name());
+        }
+    }
+}
+
+/// Bars by every corrector, and with contact nodes without mass.
+fn correctors() {
+    let make: [(&str, fn() -> Option<Box<dyn Corrector<f64>>>); 8] = [
+        ("contact-implicit", || Some(Box::new(ContactImplicit))),
+        ("contact-stabilized", || Some(Box::new(ContactStabilized::new()))),
+        ("contact-stabilized, closed", || Some(Box::new(ContactStabilized::improved()))),
+        ("Laursen-Love", || Some(Box::new(LaursenLove))),
+        ("Taylor-Papadopoulos", || Some(Box::new(TaylorPapadopoulos::new(1e-3).unwrap()))),
+        ("release", || Some(Box::new(Release))),
+        ("a = 0", || Some(Box::new(ZeroAcceleration))),
+        ("massless", || None),
+    ];
+    for (name, corrector) in make {
+        for mass in [MassKind::Lumped, MassKind::Consistent] {
+            let bars = Bars::paper(50).delayed(0.3, 1e-3).with_mass(mass);
+            let (mut system, mut first) = (bars.system::<f64>(), None);
+            let mut integrator: Box<dyn TimeIntegrator> = Box::new(Newmark::trapezoidal());
+            match name {
+                "Laursen-Love" => integrator = Box::new(Gssss::new(1.0, 1.0, 1.0).unwrap()),
+                "release" => first = Some(Box::new(PersistencyCorrection::new()) as Box<dyn Corrector<f64>>),
+                "massless" => {
+                    let contact = bars.contact_dofs();
+                    let masses = bars.lumped_mass::<f64>().into_iter().enumerate();
+                    let masses = masses.map(|(dof, m)| if contact.contains(&dof) { 0.0 } else { m }).collect();
+                    system = LinearSystem::lumped(masses, bars.stiffness()).unwrap();
+                }
+                _ => {}
+            }
+            let mut run = Simulation::builder(system, integrator, 1e-3)
+                .velocity(bars.velocities())
+                .constraint(bars.contact())
+                .correctors(first)
+                .correctors(corrector())
+                .build()
+                .unwrap();
+            run.step().unwrap();
+            let counted = allocation_counter::measure(|| {
+                for _ in 0..400 {
+                    run.step().unwrap();
+                }
+            });
+            assert!(run.statistics().contact_changes >= 2, "{name}");
+            assert_eq!(counted.count_total, 0, "{name}, {mass:?}");
         }
     }
 }
