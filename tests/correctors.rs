@@ -1,5 +1,6 @@
 //! The correctors beside λ_v/λ_a: against their papers' formulas written out by hand, and for what they conserve.
 
+use contact_dynamics::contact::GapOffset;
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
@@ -317,11 +318,114 @@ fn newtons_method_takes_the_same_corrections() {
 
 #[test]
 fn balances_halfway_are_shifted_by_their_share() {
-    // Generalized-α with α_f: the closed contact of the next step must not feel the shift twice, so the force stays smooth.
     let scheme = || GeneralizedAlpha::chung_hulbert(0.8).unwrap();
+    // With the force of contact out of the accelerations, the balance holds without it, at the shifted displacements:
+    // M ((1 − α_m) a' + α_m a) + K ((1 − α_f) u' + α_f u) = 0.
+    let (am, af) = (0.6 / 1.8, 0.8 / 1.8);
+    let scene = bars(20, 0.3);
+    let (mass, stiffness) = (scene.lumped_mass::<f64>(), scene.stiffness::<f64>());
+    let mut stepped = builder(&scene, scheme(), list([Box::new(ContactStabilized::new())])).build().unwrap();
+    let scale = 0.0125;
+    while stepped.time() < 0.15 {
+        let (u, a) = (stepped.state().displacement().to_vec(), stepped.state().stored_acceleration().to_vec());
+        stepped.step().unwrap();
+        let (now, rate) = (stepped.state().displacement(), stepped.state().stored_acceleration());
+        let mut residual: Vec<f64> = (0..mass.len()).map(|i| mass[i] * ((1.0 - am) * rate[i] + am * a[i])).collect();
+        for j in 0..mass.len() {
+            let middle = (1.0 - af) * now[j] + af * u[j];
+            for (&i, &k) in stiffness.as_ref().row_idx_of_col_raw(j).iter().zip(stiffness.val_of_col(j)) {
+                residual[i] += k * middle;
+            }
+        }
+        let worst = residual.iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
+        assert!(worst < 1e-9 * scale, "{}: {worst:e}", stepped.time());
+    }
     for phase in PHASES {
         let (_, found) = run(&bars(50, phase), scheme(), list([Box::new(ContactStabilized::new())]));
         assert!(found.force_rms < 0.13 && found.force_max < 1.25 && found.energy < 1.0, "{phase}: {found:?}");
         assert!(found.closure < 1e-9 && found.drift < 1e-9, "{phase}: {found:?}");
     }
+}
+
+#[test]
+fn only_the_full_projection_moves_bodies_that_meet_for_the_first_time() {
+    let first = |corrector: Box<dyn Corrector<f64>>| {
+        let mut run = builder(&bars(20, 0.3), Newmark::trapezoidal(), list([corrector])).build().unwrap();
+        while !run.state().contacts().closed()[0] {
+            run.step().unwrap();
+        }
+        run.state().contacts().forces()[0]
+    };
+    let implicit = first(Box::new(ContactImplicit));
+    assert!((first(Box::new(ContactStabilized::improved())) / implicit - 1.0).abs() < 1e-9);
+    assert!((first(Box::new(ContactStabilized::new())) / implicit - 1.0).abs() > 0.05);
+}
+
+/// Two masses on a spring, the first of which meets a wall that comes, as a driven dof or as a gap that closes.
+fn wall(driven: bool, equality: bool, corrector: Box<dyn Corrector<f64>>) -> Vec<f64> {
+    let entries = [(1, 1, 40.0), (2, 2, 40.0), (1, 2, -40.0), (2, 1, -40.0), (0, 0, 0.0)];
+    let k = SparseColMat::try_new_from_triplets(3, 3, &entries.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+    let system = LinearSystem::lumped(vec![1.0, 0.5, 2.0], k).unwrap();
+    let motion = |t: f64| [0.3 * t, 0.3, 0.0];
+    let system = if driven { system.drive(0, motion).unwrap() } else { system.fix(0).unwrap() };
+    let gap = |t: f64| [0.05 - if equality { 0.05 } else { 0.0 } - 0.3 * t, -0.3, 0.0];
+    let rows = LinearRows::new();
+    let start = gap(0.0)[0];
+    let rows = match (driven, equality) {
+        (true, false) => rows.unilateral(&[(1, 1.0), (0, -1.0)], start),
+        (true, true) => rows.equality(&[(1, 1.0), (0, -1.0)], start),
+        (false, false) => rows.unilateral(&[(1, 1.0)], GapOffset::moving(gap)),
+        (false, true) => rows.equality(&[(1, 1.0)], GapOffset::moving(gap)),
+    };
+    let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.02)
+        .velocity(vec![if driven { 0.3 } else { 0.0 }, -0.2, -0.2])
+        .constraint(rows)
+        .corrector(corrector)
+        .build()
+        .unwrap();
+    run.run_until(0.3, &mut ()).unwrap();
+    run.state().displacement()[1..].iter().chain(&run.state().velocity()[1..]).copied().collect()
+}
+
+#[test]
+fn predictions_see_supports_where_they_will_be() {
+    for equality in [false, true] {
+        let driven = wall(true, equality, Box::new(ContactStabilized::new()));
+        let moving = wall(false, equality, Box::new(ContactStabilized::new()));
+        for (x, y) in driven.iter().zip(&moving) {
+            assert!((x - y).abs() < 1e-10, "{equality}: {driven:?} {moving:?}");
+        }
+        // And the projection is there.
+        let implicit = wall(true, equality, Box::new(ContactImplicit));
+        assert!(implicit.iter().zip(&driven).any(|(x, y)| (x - y).abs() > 1e-6), "{equality}: {driven:?}");
+    }
+}
+
+#[test]
+fn energy_taken_by_an_impact_is_counted_from_that_impact() {
+    // A light foot on a spring under a heavy mass, under gravity: it lands several times.
+    let k = [(0, 0, 400.0), (1, 1, 400.0), (0, 1, -400.0), (1, 0, -400.0)].map(|(i, j, k)| Triplet::new(i, j, k));
+    let k = SparseColMat::try_new_from_triplets(2, 2, &k).unwrap();
+    let system = LinearSystem::lumped(vec![0.2, 2.0], k).unwrap().load(|_, f| (f[0], f[1]) = (-2.0, -20.0));
+    let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1e-3)
+        .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.5))
+        .corrector(PersistencyCorrection::new())
+        .energy_balance()
+        .build()
+        .unwrap();
+    let (mut landings, mut at_landing) = (0, 0.0);
+    let corrections = |run: &mut Simulation<'_, f64>| run.energy().works.unwrap().corrections;
+    while run.time() < 3.0 {
+        let (open, before) = (!run.state().contacts().closed()[0], corrections(&mut run));
+        run.step().unwrap();
+        if run.state().contacts().closed()[0] {
+            if open {
+                (landings, at_landing) = (landings + 1, before);
+            }
+            let taken = at_landing - corrections(&mut run);
+            let booked = run.state().contacts().dissipated()[0];
+            assert!((taken - booked).abs() < 1e-10, "{landings}: {taken} {booked}");
+        }
+    }
+    assert!(landings > 2, "{landings}");
 }

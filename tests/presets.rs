@@ -6,6 +6,7 @@ use contact_dynamics::{
     Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Preset, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::record_run;
+use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::{Bars, MassKind, Record};
 
 const H: f64 = 1e-3;
@@ -200,4 +201,23 @@ fn courant_numbers_are_checked() {
     }
     assert!(matches!(try_mass(Preset::explicit(), 1.1), Err(Error::Parameter { .. })));
     assert!(try_mass(Preset::conservative(), 40.0).is_ok());
+}
+
+#[test]
+fn the_mass_of_a_preset_is_definite_on_any_mesh_at_any_courant_number() {
+    let material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
+    let solid = Solid::rectangle([1.0, 0.6], [10, 6], material);
+    let bottom = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < 1e-9);
+    let massless: Vec<usize> = bottom.flat_map(|n| [2 * n, 2 * n + 1]).collect();
+    let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 2).collect();
+    let (m, k) = (solid.consistent_mass(), solid.stiffness::<f64>());
+    let total: f64 = m.val().iter().sum();
+    for courant in [0.0, 0.5, 1.0, 3.0] {
+        for preset in [Preset::smooth(), Preset::conservative()] {
+            let mass = preset.mass(m.as_ref(), k.symbolic(), &massless, &groups, courant).unwrap();
+            assert!((mass.val().iter().sum::<f64>() / total - 1.0).abs() < 1e-12, "{courant}");
+            let system = LinearSystem::new(mass, solid.stiffness()).unwrap();
+            assert!(Simulation::builder(system, preset.integrator(), 1e-2).build().is_ok(), "{courant}");
+        }
+    }
 }
