@@ -122,9 +122,11 @@ fn bars() {
     }
 }
 
+type Make = fn() -> Option<Box<dyn Corrector<f64>>>;
+
 /// Bars by every corrector, and with contact nodes without mass.
 fn correctors() {
-    let make: [(&str, fn() -> Option<Box<dyn Corrector<f64>>>); 8] = [
+    let make: [(&str, Make); 8] = [
         ("contact-implicit", || Some(Box::new(ContactImplicit))),
         ("contact-stabilized", || Some(Box::new(ContactStabilized::new()))),
         ("contact-stabilized, closed", || Some(Box::new(ContactStabilized::improved()))),

@@ -15,6 +15,7 @@ use contact_dynamics_scenes::{Bars, MassKind, Record};
 const H: f64 = 1e-3;
 
 type Correctors = Vec<Box<dyn Corrector<f64>>>;
+type Make = fn() -> Box<dyn Corrector<f64>>;
 
 fn list<const N: usize>(correctors: [Box<dyn Corrector<f64>>; N]) -> Correctors {
     correctors.into()
@@ -296,7 +297,7 @@ fn schemes_that_cannot_be_corrected_so_are_refused() {
 #[test]
 fn newtons_method_takes_the_same_corrections() {
     let bars = bars(20, 0.3);
-    let correctors: [fn() -> Box<dyn Corrector<f64>>; 3] = [
+    let correctors: [Make; 3] = [
         || Box::new(ContactStabilized::new()),
         || Box::new(ContactStabilized::improved()),
         || Box::new(ContactImplicit),
