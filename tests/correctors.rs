@@ -367,9 +367,9 @@ fn wall(driven: bool, equality: bool, corrector: Box<dyn Corrector<f64>>) -> Vec
     let entries = [(1, 1, 40.0), (2, 2, 40.0), (1, 2, -40.0), (2, 1, -40.0), (0, 0, 0.0)];
     let k = SparseColMat::try_new_from_triplets(3, 3, &entries.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
     let system = LinearSystem::lumped(vec![1.0, 0.5, 2.0], k).unwrap();
-    let motion = |t: f64| [0.3 * t, 0.3, 0.0];
+    let motion = |t: f64| [0.3 * t + t * t, 0.3 + 2.0 * t, 2.0];
     let system = if driven { system.drive(0, motion).unwrap() } else { system.fix(0).unwrap() };
-    let gap = |t: f64| [0.05 - if equality { 0.05 } else { 0.0 } - 0.3 * t, -0.3, 0.0];
+    let gap = |t: f64| [0.05 - if equality { 0.05 } else { 0.0 } - 0.3 * t - t * t, -0.3 - 2.0 * t, -2.0];
     let rows = LinearRows::new();
     let start = gap(0.0)[0];
     let rows = match (driven, equality) {
@@ -379,7 +379,10 @@ fn wall(driven: bool, equality: bool, corrector: Box<dyn Corrector<f64>>) -> Vec
         (false, true) => rows.equality(&[(1, 1.0)], GapOffset::moving(gap)),
     };
     let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.02)
-        .velocity(vec![if driven { 0.3 } else { 0.0 }, -0.2, -0.2])
+        // (The tie is pulled open, not pressed.)
+        .velocity(
+            [if driven { 0.3 } else { 0.0 }, -0.2, -0.2].map(|v| if equality && v < 0.0 { 0.9 } else { v }).to_vec(),
+        )
         .constraint(rows)
         .corrector(corrector)
         .build()
