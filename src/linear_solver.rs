@@ -1,9 +1,11 @@
 //! Linear solvers: analyze a pattern once, factorize values many times, solve in place.
 
+mod by_body;
 mod cholesky;
 mod diagonal;
 mod ordering;
 
+pub use by_body::ByBody;
 pub use cholesky::Cholesky;
 pub use diagonal::Diagonal;
 

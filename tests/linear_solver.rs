@@ -2,7 +2,8 @@
 //! precisions.
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::{Automatic, Cholesky, Diagonal, Error, LinearSolver, Real};
+use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use contact_dynamics::{Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result};
 
 /// A symmetric positive definite matrix with the given pairs as off-diagonal entries.
 fn matrix<T: Real>(n: usize, pairs: &[(usize, usize)], shift: f64) -> SparseColMat<usize, T> {
@@ -49,9 +50,9 @@ fn dense(n: usize) -> Vec<(usize, usize)> {
     (0..n).flat_map(|i| (0..i).map(move |j| (j, i))).collect()
 }
 
-fn check<T: Real>(n: usize, pairs: &[(usize, usize)], tolerance: f64) {
+fn check<T: Real>(solver: &dyn LinearSolver<T>, n: usize, pairs: &[(usize, usize)], tolerance: f64) {
     let pattern_of = matrix::<T>(n, pairs, 0.1);
-    let mut factor = LinearSolver::<T>::analyze(&Automatic, pattern_of.symbolic(), &[]).unwrap();
+    let mut factor = solver.analyze(pattern_of.symbolic(), &[]).unwrap();
     assert!(factor.stored_values() >= n);
     // The same analysis serves other values.
     for shift in [0.1, 3.0] {
@@ -88,9 +89,32 @@ fn solutions_are_right_whatever_the_structure() {
         (60, dense(60)),
     ];
     for (n, pairs) in cases {
-        check::<f64>(n, &pairs, 1e-10);
-        check::<f32>(n, &pairs, 5e-2);
+        check::<f64>(&Automatic, n, &pairs, 1e-10);
+        check::<f32>(&Automatic, n, &pairs, 5e-2);
     }
+    for (n, pairs) in bodies() {
+        check::<f64>(&ByBody::default(), n, &pairs, 1e-10);
+        check::<f32>(&ByBody::default(), n, &pairs, 5e-2);
+    }
+}
+
+/// Systems of several bodies: side by side, with numbers strewn about, with dofs that belong to none, and a single one.
+fn bodies() -> Vec<(usize, Vec<(usize, usize)>)> {
+    let behind = |first: usize, pairs: Vec<(usize, usize)>| pairs.into_iter().map(move |(i, j)| (first + i, first + j));
+    let side_by_side: Vec<_> = chain(20).into_iter().chain(behind(20, grid(20))).collect();
+    let with_single_dofs: Vec<_> = behind(3, chain(15)).chain(behind(25, arrow(12))).collect();
+    // Dof k of body b has the number 3 k + b: nothing is side by side.
+    let alternating = (0..3).flat_map(|b| grid(8).into_iter().map(move |(i, j)| (3 * i + b, 3 * j + b))).collect();
+    let thousands: Vec<_> = (0..1000).map(|k| (2 * k, 2 * k + 1)).chain([(2001, 4001)]).collect();
+    vec![
+        (1, vec![]),
+        (7, vec![]),
+        (50, chain(50)),
+        (420, side_by_side),
+        (40, with_single_dofs),
+        (192, alternating),
+        (4002, thousands),
+    ]
 }
 
 #[test]
@@ -153,10 +177,16 @@ fn free_bodies_are_recognized_by_a_pivot_of_rounding() {
 }
 
 /// Eliminates `last` last: the same solution in two halves, and S⁻¹ as the block of A⁻¹ on these dofs.
-fn check_condensation<T: Real>(n: usize, pairs: &[(usize, usize)], last: &[usize], tolerance: f64) {
+fn check_condensation<T: Real>(
+    solver: &dyn LinearSolver<T>,
+    n: usize,
+    pairs: &[(usize, usize)],
+    last: &[usize],
+    tolerance: f64,
+) {
     let a = matrix::<T>(n, pairs, 0.1);
     let mut plain = LinearSolver::<T>::analyze(&Automatic, a.symbolic(), &[]).unwrap();
-    let mut factor = LinearSolver::<T>::analyze(&Automatic, a.symbolic(), last).unwrap();
+    let mut factor = solver.analyze(a.symbolic(), last).unwrap();
     plain.factorize(a.as_ref()).unwrap();
     factor.factorize(a.as_ref()).unwrap();
     let distance = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| (x - y).abs().value()).fold(0.0, f64::max);
@@ -228,10 +258,128 @@ fn condensation_is_the_same_solution_in_two_halves() {
         let strewn: Vec<usize> = (0..n).step_by(7).collect();
         let all: Vec<usize> = (0..n.min(60)).collect();
         for last in [vec![], ends, side, zones, strewn, all] {
-            check_condensation::<f64>(n, &pairs, &last, 1e-11);
-            check_condensation::<f32>(n, &pairs, &last, 2e-3);
+            check_condensation::<f64>(&Automatic, n, &pairs, &last, 1e-11);
+            check_condensation::<f32>(&Automatic, n, &pairs, &last, 2e-3);
         }
     }
+}
+
+#[test]
+fn bodies_are_condensed_one_by_one() {
+    for (n, pairs) in bodies() {
+        // On all bodies, on one alone, strewn about, at one end, none.
+        let across: Vec<usize> = (0..n).step_by(1 + n / 40).collect();
+        let strewn: Vec<usize> = (0..n).step_by(7).take(60).collect();
+        for last in [across, vec![n / 2], strewn, (0..n.min(18)).collect(), vec![]] {
+            check_condensation::<f64>(&ByBody::default(), n, &pairs, &last, 1e-11);
+            check_condensation::<f32>(&ByBody::default(), n, &pairs, &last, 2e-3);
+        }
+    }
+}
+
+/// Cholesky without its condensation, which counts the matrices it has analyzed.
+#[derive(Debug, Default)]
+struct Plain(std::sync::Arc<std::sync::Mutex<Vec<usize>>>);
+
+#[derive(Debug)]
+struct PlainFactor(Box<dyn Factorization<f64>>);
+
+impl LinearSolver<f64> for Plain {
+    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, _: &[usize]) -> Result<Box<dyn Factorization<f64>>> {
+        self.0.lock().unwrap().push(pattern.ncols());
+        Ok(Box::new(PlainFactor(Cholesky::default().analyze(pattern, &[])?)))
+    }
+}
+
+impl Factorization<f64> for PlainFactor {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
+        self.0.factorize(a)
+    }
+    fn solve(&mut self, rhs: &mut [f64]) {
+        self.0.solve(rhs);
+    }
+    fn stored_values(&self) -> usize {
+        self.0.stored_values()
+    }
+}
+
+#[test]
+fn every_body_may_have_its_own_solver() {
+    // Chains of 5 and 6 dofs, a point mass (dof 5) between them.
+    let pairs: Vec<_> = chain(5).into_iter().chain((7..12).map(|i| (i - 1, i))).collect();
+    let a = matrix::<f64>(12, &pairs, 0.5);
+    let analyzed = std::sync::Arc::default();
+    let plain = || Plain(std::sync::Arc::clone(&analyzed));
+    for (dofs, expected) in [(vec![], vec![]), (vec![3], vec![5]), ((5..12).collect(), vec![6]), (vec![5], vec![])] {
+        analyzed.lock().unwrap().clear();
+        let solver = ByBody::new(Automatic).body(dofs.clone(), plain());
+        // Only a body that contact acts on needs a solver that condenses.
+        for last in [vec![4], vec![5, 6], vec![4, 6]] {
+            let mut factor = solver.analyze(a.symbolic(), &last).unwrap();
+            let touched = expected.contains(&5) && last.contains(&4) || expected.contains(&6) && last.contains(&6);
+            assert_eq!(factor.condensation().is_none(), touched, "{dofs:?}, {last:?}");
+            if !touched {
+                check_condensation::<f64>(&solver, 12, &pairs, &last, 1e-11);
+            }
+        }
+        check::<f64>(&solver, 12, &pairs, 1e-11);
+        analyzed.lock().unwrap().dedup();
+        assert_eq!(*analyzed.lock().unwrap(), expected);
+    }
+    // A solver for all: point masses are divided through.
+    analyzed.lock().unwrap().clear();
+    ByBody::new(plain()).analyze(a.symbolic(), &[]).unwrap();
+    assert_eq!(*analyzed.lock().unwrap(), [5, 6]);
+    let refused = |solver: ByBody<'_, f64>| solver.analyze(a.symbolic(), &[]).map(|_| ()).unwrap_err();
+    assert!(matches!(refused(ByBody::new(Diagonal)), Error::Incompatible { .. }));
+    assert!(matches!(refused(ByBody::default().body([12], Diagonal)), Error::MissingDof { dof: 12, dofs: 12, .. }));
+    let twice = ByBody::new(Automatic).body([0], Automatic).body([4], Automatic);
+    assert!(refused(twice).to_string().contains("body of dof 4"));
+}
+
+#[test]
+fn errors_of_a_body_name_dofs_of_the_system() {
+    for (n, pairs) in bodies().into_iter().skip(3) {
+        let (body, dof) = (pairs[pairs.len() - 1], pairs[pairs.len() - 1].1);
+        let single = (0..n).find(|&i| pairs.iter().all(|&(a, b)| i != a && i != b));
+        let good = matrix::<f64>(n, &pairs, 1.0);
+        let mut factor = ByBody::<f64>::default().analyze(good.symbolic(), &[0]).unwrap();
+        let (pattern, values) = good.into_parts();
+        let mut factorize = |change: &dyn Fn(usize, usize, f64) -> f64| {
+            let mut values = values.clone();
+            for j in 0..n {
+                for at in pattern.as_ref().col_range(j) {
+                    values[at] = change(pattern.row_idx()[at], j, values[at]);
+                }
+            }
+            factor.factorize(SparseColMatRef::new(pattern.as_ref(), &values))
+        };
+        for bad in [dof].into_iter().chain(single) {
+            let found = factorize(&|i, j, x| if i == bad && j == bad { -x } else { x });
+            let named = |found| if single == Some(bad) { found == bad } else { pairs.iter().any(|p| p.1 == found) };
+            assert!(
+                matches!(found, Err(Error::Singular { dof, matrix: "effective matrix" }) if named(dof)),
+                "{found:?}"
+            );
+        }
+        let found = factorize(&|i, j, x| if (i, j) == body { f64::NAN } else { x });
+        let here = |row: usize, column: usize| (row, column) == body;
+        assert!(matches!(found, Err(Error::MatrixNotFinite { row, column, .. }) if here(row, column)), "{found:?}");
+        let found = factorize(&|i, j, x| if (i, j) == body { 0.5 * x } else { x });
+        let here = |row: usize, column: usize| here(row, column) || here(column, row);
+        assert!(matches!(found, Err(Error::Asymmetric { row, column, .. }) if here(row, column)), "{found:?}");
+        factorize(&|_, _, x| x).unwrap();
+    }
+    // Body by body a free one is found beside a stiff one.
+    let pairs: Vec<_> = chain(5).into_iter().chain((6..10).map(|i| (i - 1, i))).collect();
+    let a = matrix::<f64>(10, &pairs, 0.0);
+    let mut values = a.val().to_vec();
+    values[a.symbolic().col_range(0).start] += 1.0;
+    let mut factor = ByBody::<f64>::default().analyze(a.symbolic(), &[]).unwrap();
+    let found = factor.factorize(SparseColMatRef::new(a.symbolic(), &values));
+    assert!(matches!(found, Err(Error::Singular { dof: 5..10, .. })), "{found:?}");
+    let other = matrix::<f64>(10, &chain(10), 1.0);
+    assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Dimension { .. })));
 }
 
 #[test]

@@ -1,0 +1,409 @@
+//! A factorization for each body: the connected components of a matrix, one by one.
+
+use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, LinearSolver};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::sparse;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use std::ops::Range;
+
+/// Factorizes each body on its own.
+///
+/// Bodies are the connected components of the matrix. Contact and ties by multipliers couple none of them, so that bodies in
+/// contact stay apart in the effective matrix; bodies that share a dof, a spring or a penalty in K are one. Each
+/// is ordered, factorized and solved alone, with one solver for all or with a solver of its own
+/// ([`body`](Self::body)). Results are those of a single factorization up to rounding.
+///
+/// Dofs that are coupled to no other (prescribed ones, point masses, a whole diagonal matrix) are gathered and divided
+/// through, whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs of
+/// contact is condensed by its own solver.
+///
+/// Symmetry and rounding are judged body by body, relative to the entries of the body: a soft body beside a stiff one is
+/// held to its own scale. Errors name dofs of the whole system.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{Automatic, ByBody, Cholesky, LinearSolver};
+///
+/// // Two bodies of two dofs each, numbered alternately.
+/// let entries = [(0, 0, 2.0), (0, 2, -1.0), (2, 0, -1.0), (2, 2, 1.0), (1, 1, 4.0), (1, 3, -2.0), (3, 1, -2.0), (3, 3, 4.0)];
+/// let entries = entries.map(|(i, j, a)| Triplet::new(i, j, a));
+/// let a = SparseColMat::<usize, f64>::try_new_from_triplets(4, 4, &entries)?;
+/// let solver = ByBody::new(Automatic).body([1], Cholesky::default());
+/// let mut factor = solver.analyze(a.symbolic(), &[])?;
+/// factor.factorize(a.as_ref())?;
+/// let mut x = [1.0, 0.0, 0.0, 6.0];
+/// factor.solve(&mut x);
+/// assert!(x.iter().zip([1.0, 1.0, 1.0, 2.0]).all(|(x, exact)| (x - exact).abs() < 1e-15));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ByBody<'a, T: Real> {
+    others: Box<dyn LinearSolver<T> + 'a>,
+    chosen: Vec<(Vec<usize>, Box<dyn LinearSolver<T> + 'a>)>,
+}
+
+impl<T: Real> Default for ByBody<'_, T> {
+    fn default() -> Self {
+        Self::new(Automatic)
+    }
+}
+
+impl<'a, T: Real> ByBody<'a, T> {
+    /// One solver for all bodies, but for those that are given their own.
+    pub fn new(solver: impl LinearSolver<T> + 'a) -> Self {
+        Self { others: Box::new(solver), chosen: Vec::new() }
+    }
+
+    /// A solver for the bodies that have any of these dofs: one dof of a body, or the range of all its dofs, of which some may
+    /// be prescribed.
+    ///
+    /// The analysis refuses dofs that do not exist ([`Error::MissingDof`]) and bodies that are given two solvers
+    /// ([`Error::Incompatible`]).
+    #[must_use]
+    pub fn body(mut self, dofs: impl IntoIterator<Item = usize>, solver: impl LinearSolver<T> + 'a) -> Self {
+        self.chosen.push((dofs.into_iter().collect(), Box::new(solver)));
+        self
+    }
+
+    /// The solver of each of `count` bodies.
+    fn solvers(&self, body_of: &[usize], count: usize) -> Result<Vec<&(dyn LinearSolver<T> + 'a)>> {
+        let mut choice = vec![None; count];
+        for (number, (dofs, _)) in self.chosen.iter().enumerate() {
+            for &dof in dofs {
+                let Some(&body) = body_of.get(dof) else {
+                    return Err(Error::MissingDof { what: "the choice of a body's solver", dof, dofs: body_of.len() });
+                };
+                if choice[body].is_some_and(|other| other != number) {
+                    let part = format!("another solver for the body of dof {dof}");
+                    return Err(Error::Incompatible { part, reason: "the body has been given a solver already" });
+                }
+                choice[body] = Some(number);
+            }
+        }
+        Ok(choice.into_iter().map(|number| number.map_or(&*self.others, |number| &*self.chosen[number].1)).collect())
+    }
+}
+
+impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        let n = pattern.ncols();
+        if pattern.nrows() != n {
+            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: n });
+        }
+        sparse::check_pattern("effective", pattern)?;
+        if let Some(&dof) = last.iter().find(|dof| **dof >= n) {
+            return Err(Error::MissingDof { what: "the list of contact dofs", dof, dofs: n });
+        }
+        let (body_of, mut bodies) = components(pattern);
+        let solvers = self.solvers(&body_of, bodies.len())?;
+        if let [body] = &bodies[..] {
+            return if body.len() > 1 { solvers[0].analyze(pattern, last) } else { Diagonal.analyze(pattern, last) };
+        }
+        let mut single: Vec<usize> = bodies.iter().filter(|body| body.len() == 1).map(|body| body[0]).collect();
+        if single.len() == n {
+            return Diagonal.analyze(pattern, last);
+        }
+        single.sort_unstable();
+        let mut places = vec![0; n];
+        let mut parts = Vec::new();
+        if !single.is_empty() {
+            parts.push(Part::new(single, pattern, last, &Diagonal, &mut places)?);
+        }
+        for (body, solver) in bodies.drain(..).zip(solvers).filter(|(body, _)| body.len() > 1) {
+            parts.push(Part::new(body, pattern, last, solver, &mut places)?);
+        }
+        let largest = |size: fn(&Part<T>) -> usize| parts.iter().map(size).max().unwrap_or(0);
+        let scratch = vec![T::zero(); largest(|part| part.dofs.len())];
+        let on_interface = vec![T::zero(); COLUMNS * largest(|part| part.interface.len())];
+        let entries = pattern.row_idx().len();
+        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, scratch, on_interface }))
+    }
+}
+
+/// The component of each dof, and the dofs of each component, both ascending. The pattern need not be symmetric.
+fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<usize>, Vec<Vec<usize>>) {
+    let n = pattern.ncols();
+    // A forest: every dof points toward the smallest one of its tree.
+    let mut above: Vec<usize> = (0..n).collect();
+    fn root(above: &mut [usize], mut dof: usize) -> usize {
+        while above[dof] != dof {
+            above[dof] = above[above[dof]];
+            dof = above[dof];
+        }
+        dof
+    }
+    for column in 0..n {
+        for &row in pattern.row_idx_of_col_raw(column) {
+            let (a, b) = (root(&mut above, row), root(&mut above, column));
+            above[a.max(b)] = a.min(b);
+        }
+    }
+    let (mut body_of, mut bodies) = (vec![0; n], Vec::<Vec<usize>>::new());
+    for dof in 0..n {
+        let first = root(&mut above, dof);
+        if first == dof {
+            body_of[dof] = bodies.len();
+            bodies.push(Vec::new());
+        } else {
+            body_of[dof] = body_of[first];
+        }
+        bodies[body_of[dof]].push(dof);
+    }
+    (body_of, bodies)
+}
+
+/// Ascending indices into a longer slice.
+#[derive(Debug)]
+enum Selection {
+    /// All of a range: the part of the slice is used where it is.
+    Range(Range<usize>),
+    List(Vec<usize>),
+}
+
+impl Selection {
+    fn new(list: Vec<usize>) -> Self {
+        match (list.first(), list.last()) {
+            (Some(&first), Some(&last)) if last - first + 1 == list.len() => Self::Range(first..last + 1),
+            _ => Self::List(list),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Range(range) => range.len(),
+            Self::List(list) => list.len(),
+        }
+    }
+
+    fn at(&self, place: usize) -> usize {
+        match self {
+            Self::Range(range) => range.start + place,
+            Self::List(list) => list[place],
+        }
+    }
+
+    /// The entries selected, copied to `scratch` if they are not side by side.
+    fn read<'x, T: Real>(&self, x: &'x [T], scratch: &'x mut [T]) -> &'x [T] {
+        match self {
+            Self::Range(range) => &x[range.clone()],
+            Self::List(_) => {
+                let scratch = &mut scratch[..self.len()];
+                self.gather(x, scratch);
+                scratch
+            }
+        }
+    }
+
+    fn gather<T: Real>(&self, from: &[T], to: &mut [T]) {
+        match self {
+            Self::Range(range) => to.copy_from_slice(&from[range.clone()]),
+            Self::List(list) => to.iter_mut().zip(list).for_each(|(to, &at)| *to = from[at]),
+        }
+    }
+
+    fn scatter<T: Real>(&self, from: &[T], to: &mut [T]) {
+        match self {
+            Self::Range(range) => to[range.clone()].copy_from_slice(from),
+            Self::List(list) => from.iter().zip(list).for_each(|(&from, &at)| to[at] = from),
+        }
+    }
+}
+
+/// One body, or all dofs that are coupled to no other.
+#[derive(Debug)]
+struct Part<T: Real> {
+    dofs: Selection,
+    pattern: SymbolicSparseColMat<usize>,
+    /// Where its entries are among those of the whole matrix.
+    entries: Selection,
+    /// Its entries, if they are not side by side there.
+    values: Vec<T>,
+    factor: Box<dyn Factorization<T>>,
+    /// Where its dofs of contact are on the interface of the system.
+    interface: Selection,
+    /// Without dofs of contact: its solution between `condense` and `expand`.
+    solution: Vec<T>,
+}
+
+impl<T: Real> Part<T> {
+    /// `places` is scratch, an entry for each dof of the system.
+    fn new(
+        dofs: Vec<usize>,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+        solver: &dyn LinearSolver<T>,
+        places: &mut [usize],
+    ) -> Result<Self> {
+        for (place, &dof) in dofs.iter().enumerate() {
+            places[dof] = place;
+        }
+        let (mut pointers, mut rows, mut entries) = (vec![0], Vec::new(), Vec::new());
+        for &dof in &dofs {
+            entries.extend(pattern.col_range(dof));
+            rows.extend(pattern.row_idx_of_col_raw(dof).iter().map(|&row| places[row]));
+            pointers.push(rows.len());
+        }
+        let own = SymbolicSparseColMatRef::new_checked(dofs.len(), dofs.len(), &pointers, None, &rows)
+            .to_owned()
+            .map_err(|_| Error::OutOfMemory { what: "the pattern of a body" })?;
+        let of_body = |(_, dof): &(usize, &usize)| dofs.binary_search(dof).is_ok();
+        let (interface, own_last): (Vec<usize>, Vec<usize>) =
+            last.iter().enumerate().filter(of_body).map(|(at, &dof)| (at, places[dof])).unzip();
+        let factor = match solver.analyze(own.as_ref(), &own_last) {
+            Ok(factor) => factor,
+            Err(error) => return Err(in_system(error, |dof| dofs[dof])),
+        };
+        let solution = vec![T::zero(); if interface.is_empty() { dofs.len() } else { 0 }];
+        let entries = Selection::new(entries);
+        let values = vec![T::zero(); if matches!(entries, Selection::List(_)) { entries.len() } else { 0 }];
+        let (dofs, interface) = (Selection::new(dofs), Selection::new(interface));
+        Ok(Self { dofs, pattern: own, entries, values, factor, interface, solution })
+    }
+
+    fn factorize(&mut self, values: &[T]) -> Result<()> {
+        let Self { dofs, pattern, entries, values: own, factor, .. } = self;
+        let a = SparseColMatRef::new(pattern.as_ref(), entries.read(values, own));
+        factor.factorize(a).map_err(|error| in_system(error, |dof| dofs.at(dof)))
+    }
+
+    fn touches(&self) -> bool {
+        self.interface.len() > 0
+    }
+}
+
+/// The same error with dofs of the whole system.
+fn in_system(error: Error, whole: impl Fn(usize) -> usize) -> Error {
+    match error {
+        // That the matrix of a part is diagonal is no concern of the host.
+        Error::Singular { dof, .. } => Error::Singular { matrix: "effective matrix", dof: whole(dof) },
+        Error::Mass { dof, value } => Error::Mass { dof: whole(dof), value },
+        Error::MatrixNotFinite { matrix, row, column, value } => {
+            Error::MatrixNotFinite { matrix, row: whole(row), column: whole(column), value }
+        }
+        Error::Asymmetric { matrix, row, column, value, mirrored } => {
+            Error::Asymmetric { matrix, row: whole(row), column: whole(column), value, mirrored }
+        }
+        other => other,
+    }
+}
+
+#[derive(Debug)]
+struct Factors<T: Real> {
+    parts: Vec<Part<T>>,
+    /// Dofs, dofs of contact, and entries of the whole matrix.
+    size: usize,
+    height: usize,
+    entries: usize,
+    /// Columns of a part, and of its interface: of the latter room for `COLUMNS`, or as many as were ever asked for.
+    scratch: Vec<T>,
+    on_interface: Vec<T>,
+}
+
+/// Room for that many values; allocates if there was never need for so many.
+fn room<T: Real>(scratch: &mut Vec<T>, size: usize) -> &mut [T] {
+    if scratch.len() < size {
+        scratch.resize(size, T::zero());
+    }
+    &mut scratch[..size]
+}
+
+impl<T: Real> Factorization<T> for Factors<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        if a.val().len() != self.entries {
+            let what = "the entries of the effective matrix";
+            return Err(Error::Dimension { what, expected: self.entries, found: a.val().len() });
+        }
+        self.parts.iter_mut().try_for_each(|part| part.factorize(a.val()))
+    }
+
+    fn solve(&mut self, rhs: &mut [T]) {
+        let Self { parts, size, scratch, .. } = self;
+        for Part { dofs, factor, .. } in parts {
+            match dofs {
+                Selection::Range(range) if rhs.len() == *size => factor.solve(&mut rhs[range.clone()]),
+                _ => {
+                    let height = dofs.len();
+                    let columns = room(scratch, rhs.len() / *size * height);
+                    for (rhs, column) in rhs.chunks_exact(*size).zip(columns.chunks_exact_mut(height)) {
+                        dofs.gather(rhs, column);
+                    }
+                    factor.solve(columns);
+                    for (rhs, column) in rhs.chunks_exact_mut(*size).zip(columns.chunks_exact(height)) {
+                        dofs.scatter(column, rhs);
+                    }
+                }
+            }
+        }
+    }
+
+    fn stored_values(&self) -> usize {
+        self.parts.iter().map(|part| part.factor.stored_values()).sum()
+    }
+
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        let condenses = |part: &mut Part<T>| !part.touches() || part.factor.condensation().is_some();
+        if self.parts.iter_mut().all(condenses) { Some(self) } else { None }
+    }
+}
+
+/// Parts that contact acts on are condensed: `condensation` has asked them all whether they can. The others are solved.
+impl<T: Real> Condensation<T> for Factors<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
+        let Self { parts, scratch, on_interface, .. } = self;
+        for part in parts {
+            if !part.touches() {
+                part.dofs.gather(rhs, &mut part.solution);
+                part.factor.solve(&mut part.solution);
+            } else if let Some(condensed) = part.factor.condensation() {
+                let own = &mut on_interface[..part.interface.len()];
+                condensed.condense(part.dofs.read(rhs, scratch), own);
+                part.interface.scatter(own, interface);
+            }
+        }
+    }
+
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+        let Self { parts, scratch, on_interface, .. } = self;
+        for part in parts {
+            if !part.touches() {
+                part.dofs.scatter(&part.solution, solution);
+            } else if let Some(condensed) = part.factor.condensation() {
+                let own = part.interface.read(interface, on_interface);
+                match &part.dofs {
+                    Selection::Range(range) => condensed.expand(own, &mut solution[range.clone()]),
+                    Selection::List(_) => {
+                        let column = &mut scratch[..part.dofs.len()];
+                        condensed.expand(own, column);
+                        part.dofs.scatter(column, solution);
+                    }
+                }
+            }
+        }
+    }
+
+    fn solve(&mut self, forces: &mut [T]) {
+        let Self { parts, height, on_interface, .. } = self;
+        for part in parts.iter_mut().filter(|part| part.touches()) {
+            let own = part.interface.len();
+            let columns = room(on_interface, forces.len() / *height * own);
+            for (forces, column) in forces.chunks_exact(*height).zip(columns.chunks_exact_mut(own)) {
+                part.interface.gather(forces, column);
+            }
+            // A row of contact acts on two bodies, however many there are.
+            if columns.iter().all(|force| *force == T::zero()) {
+                continue;
+            }
+            if let Some(condensed) = part.factor.condensation() {
+                condensed.solve(columns);
+            }
+            for (forces, column) in forces.chunks_exact_mut(*height).zip(columns.chunks_exact(own)) {
+                part.interface.scatter(column, forces);
+            }
+        }
+    }
+}
