@@ -1,6 +1,7 @@
 //! The one error type of the crate: every variant carries the numbers and says what to mend.
 
 use crate::contact::ContactId;
+use crate::contact_solver::ContactFailure;
 
 /// What went wrong, where, and with which numbers.
 ///
@@ -191,6 +192,13 @@ pub enum Error {
         /// Its complementarity residual, in units of the gap.
         residual: f64,
     },
+    /// The contact problem of a frame between two bodies was not solved.
+    #[error("contact on the frame: {failure}; rows are nodes of the frame")]
+    Frame {
+        /// Why, in the numbering of the frame and the unit of its gaps.
+        #[source]
+        failure: ContactFailure<f64>,
+    },
     /// The initial state violates a contact constraint.
     #[error(
         "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is not \
@@ -339,6 +347,7 @@ impl Error {
         matches!(
             self,
             Self::Contact { .. }
+                | Self::Frame { .. }
                 | Self::ContradictoryContacts { .. }
                 | Self::ContactLost { .. }
                 | Self::NewtonNotConverged { .. }

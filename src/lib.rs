@@ -17,6 +17,7 @@ pub mod linear_solver;
 pub mod mass;
 mod memory;
 pub mod observer;
+pub mod partitioned;
 mod preset;
 mod real;
 pub mod reference;

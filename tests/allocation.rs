@@ -6,8 +6,7 @@ use contact_dynamics::corrector::{
 };
 use contact_dynamics::{
     ByBody, Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
-    NodesOnObstacle,
-    PersistencyCorrection, Simulation, TimeIntegrator,
+    NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
@@ -171,8 +170,9 @@ fn correctors() {
             assert_eq!(counted.count_total, 0, "{name}, {mass:?}");
         }
     }
+}
 
-/// Two blocks, each with a factor of its own one of them with a fixed dof amid its others.
+/// Two blocks, each with a factor of its own, one of them with a fixed dof amid its others.
 fn bodies_apart() {
     let material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
     let lower = Solid::rectangle([1.0; 2], [8; 2], material);
