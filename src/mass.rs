@@ -5,6 +5,7 @@ mod bipenalty;
 mod blend;
 mod courant;
 mod lump;
+mod reciprocal;
 mod redistribute;
 mod singular;
 
@@ -12,6 +13,7 @@ pub use bipenalty::bipenalty;
 pub use blend::{blend, optimal_weight};
 pub use courant::courant;
 pub use lump::{lump, lump_diagonal};
+pub use reciprocal::reciprocal;
 pub use redistribute::{Redistribution, affine_motions, redistribute, redistribute_consistent};
 pub use singular::{mixed, singular};
 

@@ -528,6 +528,6 @@ pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)
     }
     let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
         .to_owned()
-        .map_err(|_| Error::OutOfMemory { what: "the pattern of a singular mass matrix" })?;
+        .map_err(|_| Error::OutOfMemory { what: "the pattern of a mass matrix" })?;
     Ok(SparseColMat::new(pattern, values))
 }
