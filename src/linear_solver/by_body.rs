@@ -125,18 +125,20 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
     }
 }
 
+/// The smallest dof of a tree; the way there becomes shorter.
+fn root(above: &mut [usize], mut dof: usize) -> usize {
+    while above[dof] != dof {
+        above[dof] = above[above[dof]];
+        dof = above[dof];
+    }
+    dof
+}
+
 /// The component of each dof, and the dofs of each component, both ascending. The pattern need not be symmetric.
 fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<usize>, Vec<Vec<usize>>) {
     let n = pattern.ncols();
     // A forest: every dof points toward the smallest one of its tree.
     let mut above: Vec<usize> = (0..n).collect();
-    fn root(above: &mut [usize], mut dof: usize) -> usize {
-        while above[dof] != dof {
-            above[dof] = above[above[dof]];
-            dof = above[dof];
-        }
-        dof
-    }
     for column in 0..n {
         for &row in pattern.row_idx_of_col_raw(column) {
             let (a, b) = (root(&mut above, row), root(&mut above, column));
