@@ -4,6 +4,7 @@ use contact_dynamics::contact::{ContactLaw, Side, Sphere};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
+use contact_dynamics::partitioned::{self, Frame};
 use contact_dynamics::{
     ByBody, Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
     NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
@@ -21,6 +22,7 @@ fn steps_do_not_allocate() {
     solids();
     large_motion();
     bodies_apart();
+    frames();
 }
 
 /// Blocks at large strains that bounce: Newton's method, factorizations, rows that follow a curved floor.
@@ -198,5 +200,28 @@ fn bodies_apart() {
         changes = run.statistics().contact_changes;
     });
     assert!(changes >= 10, "{changes} changes");
+    assert_eq!(counted.count_total, 0);
+}
+
+/// A frame whose nodes close one by one, and are held one by one.
+fn frames() {
+    let n = 9_usize;
+    let flexibility: Vec<f64> = (0..n * n)
+        .map(|k| (if k / n == k % n { 2.0 } else { 0.0 }) + 1.0 / (1 + (k / n).abs_diff(k % n)) as f64)
+        .collect();
+    let (mut free, gaps, mut held) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
+    let mut frame = Frame::new(n);
+    let counted = allocation_counter::measure(|| {
+        for closed in 0..=n {
+            for node in 0..n {
+                (free[node], held[node]) = (if node < closed { 1.0 } else { -2.0 }, node >= closed);
+            }
+            let first = partitioned::Side { free: &free, flexibility: &flexibility };
+            let second = partitioned::Side { free: &gaps, flexibility: &flexibility };
+            let found = frame.solve([first, second], &gaps).unwrap();
+            assert_eq!(found.closed().iter().filter(|closed| **closed).count(), closed);
+            frame.hold([first, second], &gaps, &held).unwrap();
+        }
+    });
     assert_eq!(counted.count_total, 0);
 }
