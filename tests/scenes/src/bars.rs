@@ -1,8 +1,10 @@
 //! Two elastic bars of linear elements on a line, one behind the other, with contact between their facing ends.
 
+use crate::masses::{Body, MassMatrix};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::mass::affine_motions;
 use contact_dynamics::reference::{Bar, CollidingBars};
-use contact_dynamics::{LinearRows, LinearSystem, Real};
+use contact_dynamics::{ContactLaw, LinearRows, LinearSystem, Real};
 
 /// Lumped or consistent mass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +46,12 @@ impl Bars {
     /// Bars of different stiffness (E = 49 and 100), one of them at rest; release at 0.3857.
     pub fn dissimilar(elements: usize) -> Self {
         Self { young: [49.0, 100.0], area: 1.0, velocity: [0.1, 0.0], ..Self::paper(elements) }
+    }
+
+    /// Equal bars of lengths 10 and 20, the short one moving: from 0.3 to 0.5 they touch without force.
+    pub fn unequal(elements: usize) -> Self {
+        let area = 1.0;
+        Self { elements: [elements, 2 * elements], length: [10.0, 20.0], area, velocity: [0.1, 0.0], ..Self::paper(1) }
     }
 
     /// The same bars with the impact `phase` of a step `h` later.
@@ -143,10 +151,37 @@ impl Bars {
         .unwrap()
     }
 
+    /// The free system with a mass of any kind.
+    pub fn system_with(&self, mass: MassMatrix) -> LinearSystem<'static, f64> {
+        mass.system(self.stiffness()).unwrap()
+    }
+
+    /// What treatments of the mass need.
+    pub fn body(&self) -> Body {
+        let place = |dof: usize| match dof.checked_sub(self.contact_dofs()[1]) {
+            None => dof as f64 * self.element_size(0),
+            Some(node) => self.length[0] + node as f64 * self.element_size(1),
+        };
+        let coordinates: Vec<[f64; 1]> = (0..self.dofs()).map(|dof| [place(dof)]).collect();
+        let dofs: Vec<[usize; 1]> = (0..self.dofs()).map(|dof| [dof]).collect();
+        Body {
+            consistent: self.consistent_mass(),
+            stiffness: self.stiffness(),
+            contact: self.contact_dofs().to_vec(),
+            groups: (0..self.dofs()).map(|dof| usize::from(dof >= self.contact_dofs()[1])).collect(),
+            motions: affine_motions(self.dofs(), &coordinates, &dofs).unwrap(),
+        }
+    }
+
     /// The contact row, gap = u_right − u_left + gap.
     pub fn contact<T: Real>(&self) -> LinearRows<'static, T> {
+        self.contact_under(ContactLaw::Rigid)
+    }
+
+    /// The contact row under any law.
+    pub fn contact_under<T: Real>(&self, law: ContactLaw) -> LinearRows<'static, T> {
         let [left, right] = self.contact_dofs();
-        LinearRows::new().unilateral(&[(left, -T::one()), (right, T::one())], T::of(self.gap))
+        LinearRows::new().row(law, &[(left, -T::one()), (right, T::one())], T::of(self.gap))
     }
 
     /// Initial velocities.

@@ -1,9 +1,11 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
 pub mod bars;
+pub mod disc;
 pub mod drops;
 pub mod hyperelastic;
 pub mod large;
+pub mod masses;
 pub mod measure;
 pub mod output;
 pub mod particles;

@@ -34,11 +34,15 @@ const TICK: i32 = 16;
 /// Width to allow for a character of the widest common sans-serif font.
 const CHARACTER: i32 = 31;
 
+/// Of the filling of marks.
+const OPACITY: f64 = 0.45;
+
 /// Font sizes; plotters' are 1.24 times those of the SVG it writes.
 const TEXT: f64 = 1.24 * 52.0;
 const TITLE: f64 = 1.24 * 60.0;
 
 type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 type Point = (f64, f64);
 
 /// How the numbers of an axis are written.
@@ -178,23 +182,7 @@ fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
     let (above, body) = rest.split_vertically(LEGEND * i32::try_from(lines.len().max(1))?);
     draw_legend(&lines, &above)?;
 
-    let mut chart = ChartBuilder::on(&body)
-        .y_label_area_size(Y_LABELS)
-        .x_label_area_size(X_LABELS)
-        .margin_right(MARGIN)
-        .build_cartesian_2d(panel.x.clone(), panel.y.clone())?;
-    chart
-        .configure_mesh()
-        .bold_line_style(GRID.stroke_width(UNITS))
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME.stroke_width(UNITS))
-        .set_all_tick_mark_size(TICK)
-        .label_style(text(HPos::Left, VPos::Center))
-        .x_label_formatter(&|&value| tick_label(value, panel.x.scale))
-        .y_label_formatter(&|&value| tick_label(value, panel.y.scale))
-        .x_desc(panel.x.label)
-        .y_desc(panel.y.label)
-        .draw()?;
+    let mut chart = framed(&panel.x, &panel.y, &body)?;
     for curve in &panel.curves {
         for piece in clipped(&curve.points, &panel.x.range, &panel.y.range) {
             chart.draw_series(LineSeries::new(piece, curve.color.stroke_width(curve.width)))?;
@@ -204,6 +192,79 @@ fn draw(panel: &Panel, area: &Canvas<'_>) -> Result<(), Box<dyn Error>> {
         chart.plotting_area().draw(&Text::new(note.as_str(), *point, text(HPos::Right, VPos::Top)))?;
     }
     Ok(())
+}
+
+/// Axes, frame and grid.
+fn framed<'a>(x: &Axis, y: &Axis, area: &Canvas<'a>) -> Result<Chart<'a>, Box<dyn Error>> {
+    let mut chart = ChartBuilder::on(area)
+        .y_label_area_size(Y_LABELS)
+        .x_label_area_size(X_LABELS)
+        .margin_right(MARGIN)
+        .build_cartesian_2d(x.clone(), y.clone())?;
+    chart
+        .configure_mesh()
+        .bold_line_style(GRID.stroke_width(UNITS))
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME.stroke_width(UNITS))
+        .set_all_tick_mark_size(TICK)
+        .label_style(text(HPos::Left, VPos::Center))
+        .x_label_formatter(&|&value| tick_label(value, x.scale))
+        .y_label_formatter(&|&value| tick_label(value, y.scale))
+        .x_desc(x.label)
+        .y_desc(y.label)
+        .draw()?;
+    Ok(chart)
+}
+
+/// A point of a scatter plot.
+pub struct Mark {
+    pub at: Point,
+    /// In pixels.
+    pub radius: f64,
+    /// Text beside it.
+    pub label: Option<String>,
+}
+
+/// Points of one kind.
+pub struct Cloud {
+    pub label: &'static str,
+    pub color: RGBColor,
+    pub marks: Vec<Mark>,
+}
+
+/// One page of points in a frame, the first cloud lowest; points beyond the frame are drawn on its edge.
+pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud]) -> Result<String, Box<dyn Error>> {
+    svg((900, 640), |canvas| {
+        let inner = canvas.margin(MARGIN, MARGIN, MARGIN, MARGIN);
+        let (head, rest) = inner.split_vertically(PANEL_TITLE + LEGEND);
+        head.draw_text(title, &text(HPos::Left, VPos::Center), (Y_LABELS, PANEL_TITLE / 3))?;
+        let mut left = Y_LABELS;
+        for Cloud { label, color, .. } in clouds {
+            let middle = PANEL_TITLE + LEGEND / 3;
+            head.draw(&Circle::new((left + 2 * CHARACTER / 3, middle), 20, color.mix(OPACITY).filled()))?;
+            head.draw_text(label, &text(HPos::Left, VPos::Center), (left + 2 * CHARACTER, middle))?;
+            left += (i32::try_from(label.chars().count())? * 27) + 3 * CHARACTER;
+        }
+        let chart = framed(x, y, &rest)?;
+        let area = chart.plotting_area();
+        let inside = |(px, py): Point| (px.clamp(x.range.start, x.range.end), py.clamp(y.range.start, y.range.end));
+        for Cloud { color, marks, .. } in clouds {
+            for Mark { at, radius, .. } in marks {
+                let size = (radius * f64::from(UNITS)).round() as i32;
+                let circle = |style: ShapeStyle| Circle::new(inside(*at), size, style);
+                area.draw(&circle(color.mix(OPACITY).filled()))?;
+                area.draw(&circle(color.stroke_width(UNITS)))?;
+            }
+        }
+        for Mark { at, radius, label } in clouds.iter().flat_map(|cloud| &cloud.marks) {
+            let Some(label) = label else { continue };
+            let shift = (radius * f64::from(UNITS)).round() as i32 + CHARACTER / 4;
+            let ((px, py), (left, top)) = (area.map_coordinate(&inside(*at)), rest.get_base_pixel());
+            let place = (px - left + 3 * shift / 4, py - top - 3 * shift / 4);
+            rest.draw_text(label, &text(HPos::Left, VPos::Bottom), place)?;
+        }
+        Ok(())
+    })
 }
 
 /// The labeled curves, broken into lines of a width.
