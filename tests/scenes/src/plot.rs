@@ -243,7 +243,7 @@ pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud]) -> Result<Stri
             let middle = PANEL_TITLE + LEGEND / 3;
             head.draw(&Circle::new((left + 2 * CHARACTER / 3, middle), 20, color.mix(OPACITY).filled()))?;
             head.draw_text(label, &text(HPos::Left, VPos::Center), (left + 2 * CHARACTER, middle))?;
-            left += (i32::try_from(label.chars().count())? * 27) + 3 * CHARACTER;
+            left += i32::try_from(label.chars().count())? * CHARACTER + 3 * CHARACTER;
         }
         let chart = framed(x, y, &rest)?;
         let area = chart.plotting_area();
@@ -256,12 +256,22 @@ pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud]) -> Result<Stri
                 area.draw(&circle(color.stroke_width(UNITS)))?;
             }
         }
-        for Mark { at, radius, label } in clouds.iter().flat_map(|cloud| &cloud.marks) {
-            let Some(label) = label else { continue };
-            let shift = (radius * f64::from(UNITS)).round() as i32 + CHARACTER / 4;
-            let ((px, py), (left, top)) = (area.map_coordinate(&inside(*at)), rest.get_base_pixel());
-            let place = (px - left + 3 * shift / 4, py - top - 3 * shift / 4);
-            rest.draw_text(label, &text(HPos::Left, VPos::Bottom), place)?;
+        let labeled = clouds.iter().flat_map(|cloud| &cloud.marks);
+        let labeled: Vec<_> = labeled
+            .filter_map(|mark| Some((area.map_coordinate(&inside(mark.at)), mark, mark.label.as_ref()?)))
+            .collect();
+        let (left, top) = rest.get_base_pixel();
+        for &((px, py), mark, label) in &labeled {
+            let shift = (3.0 * mark.radius + 6.0).round() as i32;
+            // Above to the right, or below to the left where another label would be in the way.
+            let in_the_way =
+                |(x, y): (i32, i32)| (1..3 * CHARACTER).contains(&(x - px)) && (y - py).abs() < 3 * CHARACTER;
+            match labeled.iter().any(|other| in_the_way(other.0)) {
+                true => rest.draw_text(label, &text(HPos::Right, VPos::Top), (px - left - shift, py - top + shift))?,
+                false => {
+                    rest.draw_text(label, &text(HPos::Left, VPos::Bottom), (px - left + shift, py - top - shift))?
+                }
+            }
         }
         Ok(())
     })
