@@ -74,7 +74,7 @@ impl Correction {
     }
 }
 
-/// One row of the matrix.
+/// One row of the matrix. With another law it is `Combination { law, ..plain(make) }`, one more line in [`all`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Combination {
     make: Make,
@@ -114,7 +114,10 @@ pub(crate) fn all() -> Vec<Combination> {
         }
     };
     let lumped = [Treatment::Lumped];
-    add(&IMPLICIT, &[Correction::None, Persistency, History], &lumped);
+    add(&IMPLICIT, &[Correction::None], &lumped);
+    // Schemes of one stage that read one state have no past to project.
+    add(&[COMPOSITE, BATHE, BATHE_1], &[Persistency, History], &lumped);
+    add(&[TRAPEZOIDAL, CHUNG_HULBERT_09, CHUNG_HULBERT_08], &[History], &lumped);
     add(&[MIDPOINT], &[Correction::None, Persistency, LaursenLove], &lumped);
     add(&[MOREAU_JEAN], &[Correction::None], &lumped);
     add(
@@ -127,9 +130,6 @@ pub(crate) fn all() -> Vec<Combination> {
     let redistributed = [Takers::Neighbors, Takers::Uniform, Takers::LeastSquares].map(Treatment::Redistributed);
     let blended = [Takers::Uniform, Takers::Tapered].map(Treatment::RedistributedBlend);
     add(&IMPLICIT, &[Correction::None], &[&redistributed[..], &blended[..]].concat());
-    // Another law is another line:
-    // rows.push(Combination { law: ContactLaw::Restitution { coefficient: 0.0 }, ..plain(MOREAU_JEAN) });
-    rows.retain(|row| !row.repeats());
     rows
 }
 
@@ -171,17 +171,6 @@ impl Combination {
             }
             None => self.mass.mass(body, &self.integrator()?.tableau(), courant),
         }
-    }
-
-    /// Whether it does the same as another row: schemes that read one state alone have no past to project.
-    fn repeats(&self) -> bool {
-        let one_step = self.integrator().is_ok_and(|scheme| scheme.tableau().depth() == 1);
-        self.correction == Correction::Persistency && one_step && self.mass == Treatment::Lumped && !self.is(MIDPOINT)
-    }
-
-    fn is(&self, make: Make) -> bool {
-        let name = |make: Make| make().map(|scheme| scheme.name()).ok();
-        name(self.make) == name(make)
     }
 
     /// The scheme against which times are measured.

@@ -54,10 +54,6 @@ impl SoftDisc {
         Self { solid, candidates, shares }
     }
 
-    pub fn dofs(&self) -> usize {
-        self.solid.dofs()
-    }
-
     /// What treatments of the mass need: vertical dofs of the candidates may be massless.
     pub fn body(&self) -> Body {
         let solid = &self.solid;
