@@ -129,7 +129,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     writeln!(page, "{}", main_table(&all, &main_results))?;
     writeln!(page, "{}", front(&all, &main_results, &cost))?;
-    writeln!(page, "{}", sizes_table(&all, &sizes))?;
+    if !sizes.is_empty() {
+        writeln!(page, "{}", sizes_table(&all, &sizes))?;
+    }
     writeln!(page, "{}", steps_table(&all, &steps))?;
     writeln!(page, "{}", plateaus_table(&all, &dissimilar))?;
     writeln!(page, "{}", touching_table(&all, &unequal))?;
