@@ -130,6 +130,8 @@ pub(crate) fn all() -> Vec<Combination> {
     let redistributed = [Takers::Neighbors, Takers::Uniform, Takers::LeastSquares].map(Treatment::Redistributed);
     let blended = [Takers::Uniform, Takers::Tapered].map(Treatment::RedistributedBlend);
     add(&IMPLICIT, &[Correction::None], &[&redistributed[..], &blended[..]].concat());
+    rows.push(Combination { law: ContactLaw::RateCondition, ..plain(MIDPOINT) });
+    rows.extend([MIDPOINT, COMPOSITE].map(|make| Combination { law: ContactLaw::PersistencySwitch, ..plain(make) }));
     rows
 }
 
@@ -196,6 +198,8 @@ impl Combination {
     fn correction(&self) -> String {
         match self.law {
             ContactLaw::Rigid => self.correction.name().into(),
+            ContactLaw::RateCondition => "rate condition".into(),
+            ContactLaw::PersistencySwitch => "persistency switch".into(),
             law => format!("{law:?}"),
         }
     }
