@@ -14,6 +14,8 @@ use num_traits::{Float, NumAssign};
 use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 
+mod sweep;
+
 /// A real scalar, `f32` or `f64` (sealed).
 ///
 /// Time, step size and scheme coefficients are `f64` in every run; `Real` is the type of matrices and vectors.
@@ -75,6 +77,13 @@ pub(crate) mod kernels {
         pub scratch: &'a mut [T],
     }
 
+    /// Whether a pass adds to what is there.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Accumulate {
+        Replace,
+        Add,
+    }
+
     #[doc(hidden)]
     pub trait Kernels: Sized {
         /// `out = c x`.
@@ -83,12 +92,18 @@ pub(crate) mod kernels {
         fn axpy(c: Self, x: &[Self], out: &mut [Self]);
         /// `out += c (x − y)`.
         fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]);
+        /// `out = Σ c x + Σ c (x − y)` in one pass, summed in this order; without a term nothing is written.
+        fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]);
+        /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether every d is finite.
+        fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
         /// Whether every entry is finite.
         fn all_finite(x: &[Self]) -> bool;
         /// `y += c A x`, any A.
         fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
         /// `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
         fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
+        /// `y = c A x` for symmetric A.
+        fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
         /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller.
         fn cholesky(
             kind: Factorization,
@@ -142,15 +157,113 @@ pub(crate) mod kernels {
     }
 
     #[inline]
-    fn symmetric_product<T: Real>(c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+    fn symmetric_product<T: Real>(a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T], put: impl Fn(&mut T, T)) {
         let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
         for (yj, range) in y.iter_mut().zip(pointers.windows(2)) {
             let mut sum = T::zero();
             for (&i, &value) in rows[range[0]..range[1]].iter().zip(&values[range[0]..range[1]]) {
                 sum += value * x[i];
             }
-            *yj += c * sum;
+            put(yj, sum);
         }
+    }
+
+    /// Numbers that are added up side by side: one sum after the other would wait for each addition.
+    const LANES: usize = 8;
+
+    /// Σ 0 x: zero if every x is finite, NaN otherwise. An early exit would not vectorize.
+    #[inline]
+    fn all_finite<T: Real>(x: &[T]) -> bool {
+        let mut sums = [T::zero(); LANES];
+        let chunks = x.chunks_exact(LANES);
+        let rest: T = chunks.remainder().iter().map(|&x| x * T::zero()).sum();
+        for chunk in chunks {
+            for (sum, &x) in sums.iter_mut().zip(chunk) {
+                *sum += x * T::zero();
+            }
+        }
+        sums.into_iter().sum::<T>() + rest == T::zero()
+    }
+
+    #[inline]
+    fn combine<T: Real>(terms: &[(T, &[T])], differences: &[(T, &[T])], y: &[T], out: &mut [T]) {
+        /// P terms and D differences; all slices are cut to one length, so that no access is checked.
+        #[inline]
+        fn fused<T: Real, const P: usize, const D: usize>(
+            terms: &[(T, &[T])],
+            differences: &[(T, &[T])],
+            y: &[T],
+            out: &mut [T],
+        ) {
+            let n = out.len();
+            let (y, x): (&[T], [&[T]; P]) = (&y[..n], std::array::from_fn(|k| &terms[k].1[..n]));
+            let d: [&[T]; D] = std::array::from_fn(|k| &differences[k].1[..n]);
+            let (c, e) =
+                (std::array::from_fn::<T, P, _>(|k| terms[k].0), std::array::from_fn::<T, D, _>(|k| differences[k].0));
+            for (i, out) in out.iter_mut().enumerate() {
+                let mut sum = if P > 0 { c[0] * x[0][i] } else { T::zero() };
+                for k in 1..P {
+                    sum += c[k] * x[k][i];
+                }
+                for k in 0..D {
+                    sum += e[k] * (d[k][i] - y[i]);
+                }
+                *out = sum;
+            }
+        }
+        match (terms.len(), differences.len()) {
+            (0, 0) => {}
+            (1, 0) => fused::<T, 1, 0>(terms, differences, y, out),
+            (2, 0) => fused::<T, 2, 0>(terms, differences, y, out),
+            (3, 0) => fused::<T, 3, 0>(terms, differences, y, out),
+            (4, 0) => fused::<T, 4, 0>(terms, differences, y, out),
+            (0, 1) => fused::<T, 0, 1>(terms, differences, y, out),
+            (1, 1) => fused::<T, 1, 1>(terms, differences, y, out),
+            (2, 1) => fused::<T, 2, 1>(terms, differences, y, out),
+            (3, 1) => fused::<T, 3, 1>(terms, differences, y, out),
+            (0, 2) => fused::<T, 0, 2>(terms, differences, y, out),
+            (1, 2) => fused::<T, 1, 2>(terms, differences, y, out),
+            (2, 2) => fused::<T, 2, 2>(terms, differences, y, out),
+            (1, 3) => fused::<T, 1, 3>(terms, differences, y, out),
+            _ => {
+                out.fill(T::zero());
+                for (c, x) in terms {
+                    for (out, &x) in out.iter_mut().zip(*x) {
+                        *out += *c * x;
+                    }
+                }
+                for (c, x) in differences {
+                    for ((out, &x), &y) in out.iter_mut().zip(*x).zip(y) {
+                        *out += *c * (x - y);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn recover<T: Real>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], accumulate: Accumulate) -> bool {
+        let [w_u, w_v, w_a] = weights;
+        let [u, v, a] = motion;
+        let n = d.len();
+        let (u, v, a) = (&mut u[..n], &mut v[..n], &mut a[..n]);
+        match accumulate {
+            Accumulate::Replace => {
+                for i in 0..n {
+                    u[i] += w_u * d[i];
+                    v[i] += w_v * d[i];
+                    a[i] = w_a * d[i];
+                }
+            }
+            Accumulate::Add => {
+                for i in 0..n {
+                    u[i] += w_u * d[i];
+                    v[i] += w_v * d[i];
+                    a[i] += w_a * d[i];
+                }
+            }
+        }
+        all_finite(d)
     }
 
     #[inline]
@@ -295,7 +408,8 @@ pub(crate) mod kernels {
     }
 
     /// The supernodes that hold any of the columns.
-    fn supernodes<T>(factor: &Supernodal<'_, T>, columns: &Range<usize>) -> Range<usize> {
+    #[inline]
+    pub(in crate::real) fn supernodes<T>(factor: &Supernodal<'_, T>, columns: &Range<usize>) -> Range<usize> {
         let begin = &factor.symbolic.supernode_begin()[..factor.symbolic.n_supernodes()];
         match columns.is_empty() {
             true => 0..0,
@@ -311,6 +425,9 @@ pub(crate) mod kernels {
     ) {
         let height = factor.symbolic.nrows() - skipped;
         let width = values.len().checked_div(height).unwrap_or(0);
+        if width == 1 {
+            return super::sweep::forward(factor, columns, Columns { values, skipped, scratch });
+        }
         for supernode in supernodes(factor, &columns) {
             let panel = Panel::new(factor, supernode, &columns);
             let mut x = MatMut::from_column_major_slice_mut(values, height, width);
@@ -335,6 +452,9 @@ pub(crate) mod kernels {
     ) {
         let height = factor.symbolic.nrows() - skipped;
         let width = values.len().checked_div(height).unwrap_or(0);
+        if width == 1 {
+            return super::sweep::backward(factor, columns, Columns { values, skipped, scratch });
+        }
         for supernode in supernodes(factor, &columns).rev() {
             let panel = Panel::new(factor, supernode, &columns);
             let count = panel.below.nrows();
@@ -369,15 +489,23 @@ pub(crate) mod kernels {
                         *out += c * (x - y);
                     }
                 }
+                fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]) {
+                    combine(terms, differences, y, out);
+                }
+                fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool {
+                    recover(weights, d, motion, a)
+                }
                 fn all_finite(x: &[Self]) -> bool {
-                    // x − x is 0 for finite x and NaN otherwise; the sum vectorizes, an early exit does not.
-                    x.iter().map(|&x| x - x).sum::<$scalar>() == 0.0
+                    all_finite(x)
                 }
                 fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
                     product(c, a, x, y);
                 }
                 fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
-                    symmetric_product(c, a, x, y);
+                    symmetric_product(a, x, y, |y, sum| *y += c * sum);
+                }
+                fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
+                    symmetric_product(a, x, y, |y, sum| *y = c * sum);
                 }
                 fn cholesky(
                     kind: Factorization,

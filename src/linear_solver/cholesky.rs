@@ -72,7 +72,8 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
         let zero = |size: usize| vec![T::zero(); size];
         let (values, pivots, sweep) = (zero(symbolic.len_val()), zero(n), zero(n));
-        let (trailing, below) = (zero(COLUMNS * last.len()), zero(if last.is_empty() { 0 } else { COLUMNS * below }));
+        let (trailing, below) =
+            (zero(COLUMNS * last.len()), zero(if last.is_empty() { below } else { COLUMNS * below }));
         Ok(Box::new(Factor {
             symbolic,
             kind,
@@ -171,7 +172,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
     fn solve(&mut self, rhs: &mut [T]) {
         let size = self.size();
         let columns = rhs.len().checked_div(size).unwrap_or(0);
-        if self.kind == Kind::Llt {
+        if self.kind == Kind::Llt && columns > 1 {
             if columns > self.columns {
                 self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
                 self.columns = columns;

@@ -30,8 +30,13 @@ impl<T> Term<T> {
 #[derive(Debug)]
 pub(crate) struct ScaledRow<T> {
     terms: Vec<Term<T>>,
+    /// The first of them that are not differences.
+    plain: usize,
     pub(crate) weight: T,
 }
+
+/// The most terms a row can have.
+const TERMS: usize = 3 * MAX_PAST;
 
 /// Dofs a block: what it touches stays in the first-level cache.
 const BLOCK: usize = 1024;
@@ -62,24 +67,19 @@ impl<T: Real> ScaledRow<T> {
             .collect();
         // Differences last: the first term overwrites.
         terms.sort_by_key(|term: &Term<T>| (term.is_difference(), term.state, term.field));
-        Self { terms, weight: T::of(row.z * scale(0)) }
+        let plain = terms.partition_point(|term| !term.is_difference());
+        Self { terms, plain, weight: T::of(row.z * scale(0)) }
     }
 
     /// Writes the part that comes from the past to a block of dofs; without a term the output is left as it is.
     fn predict_block(&self, past: &[Motion<T>], block: &Range<usize>, out: &mut [T]) {
-        for (i, term) in self.terms.iter().enumerate() {
-            let source = &past[term.state].field(term.field)[block.clone()];
-            match (i, term.is_difference()) {
-                (0, false) => T::scale_into(term.c, source, out),
-                (_, false) => T::axpy(term.c, source, out),
-                (i, true) => {
-                    if i == 0 {
-                        out.fill(T::zero());
-                    }
-                    T::axpy_difference(term.c, source, &past[0].u[block.clone()], out);
-                }
-            }
+        let Some(newest) = past.first() else { return };
+        let mut sources = [(T::zero(), &newest.u[..0]); TERMS];
+        for (source, term) in sources.iter_mut().zip(&self.terms) {
+            *source = (term.c, &past[term.state].field(term.field)[block.clone()]);
         }
+        let (plain, differences) = sources[..self.terms.len()].split_at(self.plain);
+        T::combine(plain, differences, &newest.u[block.clone()], out);
     }
 
     /// Writes the part that comes from the past.

@@ -11,6 +11,7 @@ use crate::contact_solver::ContactSolver;
 use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::real::kernels::Accumulate;
 use crate::state::{Clock, Motion};
 use crate::system::System;
 
@@ -261,17 +262,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
             self.contact(None, new, past, work)?;
         }
         self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
-        self.refuse_nan(&work.increment, "the increment")?;
         let recovery = &self.stage.recovery;
-        let [w_u, w_v, w_a] = recovery.weights();
-        T::axpy(w_u, &work.increment, &mut new.u);
-        T::axpy(w_v, &work.increment, &mut new.v);
-        if recovery.reads_past(2) {
-            T::axpy(w_a, &work.increment, &mut new.a);
-        } else {
-            T::scale_into(w_a, &work.increment, &mut new.a);
+        let accumulate = if recovery.reads_past(2) { Accumulate::Add } else { Accumulate::Replace };
+        match T::recover(recovery.weights(), &work.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
+            true => Ok(()),
+            // (What has been written is undone with the step.)
+            false => self.refuse_nan(&work.increment, "the increment"),
         }
-        Ok(())
     }
 
     /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already.

@@ -249,23 +249,25 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     }
 
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        self.external_load(t, out);
         let minus = -T::one();
+        if let StoredDamping::Rayleigh { stiffness, .. } = &self.damping {
+            // One product with K serves both: K (u + βv).
+            self.scratch.copy_from_slice(u);
+            T::axpy(*stiffness, v, &mut self.scratch);
+        }
+        let moved = if let StoredDamping::Rayleigh { .. } = &self.damping { &self.scratch[..] } else { u };
+        match &mut self.load {
+            None => T::symmetric_product_into(minus, self.stiffness.as_ref(), moved, out),
+            Some(load) => {
+                out.fill(T::zero());
+                load(t, out);
+                T::symmetric_product(minus, self.stiffness.as_ref(), moved, out);
+            }
+        }
         match &self.damping {
-            StoredDamping::None => T::symmetric_product(minus, self.stiffness.as_ref(), u, out),
-            StoredDamping::General(c) => {
-                T::symmetric_product(minus, self.stiffness.as_ref(), u, out);
-                T::symmetric_product(minus, c.as_ref(), v, out);
-            }
-            StoredDamping::Rayleigh { mass, stiffness } => {
-                // One product with K serves both: K (u + βv).
-                self.scratch.copy_from_slice(u);
-                T::axpy(*stiffness, v, &mut self.scratch);
-                T::symmetric_product(minus, self.stiffness.as_ref(), &self.scratch, out);
-                if *mass > T::zero() {
-                    self.mass.view().product(-*mass, v, out);
-                }
-            }
+            StoredDamping::General(c) => T::symmetric_product(minus, c.as_ref(), v, out),
+            StoredDamping::Rayleigh { mass, .. } if *mass > T::zero() => self.mass.view().product(-*mass, v, out),
+            StoredDamping::None | StoredDamping::Rayleigh { .. } => {}
         }
         Ok(())
     }
