@@ -2,9 +2,14 @@
 //!
 //! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20)
 
+use contact_dynamics::faer::Side;
+use contact_dynamics::faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
+};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Automatic, Composite, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation, TimeIntegrator,
+    Automatic, Composite, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation, System,
+    TimeIntegrator,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
 use std::hint::black_box;
@@ -72,6 +77,8 @@ fn measure(n: usize) {
     println!("block of {n}³ elements, {} dofs, {} candidates, Courant number 1", block.dofs(), candidates.len());
     let mut rows =
         vec![bare("bare solve, free order", &block, h, &[]), bare("bare solve, contact last", &block, h, &candidates)];
+    let entries = entries(&effective(&block, h));
+    let product = product(&block);
     for (name, pressed, corrected) in
         [("step, open", false, false), ("step, all closed", true, false), ("step, all closed, corrected", true, true)]
     {
@@ -87,7 +94,53 @@ fn measure(n: usize) {
             samples: Vec::new(),
         });
     }
+    rows.push(product);
+    rows.push(reading(&format!("reading the factor twice ({:.1} M)", entries as f64 / 1e6), entries));
     sample(&mut rows, if n > 25 { 5 } else { 15 });
+}
+
+/// Entries of L by minimum degree, without the upper halves that blocks are stored with: what a sweep has to read.
+fn entries(a: &SparseColMat<usize, f64>) -> usize {
+    let (ordering, parameters) = (SymmetricOrdering::Amd, CholeskySymbolicParams::default());
+    let symbolic = factorize_symbolic_cholesky(a.symbolic(), Side::Lower, ordering, parameters).expect("memory");
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(raw) => raw.len_val(),
+        SymbolicCholeskyRaw::Supernodal(raw) => {
+            let size = |s: usize| {
+                let columns = raw.supernode_end()[s] - raw.supernode_begin()[s];
+                columns * (columns + 1) / 2 + columns * raw.supernode(s).pattern().len()
+            };
+            (0..raw.n_supernodes()).map(size).sum()
+        }
+    }
+}
+
+/// Reads so many numbers from memory, twice: the limit of a solve.
+fn reading(name: &str, entries: usize) -> Row<'static> {
+    let numbers = vec![1.0_f64; entries];
+    let run = move || {
+        for _ in 0..2 {
+            let mut sums = [0.0; 16];
+            for chunk in black_box(&numbers[..]).chunks_exact(16) {
+                for (sum, x) in sums.iter_mut().zip(chunk) {
+                    *sum += x;
+                }
+            }
+            black_box(sums);
+        }
+    };
+    Row { name: name.into(), run: Box::new(run), samples: Vec::new() }
+}
+
+/// One product with K.
+fn product(block: &Solid<3>) -> Row<'static> {
+    let mut system = block.system::<f64>();
+    let (u, v, mut f) = (vec![1.0; block.dofs()], vec![0.0; block.dofs()], vec![0.0; block.dofs()]);
+    let run = move || {
+        system.force(0.0, black_box(&u), &v, &mut f).expect("linear");
+        black_box(&f);
+    };
+    Row { name: "bare K product".into(), run: Box::new(run), samples: Vec::new() }
 }
 
 /// Runs all rows in turn, and prints medians and ratios.
@@ -114,8 +167,8 @@ fn sample(rows: &mut [Row<'_>], samples: usize) {
     println!();
 }
 
-/// The solve with the composite scheme's effective matrix.
-fn bare(name: &str, block: &Solid<3>, h: f64, last: &[usize]) -> Row<'static> {
+/// The composite scheme's effective matrix.
+fn effective(block: &Solid<3>, h: f64) -> SparseColMat<usize, f64> {
     let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
     let (k, mass) = (block.stiffness::<f64>(), block.lumped_mass::<f64>());
     let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
@@ -123,7 +176,12 @@ fn bare(name: &str, block: &Solid<3>, h: f64, last: &[usize]) -> Row<'static> {
         let k = k.as_ref();
         triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
     }
-    let a = SparseColMat::<usize, f64>::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("triplets");
+    SparseColMat::<usize, f64>::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("triplets")
+}
+
+/// The solve with that.
+fn bare(name: &str, block: &Solid<3>, h: f64, last: &[usize]) -> Row<'static> {
+    let a = effective(block, h);
     let mut factor: Box<dyn Factorization<f64>> = Automatic.analyze(a.symbolic(), last).expect("memory");
     factor.factorize(a.as_ref()).expect("positive definite");
     let name = format!("{name} ({:.1} M)", factor.stored_values() as f64 / 1e6);

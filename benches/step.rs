@@ -11,8 +11,8 @@ use contact_dynamics::faer::sparse::linalg::cholesky::{
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::faer::{Conj, MatMut, Par, Side, Spec};
 use contact_dynamics::{
-    Automatic, Composite, Factorization, LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection,
-    Simulation, System, TimeIntegrator,
+    Automatic, CentralDifference, Composite, Factorization, LinearRows, LinearSolver, LinearSystem, Newmark,
+    PersistencyCorrection, Simulation, System, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use std::hint::black_box;
@@ -40,6 +40,9 @@ fn table(n: usize, calls: usize, samples: usize) {
     // Courant number 1 on the mesh of the table.
     let h = bars.element_size(0) / 100.0;
     let mut rows = bare(&bars, h);
+    rows.push(Row { name: "composite step by hand".into(), run: Box::new(by_hand(&bars, h)), samples: Vec::new() });
+    rows.push(traffic(&bars, 0.9 * h));
+    rows.push(explicit(&bars, 0.9 * h));
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] = [|| Box::new(Composite), || Box::new(Newmark::trapezoidal())];
     for scheme in schemes {
         for (contact, correction) in [("open", false), ("open", true), ("closed", false), ("closed", true)] {
@@ -148,6 +151,88 @@ fn faer_solve(a: &SparseColMat<usize, f64>) -> impl FnMut(usize) + 'static {
             black_box(&x);
         }
     }
+}
+
+/// The composite scheme's step of chains in a straight program: what a host would write for this scene alone. Prediction,
+/// product with K and forward sweep are one loop, backward sweep and recovery another one.
+fn by_hand(bars: &Bars, h: f64) -> impl FnMut(usize) + 'static {
+    let dofs = bars.dofs();
+    let (stiffness, mass) = (bars.stiffness::<f64>(), bars.lumped_mass::<f64>());
+    let entry = |i: usize, j: usize| {
+        let rows = stiffness.as_ref().row_idx_of_col_raw(j);
+        rows.iter().position(|&row| row == i).map_or(0.0, |at| stiffness.val_of_col(j)[at])
+    };
+    let diagonal: Vec<f64> = (0..dofs).map(|i| entry(i, i)).collect();
+    let beside: Vec<f64> = (0..dofs).map(|i| if i + 1 < dofs { entry(i, i + 1) } else { 0.0 }).collect();
+    // L D Lᵀ of 5/2 M/h² + K.
+    let (mut lower, mut inverse) = (vec![0.0; dofs], vec![0.0; dofs]);
+    for i in 0..dofs {
+        let pivot = 2.5 / (h * h) * mass[i] + diagonal[i] - if i > 0 { lower[i - 1] * beside[i - 1] } else { 0.0 };
+        (inverse[i], lower[i]) = (pivot.recip(), beside[i] / pivot);
+    }
+    let still = || vec![0.0; dofs];
+    let (mut u, mut u1, mut v, mut v1, mut x, mut a) = (still(), still(), still(), still(), still(), still());
+    u.iter_mut().enumerate().for_each(|(i, u)| *u = 1e-3 * (0.1 * i as f64).sin());
+    u1.copy_from_slice(&u);
+    move |calls| {
+        for _ in 0..calls {
+            let predicted = |i: usize| u[i] + 0.6 * (u[i] - u1[i]) + h * (0.8 * v[i] - 0.4 * v1[i]);
+            let (mut before, mut now, mut last) = (0.0, predicted(0), 0.0);
+            for i in 0..dofs {
+                let next = if i + 1 < dofs { predicted(i + 1) } else { 0.0 };
+                let pull = diagonal[i] * now + beside[i] * next + if i > 0 { beside[i - 1] * before } else { 0.0 };
+                last = -pull - if i > 0 { lower[i - 1] * last } else { 0.0 };
+                x[i] = last;
+                (before, now) = (now, next);
+            }
+            let mut d = 0.0;
+            for i in (0..dofs).rev() {
+                d = x[i] * inverse[i] - lower[i] * d;
+                let new = u[i] + 0.6 * (u[i] - u1[i]) + h * (0.8 * v[i] - 0.4 * v1[i]) + d;
+                let rate = (1.5 * (new - u[i]) - 0.5 * (u[i] - u1[i])) / h;
+                a[i] = 2.5 / (h * h) * d;
+                (u1[i], u[i]) = (u[i], new);
+                (v1[i], v[i]) = (v[i], rate);
+            }
+            black_box((&u, &v, &a));
+        }
+    }
+}
+
+/// One product with K and one pass over the vectors of an explicit step: its limit.
+fn traffic(bars: &Bars, h: f64) -> Row<'static> {
+    let dofs = bars.dofs();
+    let mut system = bars.system::<f64>();
+    let inverse: Vec<f64> = bars.lumped_mass::<f64>().iter().map(|m| m.recip()).collect();
+    let still = || vec![0.0; dofs];
+    let (mut u, mut v, mut a, mut f) = (still(), still(), still(), still());
+    let step = move |calls| {
+        for _ in 0..calls {
+            system.force(0.0, black_box(&u), &v, &mut f).expect("linear");
+            let rates = v.iter_mut().zip(&mut a).zip(inverse.iter().zip(&f));
+            for (u, ((v, a), (inverse, f))) in u.iter_mut().zip(rates) {
+                *u += h * (*v + 0.5 * h * *a);
+                *v += 0.5 * h * (*a + inverse * f);
+                *a = inverse * f;
+            }
+            black_box((&u, &v, &a));
+        }
+    };
+    Row { name: "K product and vectors".into(), run: Box::new(step), samples: Vec::new() }
+}
+
+/// A step of central differences without contact.
+fn explicit(bars: &Bars, h: f64) -> Row<'static> {
+    let mut run = Simulation::builder(bars.system::<f64>(), CentralDifference, h)
+        .velocity((0..bars.dofs()).map(|i| 1e-3 * (i as f64 * 0.1).sin()).collect())
+        .build()
+        .expect("the scene is well posed");
+    let step = move |calls| {
+        for _ in 0..calls {
+            run.step().expect("the scene is well posed");
+        }
+    };
+    Row { name: "central differences".into(), run: Box::new(step), samples: Vec::new() }
 }
 
 /// Bars that vibrate slightly while loads at the far ends press them together (closed), or far apart (open).
