@@ -87,6 +87,14 @@ pub enum Error {
         /// Number of dofs of the system.
         dofs: usize,
     },
+    /// A degree of freedom is named more than once where each must be named once.
+    #[error("{what} names dof {dof} more than once; name each once")]
+    RepeatedDof {
+        /// Who names it.
+        what: &'static str,
+        /// The dof.
+        dof: usize,
+    },
     /// A degree of freedom is prescribed twice.
     #[error("dof {dof} is prescribed twice; fix or drive it once")]
     PrescribedTwice {

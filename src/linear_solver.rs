@@ -3,11 +3,13 @@
 mod by_body;
 mod cholesky;
 mod diagonal;
+mod dissection;
 mod ordering;
 
 pub use by_body::ByBody;
 pub use cholesky::Cholesky;
 pub use diagonal::Diagonal;
+pub use ordering::Ordering;
 
 use crate::error::Result;
 use crate::real::Real;

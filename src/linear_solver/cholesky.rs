@@ -1,8 +1,9 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
-use super::ordering;
+use super::ordering::{self, Ordering};
 use super::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::real::Real;
 use crate::real::kernels::{Columns, Factorization as Kind, Simplicial, Supernodal};
 use crate::sparse;
@@ -11,15 +12,63 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// Sparse Cholesky factorization of symmetric positive definite matrices, ordered by approximate minimum degree with the
-/// dofs of contact last.
+/// Sparse Cholesky factorization of symmetric positive definite matrices, the dofs of contact eliminated last, the others
+/// in an order with little fill ([`Ordering`]).
 ///
 /// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
 /// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst
 /// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
 /// see `docs/design.md`.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Cholesky {}
+///
+/// [`analyze`](LinearSolver::analyze) refuses, besides what the trait says, an order that does not fit the pattern:
+/// [`Error::Dimension`], [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
+#[derive(Clone, Debug, Default)]
+pub struct Cholesky {
+    ordering: Ordering,
+}
+
+impl Cholesky {
+    /// With an order of the caller's choice; `default()` is [`Ordering::Automatic`].
+    ///
+    /// ```
+    /// use contact_dynamics::Cholesky;
+    /// use contact_dynamics::linear_solver::Ordering;
+    ///
+    /// // Two nodes with three dofs each.
+    /// let nodes = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+    /// let places = nodes.iter().flat_map(|&node| [node; 3]).collect();
+    /// let solver = Cholesky::ordered(Ordering::Coordinates(places));
+    /// # let _ = solver;
+    /// ```
+    pub fn ordered(ordering: Ordering) -> Self {
+        Self { ordering }
+    }
+
+    /// Number of scalars that the factor of a pattern (both triangles) will hold with `last` (ascending) eliminated last,
+    /// without allocating it: what [`Factorization::stored_values`] will say.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Cholesky, Factorization, LinearSolver};
+    ///
+    /// let entries: Vec<_> = (0..9).flat_map(|i| [(i, i, 2.0), (i, i + 1, -1.0), (i + 1, i, -1.0)]).collect();
+    /// let entries: Vec<_> = entries.into_iter().chain([(9, 9, 2.0)]).map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+    /// let chain = SparseColMat::<usize, f64>::try_new_from_triplets(10, 10, &entries)?;
+    /// let solver = Cholesky::default();
+    /// let scalars = solver.estimate(chain.symbolic(), &[9])?;
+    /// assert_eq!(scalars, 19); // ten pivots, nine entries below them
+    /// let factor: Box<dyn Factorization<f64>> = solver.analyze(chain.symbolic(), &[9])?;
+    /// assert_eq!(factor.stored_values(), scalars);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`analyze`](LinearSolver::analyze); [`Error::OutOfMemory`] only if the analysis itself finds no memory.
+    pub fn estimate(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
+        Ok(ordering::symbolic_cholesky(&self.ordering, pattern, last)?.len_val())
+    }
+}
 
 struct Factor<T: Real> {
     symbolic: SymbolicCholesky<usize>,
@@ -59,7 +108,8 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let symbolic = ordering::symbolic_cholesky(pattern, last)?;
+        let symbolic = ordering::symbolic_cholesky(&self.ordering, pattern, last)?;
+        let values = memory::zeros(symbolic.len_val(), 1, "a sparse Cholesky factor")?;
         let (kind, below) = match symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
             SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
@@ -70,10 +120,11 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
         let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
-        let zero = |size: usize| vec![T::zero(); size];
-        let (values, pivots, sweep) = (zero(symbolic.len_val()), zero(n), zero(n));
-        let (trailing, below) =
-            (zero(COLUMNS * last.len()), zero(if last.is_empty() { below } else { COLUMNS * below }));
+        let (pivots, sweep) = (vec![T::zero(); n], vec![T::zero(); n]);
+        let what = "the interface of a sparse Cholesky factor";
+        let trailing = memory::zeros(COLUMNS, last.len(), what)?;
+        // Without an interface there are still the sweeps over one right-hand side.
+        let below = memory::zeros(if last.is_empty() { 1 } else { COLUMNS }, below, what)?;
         Ok(Box::new(Factor {
             symbolic,
             kind,

@@ -1,0 +1,107 @@
+//! Separators from the graph alone: found where the graph has been made small, and refined on the way back.
+
+use super::graph::Graph;
+use super::separator::{Separator, grow, refine};
+
+/// Size of the graph that a separator is sought on from scratch.
+const COARSEST: usize = 50;
+
+/// The most that a vertex of it may weigh, as the share of the whole that is one in so many.
+const HEAVIEST: i64 = 33;
+
+/// Vertices of it that a side is grown from.
+const STARTS: usize = 5;
+
+/// Numbers without a pattern, the same in every run (xorshift of Marsaglia, J. Stat. Softw. 8, 2003).
+#[derive(Clone, Debug)]
+pub(super) struct Random(u64);
+
+impl Random {
+    pub(super) fn new() -> Self {
+        Self(0x9e37_79b9_7f4a_7c15)
+    }
+
+    /// A number below `bound`, which is not zero.
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        usize::try_from((self.0 >> 11) % bound as u64).unwrap_or(0)
+    }
+
+    fn shuffle(&mut self, items: &mut [usize]) {
+        for k in (1..items.len()).rev() {
+            items.swap(k, self.below(k + 1));
+        }
+    }
+}
+
+/// A separator of a connected graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998).
+pub(super) fn bisect(graph: &Graph, random: &mut Random) -> Separator {
+    let heaviest = 1 + graph.total() / HEAVIEST;
+    let mut levels: Vec<(Graph, Vec<usize>)> = Vec::new();
+    loop {
+        let finest = levels.last().map_or(graph, |(graph, _)| graph);
+        if finest.size() <= COARSEST {
+            break;
+        }
+        let Some(level) = coarsen(finest, heaviest, random) else { break };
+        levels.push(level);
+    }
+    let coarsest = levels.last().map_or(graph, |(graph, _)| graph);
+    let starts = (0..STARTS).map(|k| refine(coarsest, grow(coarsest, k * coarsest.size() / STARTS)));
+    let best = starts.min_by_key(Separator::cost);
+    let mut separator = best.unwrap_or_else(|| Separator::new(graph, Vec::new()));
+    while let Some((_, coarse)) = levels.pop() {
+        let finer = levels.last().map_or(graph, |(graph, _)| graph);
+        separator = refine(finer, separator.projected(&coarse));
+    }
+    separator
+}
+
+/// A smaller graph, vertices joined in pairs along the heaviest edges, and for each vertex the one it became part of;
+/// nothing if hardly any can be joined without one that weighs more than `heaviest`.
+fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, Vec<usize>)> {
+    const FREE: usize = usize::MAX;
+    let n = graph.size();
+    // In order of their numbers all pairs of a regular mesh would lie along one axis.
+    let mut visits: Vec<usize> = (0..n).collect();
+    random.shuffle(&mut visits);
+    let mut coarse = vec![FREE; n];
+    let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(n / 2 + 1);
+    for vertex in visits {
+        if coarse[vertex] != FREE {
+            continue;
+        }
+        let room = heaviest - graph.weight(vertex);
+        let mut best = (0, vertex);
+        for (neighbor, edges) in graph.edges(vertex) {
+            if coarse[neighbor] == FREE && edges > best.0 && graph.weight(neighbor) <= room {
+                best = (edges, neighbor);
+            }
+        }
+        coarse[vertex] = pairs.len();
+        coarse[best.1] = pairs.len();
+        pairs.push((vertex, best.1));
+    }
+    if pairs.len() * 20 > n * 19 {
+        return None;
+    }
+    let mut joined = Graph::with_capacity(pairs.len(), graph.entries() / 2);
+    let mut place = vec![(FREE, 0); pairs.len()];
+    for (name, &(one, other)) in pairs.iter().enumerate() {
+        let both = if one == other { &[one][..] } else { &[one, other][..] };
+        for &vertex in both {
+            for (neighbor, edges) in graph.edges(vertex) {
+                let to = coarse[neighbor];
+                match place[to] {
+                    _ if to == name => {}
+                    (seen, at) if seen == name => joined.thicken(at, edges),
+                    _ => place[to] = (name, joined.push(to, edges)),
+                }
+            }
+        }
+        joined.close(both.iter().map(|&vertex| graph.weight(vertex)).sum());
+    }
+    Some((joined, coarse))
+}

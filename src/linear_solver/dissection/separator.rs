@@ -1,0 +1,194 @@
+//! Vertex separators, grown from a vertex and made lighter by moves of single vertices.
+
+use super::graph::Graph;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// The label of vertices that separate side 0 from side 1.
+pub(super) const BETWEEN: usize = 2;
+
+/// Neither side may weigh more than this share of the whole.
+const BALANCE: f64 = 0.57;
+
+/// Moves without an improvement after which a pass ends.
+const PATIENCE: usize = 100;
+
+/// Passes of refinement on one graph, at most.
+const PASSES: usize = 6;
+
+/// A partition into two sides without an edge between them, and what separates them.
+#[derive(Clone, Debug)]
+pub(super) struct Separator {
+    /// For each vertex its side, or [`BETWEEN`].
+    pub(super) label: Vec<usize>,
+    /// Weights of the sides and of the separator.
+    pub(super) weights: [i64; 3],
+}
+
+impl Separator {
+    pub(super) fn new(graph: &Graph, label: Vec<usize>) -> Self {
+        let mut weights = [0; 3];
+        for (vertex, &label) in label.iter().enumerate() {
+            weights[label] += graph.weight(vertex);
+        }
+        Self { label, weights }
+    }
+
+    /// What is minimized: first what a side weighs too much, then the separator, then the difference of the sides.
+    pub(super) fn cost(&self) -> [i64; 3] {
+        let [one, other, between] = self.weights;
+        [(one.max(other) - self.limit()).max(0), between, (one - other).abs()]
+    }
+
+    /// The separator of the finer graph whose vertices became those of this one's as `coarse` says.
+    pub(super) fn projected(&self, coarse: &[usize]) -> Self {
+        Self { label: coarse.iter().map(|&vertex| self.label[vertex]).collect(), weights: self.weights }
+    }
+
+    /// The most that a side may weigh.
+    fn limit(&self) -> i64 {
+        // Weights are counts of dofs.
+        #[allow(clippy::cast_possible_truncation)]
+        let limit = (BALANCE * self.weights.iter().sum::<i64>() as f64) as i64;
+        limit
+    }
+}
+
+/// A separator whose vertices are moved to one of the sides; the memory for that.
+struct Mover<'g> {
+    graph: &'g Graph,
+    separator: Separator,
+    /// The side that vertices are moved to.
+    side: usize,
+    /// For each vertex of the separator, the weight of its neighbors on the other side: they would take its place.
+    beyond: Vec<i64>,
+    /// Vertices of the separator by the weight that the separator loses with them; some entries are outdated.
+    queue: BinaryHeap<(i64, Reverse<usize>)>,
+    /// Vertices that have changed their label, with the one they had.
+    log: Vec<(usize, usize)>,
+}
+
+impl<'g> Mover<'g> {
+    fn new(graph: &'g Graph, separator: Separator) -> Self {
+        Self { graph, separator, side: 0, beyond: vec![0; graph.size()], queue: BinaryHeap::new(), log: Vec::new() }
+    }
+
+    fn gain(&self, vertex: usize) -> i64 {
+        self.graph.weight(vertex) - self.beyond[vertex]
+    }
+
+    fn offer(&mut self, vertex: usize) {
+        self.queue.push((self.gain(vertex), Reverse(vertex)));
+    }
+
+    /// Takes a vertex of the separator up into the queue.
+    fn enter(&mut self, vertex: usize) {
+        let other = 1 - self.side;
+        let beyond = self.graph.neighbors(vertex).iter().filter(|&&next| self.separator.label[next] == other);
+        self.beyond[vertex] = beyond.map(|&next| self.graph.weight(next)).sum();
+        self.offer(vertex);
+    }
+
+    /// The vertex with which the separator loses most.
+    fn best(&mut self) -> Option<usize> {
+        while let Some((gain, Reverse(vertex))) = self.queue.pop() {
+            if self.separator.label[vertex] == BETWEEN && self.gain(vertex) == gain {
+                return Some(vertex);
+            }
+        }
+        None
+    }
+
+    fn relabel(&mut self, vertex: usize, to: usize) -> usize {
+        let from = std::mem::replace(&mut self.separator.label[vertex], to);
+        self.separator.weights[from] -= self.graph.weight(vertex);
+        self.separator.weights[to] += self.graph.weight(vertex);
+        from
+    }
+
+    /// Moves a vertex from the separator to the side; its neighbors on the other side take its place.
+    fn shift(&mut self, vertex: usize) {
+        let (graph, other) = (self.graph, 1 - self.side);
+        self.relabel(vertex, self.side);
+        self.log.push((vertex, BETWEEN));
+        for &neighbor in graph.neighbors(vertex) {
+            if self.separator.label[neighbor] != other {
+                continue;
+            }
+            self.relabel(neighbor, BETWEEN);
+            self.log.push((neighbor, other));
+            for &next in graph.neighbors(neighbor) {
+                if self.separator.label[next] == BETWEEN {
+                    self.beyond[next] -= graph.weight(neighbor);
+                    self.offer(next);
+                }
+            }
+            self.enter(neighbor);
+        }
+    }
+
+    /// One pass of Fiduccia and Mattheyses (19th Design Automation Conference, 1982) toward a side: the best moves one
+    /// after the other, also where they make the separator heavier for a while; what is kept is the best separator met.
+    /// Whether that is better than the one before.
+    fn pass(&mut self, side: usize) -> bool {
+        self.side = side;
+        self.log.clear();
+        self.queue.clear();
+        for vertex in 0..self.graph.size() {
+            if self.separator.label[vertex] == BETWEEN {
+                self.enter(vertex);
+            }
+        }
+        let (limit, start) = (self.separator.limit(), self.separator.cost());
+        let (mut best, mut kept, mut idle) = (start, 0, 0);
+        while idle < PATIENCE {
+            let Some(vertex) = self.best() else { break };
+            let weights = self.separator.weights;
+            if weights[side] + self.graph.weight(vertex) > limit && weights[side] >= weights[1 - side] {
+                break;
+            }
+            self.shift(vertex);
+            let cost = self.separator.cost();
+            idle += 1;
+            if cost < best {
+                (best, kept, idle) = (cost, self.log.len(), 0);
+            }
+        }
+        for (vertex, from) in self.log.split_off(kept).into_iter().rev() {
+            self.relabel(vertex, from);
+        }
+        best < start
+    }
+}
+
+/// Makes a separator lighter, or better balanced: passes toward one side and the other, the lighter one first, until
+/// neither helps. A pass that may go both ways at once would only toss vertices to and fro: a slanted separator becomes
+/// straight by wandering.
+pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
+    let mut side = usize::from(separator.weights[1] < separator.weights[0]);
+    let mut mover = Mover::new(graph, separator);
+    let mut idle = 0;
+    for _ in 0..PASSES {
+        idle = if mover.pass(side) { 0 } else { idle + 1 };
+        side = 1 - side;
+        if idle == 2 {
+            break;
+        }
+    }
+    mover.separator
+}
+
+/// Grows side 0 from a vertex, always by the vertex that makes its boundary lightest, until it weighs as much as the rest.
+pub(super) fn grow(graph: &Graph, seed: usize) -> Separator {
+    let mut label = vec![1; graph.size()];
+    label[seed] = BETWEEN;
+    let mut mover = Mover::new(graph, Separator::new(graph, label));
+    mover.enter(seed);
+    while mover.separator.weights[0] < mover.separator.weights[1] {
+        match mover.best() {
+            Some(vertex) => mover.shift(vertex),
+            None => break,
+        }
+    }
+    mover.separator
+}
