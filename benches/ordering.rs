@@ -22,6 +22,8 @@ fn main() {
     measure("quarter of a ball, 12 × 12 × 20 hex8", &ball, 0.02, 9);
     let plate = Solid::block([10.0, 10.0, 0.4], [60, 60, 3], MATERIAL);
     measure("thick plate, 60 × 60 × 3 hex8", &plate, 0.1, 5);
+    let beam = Solid::block([1.0, 1.0, 100.0], [3, 3, 300], MATERIAL);
+    measure("slender beam, 3 × 3 × 300 hex8", &beam, 0.33, 9);
     measure("plate of 300² quad4", &Solid::rectangle([1.0; 2], [300; 2], MATERIAL), 1.0 / 300.0, 5);
     measure("disc of 100² quad4", &Solid::disc(1.0, 100, MATERIAL), 0.02, 9);
 }

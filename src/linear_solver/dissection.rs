@@ -105,7 +105,7 @@ mod tests {
     use faer::sparse::SymbolicSparseColMat;
 
     /// The pattern with these pairs, both triangles.
-    pub(super) fn pattern(n: usize, pairs: &[(usize, usize)]) -> SymbolicSparseColMat<usize> {
+    fn pattern(n: usize, pairs: &[(usize, usize)]) -> SymbolicSparseColMat<usize> {
         let mut columns: Vec<Vec<usize>> = (0..n).map(|i| vec![i]).collect();
         for &(i, j) in pairs {
             columns[i].push(j);

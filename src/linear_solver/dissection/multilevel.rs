@@ -6,7 +6,7 @@ use super::separator::{Separator, grow, refine};
 /// Size of the graph that a separator is sought on from scratch.
 const COARSEST: usize = 50;
 
-/// The most that a vertex of it may weigh, as the share of the whole that is one in so many.
+/// A vertex of it weighs no more than one part in so many of the whole.
 const HEAVIEST: i64 = 33;
 
 /// Vertices of it that a side is grown from.
