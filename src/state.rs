@@ -217,7 +217,8 @@ impl<T: Real> ContactState<T> {
         &self.lambda_a
     }
 
-    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back.
+    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in the
+    /// frame of the obstacle, where there is one that moves.
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
     }

@@ -299,7 +299,7 @@ impl<T: Real> Correction<'_, T> {
     pub fn push_velocity(&mut self) {
         let rows = std::mem::take(&mut self.buffers.closed);
         let impulses = std::mem::take(&mut self.buffers.impulses);
-        self.apply_impulses(&rows, &impulses);
+        self.apply(&rows, &impulses);
         for (&row, &impulse) in rows.iter().zip(&impulses).filter(|(_, impulse)| **impulse != T::zero()) {
             self.contacts.lambda_a[row] = -T::of(self.h) * impulse;
         }
@@ -308,14 +308,20 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Applies impulses to v along rows, v ← v + M⁻¹ Gᵀ impulses, and the change of damping forces to a. They are booked as
-    /// impulses of their contacts, and the energy they take as dissipated by these.
+    /// impulses of their contacts, and the energy they take, seen from the obstacle, as dissipated by these.
     pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) {
+        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
+        self.apply(rows, impulses);
+    }
+
+    /// The same if the rates of the rows are known.
+    fn apply(&mut self, rows: &[usize], impulses: &[T]) {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return;
         }
         self.projection.prepare(self.g, rows);
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
-        let Buffers { jump, change, damping, before, .. } = &mut **buffers;
+        let Buffers { jump, rates, change, damping, before, .. } = &mut **buffers;
         jump.clear();
         jump.extend(rows.iter().map(|&row| g.product(row, &new.v)));
         for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
@@ -327,7 +333,8 @@ impl<T: Real> Correction<'_, T> {
         for ((&row, &impulse), &before) in rows.iter().zip(impulses.iter()).zip(jump.iter()) {
             let gain = impulse * T::of(0.5) * (before + g.product(row, &new.v));
             **energy += gain;
-            contacts.dissipated[row] -= gain;
+            // An obstacle that moves does work; what is lost is lost in its frame.
+            contacts.dissipated[row] -= gain + impulse * rates[row].rate;
         }
         if !change.is_empty() {
             change.fill(T::zero());
@@ -392,13 +399,14 @@ impl<T: Real> Correction<'_, T> {
         compliance
     }
 
-    /// The gap rate of the bodies along a row, without that of the obstacle.
-    pub fn rate(&self, row: usize) -> T {
-        self.g.product(row, &self.new.v)
+    /// The rate of the gap of a row.
+    pub fn rate(&mut self, row: usize) -> T {
+        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
+        self.g.product(row, &self.new.v) + self.buffers.rates[row].rate
     }
 
-    /// Applies an impulse along a row that changes the kinetic energy by `energy`, as far as there is one: the bodies leave
-    /// each other faster, or with a negative energy slower.
+    /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as there
+    /// is one: the bodies leave each other faster, or with a negative energy slower.
     pub fn exchange_energy(&mut self, row: usize, energy: T) {
         let (s, rate) = (self.compliance(row), self.rate(row));
         if s > T::zero() && energy != T::zero() && energy.is_finite() {
@@ -454,9 +462,10 @@ impl<T: Real> Correction<'_, T> {
         closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum()
     }
 
-    /// Changes the kinetic energy by `energy` through impulses in proportion to the raw multipliers of the closed rows, as far
-    /// as there is any.
+    /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw multipliers of
+    /// the closed rows, as far as there is any.
     pub(super) fn exchange_by_forces(&mut self, energy: T) {
+        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
         impulses.clear();
@@ -465,7 +474,7 @@ impl<T: Real> Correction<'_, T> {
         let size = rows.len();
         let (mut square, mut rate) = (T::zero(), T::zero());
         for (i, (&row, &x)) in rows.iter().zip(&impulses).enumerate() {
-            rate += x * self.rate(row);
+            rate += x * (self.g.product(row, &self.new.v) + self.buffers.rates[row].rate);
             let column = &self.buffers.s[i * size..(i + 1) * size];
             square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
         }
@@ -475,7 +484,7 @@ impl<T: Real> Correction<'_, T> {
             for x in &mut impulses {
                 *x *= factor;
             }
-            self.apply_impulses(&rows, &impulses);
+            self.apply(&rows, &impulses);
         }
         self.buffers.closed = rows;
         self.buffers.impulses = impulses;
