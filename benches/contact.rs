@@ -95,8 +95,8 @@ fn measure(n: usize) {
     sample(&mut rows, if n > 25 { 5 } else { 15 });
 }
 
-/// Reads so many numbers from memory, twice: what a solve would take that does nothing else (a sixth of what is stored, upper
-/// halves of blocks, it need not read).
+/// Reads so many numbers from memory, twice: what a solve would take that does nothing else (upper halves of blocks are
+/// stored, and need not be read).
 fn reading(name: &str, entries: usize) -> Row<'static> {
     let numbers = vec![1.0_f64; entries];
     let run = move || {

@@ -10,6 +10,7 @@ mod redistribute;
 mod singular;
 
 pub use bipenalty::bipenalty;
+pub(crate) use blend::dispersion_weight;
 pub use blend::{blend, optimal_weight};
 pub use courant::courant;
 pub use lump::{lump, lump_diagonal};

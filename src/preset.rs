@@ -1,6 +1,5 @@
 //! Schemes, masses and corrections that go together, by name.
 
-use crate::analysis::period_elongation;
 use crate::corrector::Corrector;
 use crate::error::{Error, Result};
 use crate::integrator::{Bathe, CdLagrange, GeneralizedAlpha, TimeIntegrator};
@@ -119,8 +118,9 @@ impl Preset {
         if explicit {
             return Ok(Combination::diagonal(lumped.len(), &[], &[])?.into_matrix(lumped));
         }
-        let elongation = period_elongation(&self.integrator().tableau()).unwrap_or(0.0);
-        let weight = (0.5 + 12.0 * elongation * courant * courant).min(1.0);
+        // (The schemes of the presets are of second order.)
+        let weight =
+            mass::dispersion_weight(&self.integrator().tableau(), courant).map_or(0.5, |weight| weight.min(1.0));
         let blend = mass::blend(consistent, &lumped, weight)?;
         let by = Redistribution::Tapered { neighbors, fraction: TAPER };
         mass::redistribute_consistent(blend.as_ref(), contact, groups, by)

@@ -86,17 +86,21 @@ pub fn optimal_weight(tableau: &Tableau, courant: f64) -> Result<f64> {
         let range = "finite and not negative";
         return Err(Error::Parameter { name: "the Courant number", value: courant, range });
     }
-    let Some(elongation) = period_elongation(tableau) else {
+    let Some(weight) = dispersion_weight(tableau, courant) else {
         return Err(Error::Incompatible {
             part: "the scheme of the blending weight".into(),
             reason: "its free oscillations err at first order, which no mass matrix makes up for",
         });
     };
-    let weight = 0.5 + 12.0 * elongation * courant * courant;
     if weight < 1.5 {
         Ok(weight)
     } else {
         let range = "below 3/2, or no blend is positive definite; take a smaller step";
         Err(Error::Parameter { name: "the blending weight for this Courant number", value: weight, range })
     }
+}
+
+/// The weight of [`optimal_weight`] whether or not a blend with it is definite; `None` for schemes that err at first order.
+pub(crate) fn dispersion_weight(tableau: &Tableau, courant: f64) -> Option<f64> {
+    period_elongation(tableau).map(|elongation| 0.5 + 12.0 * elongation * courant * courant)
 }

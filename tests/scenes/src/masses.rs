@@ -1,10 +1,9 @@
 //! What may be done with the mass of a body that touches others: lumped, consistent, blended, redistributed.
 
-use contact_dynamics::analysis::period_elongation;
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::mass::{self, Redistribution};
 use contact_dynamics::tableau::Tableau;
-use contact_dynamics::{LinearSystem, Mass, Result};
+use contact_dynamics::{Error, LinearSystem, Mass, Result};
 
 /// A mass matrix, diagonal or not.
 #[derive(Clone, Debug)]
@@ -99,8 +98,12 @@ impl Treatment {
     /// The matrix for a scheme whose Courant number at the contact is given.
     pub fn mass(self, body: &Body, tableau: &Tableau, courant: f64) -> Result<MassMatrix> {
         let lumped = mass::lump(body.consistent.as_ref())?;
-        let elongation = period_elongation(tableau).unwrap_or(0.0);
-        let weight = (0.5 + 12.0 * elongation * courant * courant).clamp(0.0, 1.0);
+        let weight = match mass::optimal_weight(tableau, courant) {
+            Ok(weight) => weight.clamp(0.0, 1.0),
+            // Beyond what is definite: the consistent mass. No optimum: halfway.
+            Err(Error::Parameter { .. }) => 1.0,
+            Err(_) => 0.5,
+        };
         let blend = || mass::blend(body.consistent.as_ref(), &lumped, weight);
         let by = |takers| match takers {
             Takers::Neighbors => Redistribution::Neighbors(body.stiffness.symbolic()),
