@@ -341,7 +341,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// Weights of d in what rigid rows constrain, and in the displacements and accelerations of the balance.
     fn weights(&self) -> [T; 3] {
         let rigid = self.stage.contact.as_ref().map_or(self.stage.recovery.weights()[0], |target| target.row.weight);
-        let [balance_u, _, balance_a] = self.stage.balance.as_ref().unwrap_or(&self.stage.recovery).weights();
+        let [balance_u, _, balance_a] = self.stage.balanced().weights();
         [rigid, balance_u, balance_a]
     }
 
@@ -418,7 +418,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, clock, constraints, g, .. } = self;
         let Workspace { interface, rows, balance, .. } = work;
         let t = clock.at(stage.load);
-        let known = self.iterate.is_some() || stage.balance.as_ref().unwrap_or(&stage.recovery).reads_past(2);
+        let known = self.iterate.is_some() || stage.balanced().reads_past(2);
         // The ū of a balance is not read again: it may be overwritten. (If this is called again ū does not depend on d.)
         let motion = match (&stage.balance, balance.as_mut()) {
             (Some(_), Some(balance)) => {

@@ -167,7 +167,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
         // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more, or has
         // fallen far; or no force can tell the displacements before from those after.
-        let [in_u, in_v, _] = self.stage.balance.as_ref().unwrap_or(&self.stage.recovery).weights();
+        let [in_u, in_v, _] = self.stage.balanced().weights();
         let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));
         let small = size <= displacement * whole || moved <= 1e4 * resolution;

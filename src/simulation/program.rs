@@ -179,10 +179,9 @@ pub(crate) struct CompiledStage<T> {
 }
 
 impl<T: Real> CompiledStage<T> {
-    /// Weights of the unknown in the displacements of the state and of the balance.
-    pub(crate) fn displacement_weights(&self) -> [T; 2] {
-        let balance = self.balance.as_ref().unwrap_or(&self.recovery);
-        [self.recovery.weights()[0], balance.weights()[0]]
+    /// The rows at which the balance holds.
+    pub(crate) fn balanced(&self) -> &ScaledRows<T> {
+        self.balance.as_ref().unwrap_or(&self.recovery)
     }
 
     /// β: a raw multiplier λ of the stage changes the momentum by h β λ.

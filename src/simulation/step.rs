@@ -144,7 +144,7 @@ impl<T: Real> Simulation<'_, T> {
                     let mut prediction = Prediction {
                         h: clock.h * stage.end,
                         t: new.t,
-                        weights: stage.displacement_weights(),
+                        weights: [stage.recovery.weights()[0], stage.balanced().weights()[0]],
                         g,
                         projection,
                         solver: &mut **contact_solver,
