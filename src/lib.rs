@@ -26,6 +26,7 @@ mod sparse;
 mod state;
 mod system;
 pub mod tableau;
+mod threads;
 pub mod verify;
 
 pub use contact::{ContactConstraint, ContactLaw, LinearRows, NodesOnObstacle};

@@ -4,6 +4,7 @@ mod by_body;
 mod cholesky;
 mod diagonal;
 mod dissection;
+pub(crate) mod forest;
 mod ordering;
 
 pub use by_body::ByBody;

@@ -31,7 +31,8 @@ pub trait Real:
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
-    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw};
+    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw, sweep};
+    use crate::linear_solver::forest::Forest;
     use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
     use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
     use faer::linalg::matmul::matmul;
@@ -104,13 +105,15 @@ pub(crate) mod kernels {
         fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
         /// `y = c A x` for symmetric A.
         fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
-        /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller.
+        /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller. Only
+        /// supernodal factors use threads.
         fn cholesky(
             kind: Factorization,
             symbolic: &SymbolicCholesky<usize>,
             a: SparseColMatRef<'_, usize, Self>,
             values: &mut [Self],
             pivots: &mut [Self],
+            par: Par,
             memory: &mut MemBuffer,
         ) -> Result<(), usize>;
         /// Solves in place for the columns of `rhs` with a supernodal factor.
@@ -129,6 +132,17 @@ pub(crate) mod kernels {
         fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
         /// The backward sweep over `columns`; entries behind them hold the solution.
         fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
+        /// The forward sweep over the interior for one right-hand side `b`, of which each column finds its own entry through
+        /// `order`; `w` are the work vectors of the forest.
+        fn forest_forward(
+            factor: Supernodal<'_, Self>,
+            forest: &Forest,
+            b: &[Self],
+            order: Option<&[usize]>,
+            w: &mut [Self],
+        );
+        /// The backward sweep over the interior.
+        fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]);
         /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots were
         /// positive.
         fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool;
@@ -141,6 +155,7 @@ pub(crate) mod kernels {
             kind: Factorization,
             symbolic: &SymbolicCholesky<usize>,
             columns: usize,
+            par: Par,
         ) -> faer::dyn_stack::StackReq;
     }
 
@@ -273,6 +288,7 @@ pub(crate) mod kernels {
         a: SparseColMatRef<'_, usize, T>,
         values: &mut [T],
         pivots: &mut [T],
+        par: Par,
         memory: &mut MemBuffer,
     ) -> Result<(), usize> {
         let stack = MemStack::new(memory);
@@ -283,7 +299,7 @@ pub(crate) mod kernels {
                     a,
                     Side::Lower,
                     LltRegularization::default(),
-                    Par::Seq,
+                    par,
                     stack,
                     Spec::default(),
                 )
@@ -426,7 +442,7 @@ pub(crate) mod kernels {
         let height = factor.symbolic.nrows() - skipped;
         let width = values.len().checked_div(height).unwrap_or(0);
         if width == 1 {
-            return super::sweep::forward(factor, columns, Columns { values, skipped, scratch });
+            return sweep::forward(factor, columns, Columns { values, skipped, scratch });
         }
         for supernode in supernodes(factor, &columns) {
             let panel = Panel::new(factor, supernode, &columns);
@@ -453,7 +469,7 @@ pub(crate) mod kernels {
         let height = factor.symbolic.nrows() - skipped;
         let width = values.len().checked_div(height).unwrap_or(0);
         if width == 1 {
-            return super::sweep::backward(factor, columns, Columns { values, skipped, scratch });
+            return sweep::backward(factor, columns, Columns { values, skipped, scratch });
         }
         for supernode in supernodes(factor, &columns).rev() {
             let panel = Panel::new(factor, supernode, &columns);
@@ -513,9 +529,10 @@ pub(crate) mod kernels {
                     a: SparseColMatRef<'_, usize, Self>,
                     values: &mut [Self],
                     pivots: &mut [Self],
+                    par: Par,
                     memory: &mut MemBuffer,
                 ) -> Result<(), usize> {
-                    cholesky(kind, symbolic, a, values, pivots, memory)
+                    cholesky(kind, symbolic, a, values, pivots, par, memory)
                 }
                 fn supernodal_solve(
                     symbolic: &SymbolicCholesky<usize>,
@@ -540,6 +557,18 @@ pub(crate) mod kernels {
                 fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
                     supernodal_backward(factor, columns, x);
                 }
+                fn forest_forward(
+                    factor: Supernodal<'_, Self>,
+                    forest: &Forest,
+                    b: &[Self],
+                    order: Option<&[usize]>,
+                    w: &mut [Self],
+                ) {
+                    sweep::forest_forward(&sweep::Interior { factor, forest }, b, order, w);
+                }
+                fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]) {
+                    sweep::forest_backward(&sweep::Interior { factor, forest }, w);
+                }
                 fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool {
                     let a = MatMut::from_column_major_slice_mut(values, size, size);
                     let (regularization, stack) = (LltRegularization::default(), MemStack::new(memory));
@@ -558,12 +587,11 @@ pub(crate) mod kernels {
                     kind: Factorization,
                     symbolic: &SymbolicCholesky<usize>,
                     columns: usize,
+                    par: Par,
                 ) -> faer::dyn_stack::StackReq {
                     let solve = symbolic.solve_in_place_scratch::<$scalar>(columns, Par::Seq);
                     let factorize = match kind {
-                        Factorization::Llt => {
-                            symbolic.factorize_numeric_llt_scratch::<$scalar>(Par::Seq, Spec::default())
-                        }
+                        Factorization::Llt => symbolic.factorize_numeric_llt_scratch::<$scalar>(par, Spec::default()),
                         Factorization::Ldlt => {
                             symbolic.factorize_numeric_ldlt_scratch::<$scalar>(Par::Seq, Spec::default())
                         }

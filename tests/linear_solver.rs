@@ -46,6 +46,15 @@ fn grid(side: usize) -> Vec<(usize, usize)> {
     pairs
 }
 
+/// A cube in which every node has 26 neighbors.
+fn cube(side: usize) -> Vec<(usize, usize)> {
+    let n = side * side * side;
+    let place = move |dof: usize| [dof % side, dof / side % side, dof / (side * side)];
+    let near = move |i: usize, j: usize| place(i).iter().zip(place(j)).all(|(a, b)| a.abs_diff(b) <= 1);
+    let reach = 1 + side + side * side;
+    (0..n).flat_map(|j| (j + 1..n.min(j + reach + 1)).map(move |i| (j, i))).filter(|&(i, j)| near(i, j)).collect()
+}
+
 fn dense(n: usize) -> Vec<(usize, usize)> {
     (0..n).flat_map(|i| (0..i).map(move |j| (j, i))).collect()
 }
@@ -268,6 +277,16 @@ fn condensation_is_the_same_solution_in_two_halves() {
             check_condensation::<f32>(&Automatic, n, &pairs, &last, 2e-3);
         }
     }
+}
+
+/// Large enough that branches of the factor are swept apart.
+#[test]
+fn large_bodies_are_the_same_solution_in_two_halves() {
+    let (n, pairs) = (24 * 24 * 24, cube(24));
+    for last in [vec![], vec![0, n - 1], (0..24).collect(), (0..n).step_by(701).collect()] {
+        check_condensation::<f64>(&Cholesky::default(), n, &pairs, &last, 1e-11);
+    }
+    check_condensation::<f32>(&Cholesky::default(), n, &pairs, &[5, 900, n - 3], 2e-3);
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
+use super::forest::Forest;
 use super::ordering::{self, Ordering};
 use super::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 use crate::real::kernels::{Columns, Factorization as Kind, Simplicial, Supernodal};
-use crate::sparse;
+use crate::{sparse, threads};
+use faer::Par;
 use faer::dyn_stack::MemBuffer;
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -75,11 +77,16 @@ struct Factor<T: Real> {
     kind: Kind,
     values: Vec<T>,
     memory: MemBuffer,
+    /// What `memory` is made for.
+    par: Par,
     /// Right-hand sides that `memory` has room for.
     columns: usize,
     /// Pivots in the numbering of the matrix.
     pivots: Vec<T>,
-    /// One right-hand side in the order of elimination.
+    /// The interior of a supernodal factor, and the work vectors of its supernodes.
+    forest: Option<Forest>,
+    work: Vec<T>,
+    /// One right-hand side in the order of elimination; what belongs to the forest is in `work`.
     sweep: Vec<T>,
     /// For each dof of the interface, its place among those eliminated last.
     interface: Vec<usize>,
@@ -114,12 +121,18 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
             SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
         };
-        let scratch = T::cholesky_scratch(kind, &symbolic, 1);
+        let par = threads::all(values.len());
+        let scratch = T::cholesky_scratch(kind, &symbolic, 1, par);
         let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
         let n = symbolic.nrows();
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
         let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
+        let forest = match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(_) => None,
+            SymbolicCholeskyRaw::Supernodal(raw) => Some(Forest::new(raw, first)),
+        };
+        let work = memory::zeros(forest.as_ref().map_or(0, Forest::work), 1, "the sweeps of a sparse Cholesky factor")?;
         let (pivots, sweep) = (vec![T::zero(); n], vec![T::zero(); n]);
         let what = "the interface of a sparse Cholesky factor";
         let trailing = memory::zeros(COLUMNS, last.len(), what)?;
@@ -130,8 +143,11 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             kind,
             values,
             memory,
+            par,
             columns: 1,
             pivots,
+            forest,
+            work,
             sweep,
             interface,
             trailing,
@@ -155,13 +171,67 @@ impl<T: Real> Factor<T> {
         self.symbolic.nrows()
     }
 
-    /// Columns of the interior, and of the interface, in the order of elimination.
-    fn interior(&self) -> Range<usize> {
-        0..self.size() - self.interface.len()
-    }
-
+    /// Columns of the interface in the order of elimination; those of the interior are before them.
     fn trailing(&self) -> Range<usize> {
         self.size() - self.interface.len()..self.size()
+    }
+
+    /// Takes a right-hand side, and sweeps forward over the columns before `end`.
+    fn forward(&mut self, rhs: &[T], end: usize) {
+        let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
+        let order = symbolic.perm().map(|perm| perm.arrays().0);
+        let mut behind = 0;
+        if let (Some(forest), SymbolicCholeskyRaw::Supernodal(symbolic)) = (&*forest, symbolic.raw()) {
+            T::forest_forward(Supernodal { symbolic, values }, forest, rhs, order, work);
+            behind = forest.end;
+        }
+        let x = &mut x[behind..];
+        match order {
+            Some(order) => x.iter_mut().zip(&order[behind..]).for_each(|(x, &dof)| *x = rhs[dof]),
+            None => x.copy_from_slice(&rhs[behind..]),
+        }
+        if let Some(forest) = forest {
+            for &root in &forest.roots {
+                for (&place, &change) in forest.places(root).iter().zip(&work[forest.update(root)]) {
+                    x[place] += change;
+                }
+            }
+        }
+        sweep(Sweep::Forward, (symbolic, values), behind..end, x, behind, below);
+    }
+
+    /// Sweeps backward over the columns before `end`; those behind are solved for.
+    fn backward(&mut self, end: usize) {
+        let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
+        let behind = forest.as_ref().map_or(0, |forest| forest.end);
+        let x = &mut x[behind..];
+        sweep(Sweep::Backward, (symbolic, values), behind..end, x, behind, below);
+        if let (Some(forest), SymbolicCholeskyRaw::Supernodal(symbolic)) = (forest, symbolic.raw()) {
+            for &root in &forest.roots {
+                for (&place, known) in forest.places(root).iter().zip(&mut work[forest.update(root)]) {
+                    *known = x[place];
+                }
+            }
+            T::forest_backward(Supernodal { symbolic, values }, forest, work);
+        }
+    }
+
+    /// Brings the solution into the order of the matrix.
+    fn give(&self, solution: &mut [T]) {
+        let Self { symbolic, forest, work, sweep: x, .. } = self;
+        let order = symbolic.perm().map(|perm| perm.arrays().0);
+        let mut put = |columns: Range<usize>, x: &[T]| match order {
+            Some(order) => x.iter().zip(&order[columns]).for_each(|(&x, &dof)| solution[dof] = x),
+            None => solution[columns.clone()].copy_from_slice(&x[..columns.len()]),
+        };
+        let mut behind = 0;
+        if let Some(forest) = forest {
+            for s in 0..forest.count() {
+                put(forest.columns(s), &work[forest.offsets[s]..]);
+            }
+            behind = forest.end;
+        }
+        put(behind..x.len(), &x[behind..]);
     }
 }
 
@@ -207,10 +277,10 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { symbolic, kind, values, pivots, memory, cursor, .. } = self;
+        let Self { symbolic, kind, values, pivots, memory, par, cursor, .. } = self;
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
-        T::cholesky(*kind, symbolic, a, values, pivots, memory).map_err(singular)?;
+        T::cholesky(*kind, symbolic, a, values, pivots, *par, memory).map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());
         // Written so that NaN is refused too.
         let sound = |(dof, &pivot): (usize, &T)| pivot > negligible * sparse::entry(a, dof, dof);
@@ -225,18 +295,16 @@ impl<T: Real> Factorization<T> for Factor<T> {
         let columns = rhs.len().checked_div(size).unwrap_or(0);
         if self.kind == Kind::Llt && columns > 1 {
             if columns > self.columns {
-                self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns));
+                self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns, self.par));
                 self.columns = columns;
             }
             T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
             return;
         }
-        let Self { symbolic, values, sweep: x, below, .. } = self;
         for column in rhs.chunks_exact_mut(size) {
-            permute(symbolic, column, x);
-            sweep(Sweep::Forward, (symbolic, values), 0..size, x, 0, below);
-            sweep(Sweep::Backward, (symbolic, values), 0..size, x, 0, below);
-            permute_back(symbolic, x, column);
+            self.forward(column, size);
+            self.backward(size);
+            self.give(column);
         }
     }
 
@@ -249,28 +317,11 @@ impl<T: Real> Factorization<T> for Factor<T> {
     }
 }
 
-/// Brings a vector into the order of elimination.
-fn permute<T: Real>(symbolic: &SymbolicCholesky<usize>, from: &[T], to: &mut [T]) {
-    match symbolic.perm() {
-        Some(perm) => to.iter_mut().zip(perm.arrays().0).for_each(|(x, &dof)| *x = from[dof]),
-        None => to.copy_from_slice(from),
-    }
-}
-
-/// Brings a vector from the order of elimination into that of the matrix.
-fn permute_back<T: Real>(symbolic: &SymbolicCholesky<usize>, from: &[T], to: &mut [T]) {
-    match symbolic.perm() {
-        Some(perm) => from.iter().zip(perm.arrays().0).for_each(|(&x, &dof)| to[dof] = x),
-        None => to.copy_from_slice(from),
-    }
-}
-
 impl<T: Real> Condensation<T> for Factor<T> {
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
-        let (interior, trailing) = (self.interior(), self.trailing());
+        let trailing = self.trailing();
+        self.forward(rhs, trailing.start);
         let Self { symbolic, values, sweep: x, below, trailing: on_interface, interface: places, .. } = self;
-        permute(symbolic, rhs, x);
-        sweep(Sweep::Forward, (symbolic, values), interior, x, 0, below);
         let on_interface = &mut on_interface[..places.len()];
         on_interface.copy_from_slice(&x[trailing.clone()]);
         sweep(Sweep::Forward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
@@ -281,13 +332,12 @@ impl<T: Real> Condensation<T> for Factor<T> {
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) {
-        let interior = self.interior();
-        let Self { symbolic, values, sweep: x, below, interface: places, .. } = self;
-        for (&value, &place) in interface.iter().zip(places.iter()) {
-            x[interior.end + place] = value;
+        let first = self.trailing().start;
+        for (&value, &place) in interface.iter().zip(&self.interface) {
+            self.sweep[first + place] = value;
         }
-        sweep(Sweep::Backward, (symbolic, values), interior, x, 0, below);
-        permute_back(symbolic, x, solution);
+        self.backward(first);
+        self.give(solution);
     }
 
     fn solve(&mut self, forces: &mut [T]) {

@@ -2,10 +2,14 @@
 //!
 //! Four columns of a supernode go together: every entry of L is read once, every entry of the vector a quarter as often. The
 //! loops are plain; pulp compiles them for the vector units of the machine that they run on.
+//!
+//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; what
+//! is eliminated behind it column by column.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these
 
 use super::Real;
 use super::kernels::{Columns, Supernodal, supernodes};
+use crate::linear_solver::forest::{Forest, Plan};
 use faer::traits::pulp::Arch;
 use std::ops::Range;
 
@@ -14,6 +18,121 @@ const WIDTH: usize = 4;
 
 /// Sums that are kept side by side in a dot product.
 const LANES: usize = 8;
+
+/// A factor, its forest, and a right-hand side that is read in this order.
+#[derive(Debug)]
+pub(super) struct Interior<'a, T> {
+    pub(super) factor: Supernodal<'a, T>,
+    pub(super) forest: &'a Forest,
+}
+
+/// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them what
+/// its parent has to add. `b` are the entries of the right-hand side, `order` where each column finds its own.
+pub(super) fn forest_forward<T: Real>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
+    forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
+}
+
+/// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry those of
+/// the roots know the solution on the rows below them.
+pub(super) fn forest_backward<T: Real>(interior: &Interior<'_, T>, w: &mut [T]) {
+    backward_plan(&interior.forest.plan, interior, 0, w);
+}
+
+/// What forward sweeps read.
+struct Forward<'a, T> {
+    interior: &'a Interior<'a, T>,
+    b: &'a [T],
+    order: Option<&'a [usize]>,
+}
+
+/// `w` begins with the work vector of supernode `from`.
+fn forward_plan<T: Real>(plan: &Plan, forward: &Forward<'_, T>, from: usize, w: &mut [T]) {
+    match plan {
+        Plan::Serial(range) => forward_serial(forward, range.clone(), from, w),
+        Plan::Stem(branch, stem) => {
+            forward_plan(branch, forward, from, w);
+            forward_serial(forward, stem.clone(), from, w);
+        }
+        Plan::Fork(branches, cut) => {
+            let offsets = &forward.interior.forest.offsets;
+            let (first, second) = w.split_at_mut(offsets[*cut] - offsets[from]);
+            crate::threads::join(
+                || forward_plan(&branches[0], forward, from, first),
+                || forward_plan(&branches[1], forward, *cut, second),
+            );
+        }
+    }
+}
+
+fn backward_plan<T: Real>(plan: &Plan, interior: &Interior<'_, T>, from: usize, w: &mut [T]) {
+    match plan {
+        Plan::Serial(range) => backward_serial(interior, range.clone(), from, w),
+        Plan::Stem(branch, stem) => {
+            backward_serial(interior, stem.clone(), from, w);
+            backward_plan(branch, interior, from, w);
+        }
+        Plan::Fork(branches, cut) => {
+            let offsets = &interior.forest.offsets;
+            let (first, second) = w.split_at_mut(offsets[*cut] - offsets[from]);
+            crate::threads::join(
+                || backward_plan(&branches[0], interior, from, first),
+                || backward_plan(&branches[1], interior, *cut, second),
+            );
+        }
+    }
+}
+
+fn forward_serial<T: Real>(forward: &Forward<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
+    Arch::new().dispatch(
+        #[inline(always)]
+        move || {
+            let Forward { interior: Interior { factor, forest }, b, order } = *forward;
+            let base = forest.offsets[from];
+            for s in range {
+                let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
+                let panel = Panel::whole(factor, s);
+                let own = &mut rest[..panel.rows];
+                let (top, update) = own.split_at_mut(panel.size);
+                match order {
+                    Some(order) => {
+                        top.iter_mut().zip(&order[forest.columns(s)]).for_each(|(x, &dof)| *x = b[dof]);
+                    }
+                    None => top.copy_from_slice(&b[forest.columns(s)]),
+                }
+                update.fill(T::zero());
+                for &child in forest.children(s) {
+                    let update = &below[forest.update(child).start - base..forest.update(child).end - base];
+                    for (&place, &change) in forest.places(child).iter().zip(update) {
+                        own[place] += change;
+                    }
+                }
+                panel.forward(own);
+            }
+        },
+    );
+}
+
+fn backward_serial<T: Real>(interior: &Interior<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
+    Arch::new().dispatch(
+        #[inline(always)]
+        move || {
+            let Interior { factor, forest } = interior;
+            let base = forest.offsets[from];
+            for s in range.rev() {
+                let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
+                let panel = Panel::whole(factor, s);
+                let own = &mut rest[..panel.rows];
+                panel.backward(own);
+                for &child in forest.children(s) {
+                    let known = &mut below[forest.update(child).start - base..forest.update(child).end - base];
+                    for (&place, known) in forest.places(child).iter().zip(known) {
+                        *known = own[place];
+                    }
+                }
+            }
+        },
+    );
+}
 
 /// Forward over `columns` for one right-hand side.
 pub(super) fn forward<T: Real>(factor: &Supernodal<'_, T>, columns: Range<usize>, x: Columns<'_, T>) {
@@ -70,6 +189,71 @@ impl<'a, T> Panel<'a, T> {
     fn leading(&self) -> usize {
         self.rows - self.pattern.len()
     }
+
+    /// All of a supernode.
+    #[inline(always)]
+    fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
+        let symbolic = factor.symbolic;
+        Self::new(factor, supernode, &(symbolic.supernode_begin()[supernode]..symbolic.supernode_end()[supernode]))
+    }
+}
+
+impl<T: Real> Panel<'_, T> {
+    /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
+    #[inline(always)]
+    fn forward(&self, w: &mut [T]) {
+        let size = self.size;
+        let mut column = 0;
+        while column + WIDTH <= size {
+            // The small triangle, column by column, then the rows below it.
+            for j in column..column + WIDTH {
+                let l = self.column(j, j);
+                let xj = w[j] / l[0];
+                w[j] = xj;
+                for (x, &l) in w[j + 1..column + WIDTH].iter_mut().zip(&l[1..]) {
+                    *x -= l * xj;
+                }
+            }
+            let (done, rest) = w.split_at_mut(column + WIDTH);
+            let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
+            subtract(std::array::from_fn(|k| done[column + k]), l, rest);
+            column += WIDTH;
+        }
+        for j in column..size {
+            let l = self.column(j, j);
+            let xj = w[j] / l[0];
+            w[j] = xj;
+            for (x, &l) in w[j + 1..].iter_mut().zip(&l[1..]) {
+                *x -= l * xj;
+            }
+        }
+    }
+
+    /// Solves for the columns: `w` has their right-hand sides, then the solution on the rows below.
+    #[inline(always)]
+    fn backward(&self, w: &mut [T]) {
+        // The columns that are no group of four are the last ones, as forward.
+        let groups = self.size - self.size % WIDTH;
+        for j in (groups..self.size).rev() {
+            let l = self.column(j, j);
+            w[j] = (w[j] - dot(&l[1..], &w[j + 1..])) / l[0];
+        }
+        let mut column = groups;
+        while column > 0 {
+            column -= WIDTH;
+            let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
+            let sums = dots(l, &w[column + WIDTH..]);
+            for k in (0..WIDTH).rev() {
+                let j = column + k;
+                let l = self.column(j, j);
+                let mut sum = w[j] - sums[k];
+                for (&x, &l) in w[j + 1..column + WIDTH].iter().zip(&l[1..]) {
+                    sum -= l * x;
+                }
+                w[j] = sum / l[0];
+            }
+        }
+    }
 }
 
 #[inline(always)]
@@ -80,34 +264,11 @@ fn forward_with<T: Real>(
 ) {
     for supernode in supernodes(factor, &columns) {
         let panel = Panel::new(factor, supernode, &columns);
-        let (start, size, leading) = (panel.start - skipped, panel.size, panel.leading());
+        let (start, leading) = (panel.start - skipped, panel.leading());
         let w = &mut scratch[..panel.rows];
         w[..leading].copy_from_slice(&x[start..start + leading]);
         w[leading..].fill(T::zero());
-        let mut column = 0;
-        while column + WIDTH <= size {
-            // The small triangle, column by column, then the rows below it.
-            for j in column..column + WIDTH {
-                let l = panel.column(j, j);
-                let xj = w[j] / l[0];
-                w[j] = xj;
-                for (x, &l) in w[j + 1..column + WIDTH].iter_mut().zip(&l[1..]) {
-                    *x -= l * xj;
-                }
-            }
-            let (done, rest) = w.split_at_mut(column + WIDTH);
-            let l: [&[T]; WIDTH] = std::array::from_fn(|k| panel.column(column + k, column + WIDTH));
-            subtract(std::array::from_fn(|k| done[column + k]), l, rest);
-            column += WIDTH;
-        }
-        for j in column..size {
-            let l = panel.column(j, j);
-            let xj = w[j] / l[0];
-            w[j] = xj;
-            for (x, &l) in w[j + 1..].iter_mut().zip(&l[1..]) {
-                *x -= l * xj;
-            }
-        }
+        panel.forward(w);
         x[start..start + leading].copy_from_slice(&w[..leading]);
         for (&row, &change) in panel.pattern.iter().zip(&w[leading..]) {
             x[row - skipped] += change;
@@ -129,27 +290,7 @@ fn backward_with<T: Real>(
         for (w, &row) in w[leading..].iter_mut().zip(panel.pattern) {
             *w = x[row - skipped];
         }
-        // The columns that are no group of four are the last ones, as forward.
-        let groups = size - size % WIDTH;
-        for j in (groups..size).rev() {
-            let l = panel.column(j, j);
-            w[j] = (w[j] - dot(&l[1..], &w[j + 1..])) / l[0];
-        }
-        let mut column = groups;
-        while column > 0 {
-            column -= WIDTH;
-            let l: [&[T]; WIDTH] = std::array::from_fn(|k| panel.column(column + k, column + WIDTH));
-            let sums = dots(l, &w[column + WIDTH..]);
-            for k in (0..WIDTH).rev() {
-                let j = column + k;
-                let l = panel.column(j, j);
-                let mut sum = w[j] - sums[k];
-                for (&x, &l) in w[j + 1..column + WIDTH].iter().zip(&l[1..]) {
-                    sum -= l * x;
-                }
-                w[j] = sum / l[0];
-            }
-        }
+        panel.backward(w);
         x[start..start + size].copy_from_slice(&w[..size]);
     }
 }

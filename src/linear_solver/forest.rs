@@ -1,0 +1,328 @@
+//! The elimination forest of a supernodal factor: who hands what to whom in a sweep, and what may go side by side.
+//!
+//! A sweep with a work vector for each supernode (its own rows, then those below it) needs nothing but that of the parent:
+//! forward a supernode adds what its children have for it, backward it hands its children what they need (Duff and Reid,
+//! ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may be swept at the same time. What is added
+//! to what, and in which order, is a matter of the factor alone: results are the same bit for bit on any number of threads.
+
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+use std::ops::Range;
+
+/// Scalars of a branch from which on a thread of its own is worth waking: a tenth of a millisecond of reading.
+const GRAIN: usize = 1 << 18;
+
+/// The supernodes of the interior, and how they hang together.
+#[derive(Debug)]
+pub struct Forest {
+    /// The first column that is not in the forest.
+    pub(crate) end: usize,
+    /// Where the work vector of each supernode begins; one more entry for the end.
+    pub(crate) offsets: Vec<usize>,
+    /// The children of each supernode, ascending, one list after the other.
+    children: Vec<usize>,
+    first_child: Vec<usize>,
+    /// For each row below a supernode its place in the work vector of the parent; of a root's rows, behind `end`.
+    places: Vec<usize>,
+    /// The first column of each supernode; one more entry for `end`.
+    begins: Vec<usize>,
+    /// Supernodes without a parent in the forest, ascending.
+    pub(crate) roots: Vec<usize>,
+    pub(crate) plan: Plan,
+}
+
+/// What is swept after what: forward from the branches to the stem, backward the other way round.
+#[derive(Debug)]
+pub(crate) enum Plan {
+    /// Supernodes one after the other.
+    Serial(Range<usize>),
+    /// A branch (all supernodes before those of the stem), then the stem.
+    Stem(Box<Plan>, Range<usize>),
+    /// Two branches that have nothing to do with each other; the second one begins with this supernode.
+    Fork(Box<[Plan; 2]>, usize),
+}
+
+impl Forest {
+    /// The supernodes whose columns all lie before `interior`.
+    pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>, interior: usize) -> Self {
+        let count = symbolic.supernode_end().partition_point(|&end| end <= interior);
+        let mut begins = symbolic.supernode_begin()[..count].to_vec();
+        let end = count.checked_sub(1).map_or(0, |last| symbolic.supernode_end()[last]);
+        begins.push(end);
+        let mut offsets = vec![0];
+        for s in 0..count {
+            offsets.push(offsets[s] + begins[s + 1] - begins[s] + symbolic.supernode(s).pattern().len());
+        }
+        let parents: Vec<usize> = (0..count)
+            .map(|s| match symbolic.supernode(s).pattern().iter().min() {
+                Some(&row) if row < end => begins.partition_point(|&begin| begin <= row) - 1,
+                _ => count, // a root
+            })
+            .collect();
+        let (children, first_child) = lists(&parents);
+        let mut forest = Self {
+            end,
+            children,
+            first_child,
+            places: Vec::new(),
+            begins,
+            roots: (0..count).filter(|&s| parents[s] == count).collect(),
+            plan: Plan::Serial(0..count),
+            offsets,
+        };
+        forest.places = forest.places_in_parents(symbolic, &parents);
+        forest.plan = Planner::new(&forest, &parents).plan(0..count);
+        forest
+    }
+
+    fn places_in_parents(&self, symbolic: &SymbolicSupernodalCholesky<usize>, parents: &[usize]) -> Vec<usize> {
+        let mut places = vec![0; self.offsets[parents.len()] - self.end];
+        let mut place_of = vec![0; symbolic.nrows()];
+        for parent in 0..parents.len() {
+            let size = self.size(parent);
+            for (row, place) in (self.begins[parent]..self.begins[parent + 1]).zip(0..) {
+                place_of[row] = place;
+            }
+            for (&row, place) in symbolic.supernode(parent).pattern().iter().zip(size..) {
+                place_of[row] = place;
+            }
+            for &child in self.children(parent) {
+                for (place, row) in places[self.below(child)].iter_mut().zip(symbolic.supernode(child).pattern()) {
+                    *place = place_of[*row];
+                }
+            }
+        }
+        for &root in &self.roots {
+            for (place, row) in places[self.below(root)].iter_mut().zip(symbolic.supernode(root).pattern()) {
+                *place = row - self.end;
+            }
+        }
+        places
+    }
+
+    /// Scalars in the work vectors of all supernodes.
+    pub(crate) fn work(&self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// The number of supernodes.
+    pub(crate) fn count(&self) -> usize {
+        self.begins.len() - 1
+    }
+
+    /// Where the rows below a supernode are among the work vectors of all.
+    #[inline]
+    pub(crate) fn update(&self, s: usize) -> Range<usize> {
+        self.offsets[s] + self.size(s)..self.offsets[s + 1]
+    }
+
+    /// The columns of a supernode.
+    #[inline]
+    pub(crate) fn columns(&self, s: usize) -> Range<usize> {
+        self.begins[s]..self.begins[s + 1]
+    }
+
+    /// How many columns a supernode has.
+    #[inline]
+    pub(crate) fn size(&self, s: usize) -> usize {
+        self.begins[s + 1] - self.begins[s]
+    }
+
+    #[inline]
+    pub(crate) fn children(&self, s: usize) -> &[usize] {
+        &self.children[self.first_child[s]..self.first_child[s + 1]]
+    }
+
+    /// Where the rows below a supernode are in the work vector of its parent; those of a root, behind `end`.
+    #[inline]
+    pub(crate) fn places(&self, s: usize) -> &[usize] {
+        &self.places[self.below(s)]
+    }
+
+    #[inline]
+    fn below(&self, s: usize) -> Range<usize> {
+        self.offsets[s] - self.begins[s]..self.offsets[s + 1] - self.begins[s + 1]
+    }
+
+    /// Scalars that a sweep reads of a supernode.
+    fn reads(&self, s: usize) -> usize {
+        self.size(s) * (self.offsets[s + 1] - self.offsets[s])
+    }
+}
+
+/// The children of each parent, and where the list of each begins; a parent that is no index has no list.
+fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
+    let count = parents.len();
+    let mut first = vec![0; count + 1];
+    for &parent in parents.iter().filter(|parent| **parent < count) {
+        first[parent + 1] += 1;
+    }
+    for s in 0..count {
+        first[s + 1] += first[s];
+    }
+    let mut next = first.clone();
+    let mut children = vec![0; first[count]];
+    for (s, &parent) in parents.iter().enumerate().filter(|(_, parent)| **parent < count) {
+        children[next[parent]] = s;
+        next[parent] += 1;
+    }
+    (children, first)
+}
+
+/// Cuts a forest into branches.
+struct Planner<'f> {
+    parents: &'f [usize],
+    /// Scalars of all supernodes before each one.
+    read_before: Vec<usize>,
+    /// For each supernode the first of its branch, if the branch has all those in between; else nothing.
+    first: Vec<Option<usize>>,
+}
+
+impl<'f> Planner<'f> {
+    fn new(forest: &Forest, parents: &'f [usize]) -> Self {
+        let mut read_before = vec![0];
+        let (mut first, mut members): (Vec<usize>, Vec<usize>) = (0..parents.len()).map(|s| (s, 1)).unzip();
+        for s in 0..parents.len() {
+            read_before.push(read_before[s] + forest.reads(s));
+            let parent = parents[s];
+            if parent < parents.len() {
+                first[parent] = first[parent].min(first[s]);
+                members[parent] += members[s];
+            }
+        }
+        let whole = |s: usize| (s + 1 - first[s] == members[s]).then_some(first[s]);
+        Self { parents, read_before, first: (0..parents.len()).map(whole).collect() }
+    }
+
+    fn reads(&self, range: &Range<usize>) -> usize {
+        self.read_before[range.end] - self.read_before[range.start]
+    }
+
+    /// A plan for a range that is a forest of its own.
+    fn plan(&self, range: Range<usize>) -> Plan {
+        if self.reads(&range) < 2 * GRAIN {
+            return Plan::Serial(range);
+        }
+        // The stem: roots as long as there is one tree only, and trees that are not worth a thread.
+        let mut end = range.end;
+        while let Some(first) = end.checked_sub(1).filter(|last| *last >= range.start).and_then(|last| self.first[last])
+        {
+            match first {
+                first if first <= range.start => end -= 1,
+                first if self.reads(&(first..end)) < GRAIN => end = first,
+                _ => break,
+            }
+        }
+        let branches = range.start..end;
+        let plan = match self.cut(&branches) {
+            Some(cut) => Plan::Fork(Box::new([self.plan(range.start..cut), self.plan(cut..end)]), cut),
+            None => return Plan::Serial(range),
+        };
+        if end == range.end { plan } else { Plan::Stem(Box::new(plan), end..range.end) }
+    }
+
+    /// The supernode at which a forest falls into two of about the same weight, both worth a thread.
+    fn cut(&self, range: &Range<usize>) -> Option<usize> {
+        // From the last tree to the first one.
+        let (mut cuts, mut end) = (Vec::new(), range.end);
+        while end > range.start {
+            // A tree that is not in one piece ends the search: what is before it stays together with it.
+            let Some(first) = self.first[end - 1].filter(|first| *first >= range.start) else { break };
+            cuts.push(first);
+            end = first;
+        }
+        let lighter = |&cut: &usize| self.reads(&(range.start..cut)).min(self.reads(&(cut..range.end)));
+        debug_assert!(cuts.iter().all(|&cut| (range.start..cut).all(|s| !(cut..range.end).contains(&self.parents[s]))));
+        cuts.into_iter().max_by_key(lighter).filter(|cut| lighter(cut) >= GRAIN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_solver::Ordering;
+    use crate::linear_solver::ordering::symbolic_cholesky;
+    use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
+    use faer::sparse::{SparseColMat, Triplet};
+
+    /// The factor of a grid with 27 neighbors, the dofs of one face last.
+    fn grid(sides: [usize; 3], ordering: &Ordering) -> (SymbolicCholesky<usize>, usize) {
+        let n = sides.iter().product();
+        let place = |dof: usize| [dof % sides[0], dof / sides[0] % sides[1], dof / (sides[0] * sides[1])];
+        let near = |i: usize, j: usize| place(i).iter().zip(place(j)).all(|(a, b)| a.abs_diff(b) <= 1);
+        let reach = 1 + sides[0] + sides[0] * sides[1];
+        let entries = (0..n).flat_map(|j| (j.saturating_sub(reach)..n.min(j + reach + 1)).map(move |i| (i, j)));
+        let entries: Vec<_> = entries.filter(|&(i, j)| near(i, j)).map(|(i, j)| Triplet::new(i, j, 1.0)).collect();
+        let a = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).unwrap();
+        let last: Vec<usize> = (0..sides[0]).collect();
+        (symbolic_cholesky(ordering, a.symbolic(), &last).unwrap(), n - last.len())
+    }
+
+    /// The order of a plan on one thread, and the number of forks; checks that branches are strangers to each other.
+    fn flatten(plan: &Plan, forest: &Forest, order: &mut Vec<usize>) -> usize {
+        match plan {
+            Plan::Serial(range) => {
+                order.extend(range.clone());
+                0
+            }
+            Plan::Stem(branch, stem) => {
+                let forks = flatten(branch, forest, order);
+                order.extend(stem.clone());
+                forks
+            }
+            Plan::Fork(branches, cut) => {
+                let begin = order.len();
+                let mut forks = 1 + flatten(&branches[0], forest, order);
+                assert_eq!(order.len(), *cut);
+                forks += flatten(&branches[1], forest, order);
+                for branch in [begin..*cut, *cut..order.len()] {
+                    let strangers = |s: usize| forest.children(s).iter().all(|child| branch.contains(child));
+                    assert!(branch.clone().all(strangers), "{branch:?}");
+                    assert!(branch.map(|s| forest.reads(s)).sum::<usize>() >= GRAIN);
+                }
+                forks
+            }
+        }
+    }
+
+    #[test]
+    fn plans_visit_every_supernode_once_after_its_children() {
+        for (sides, ordering, forks) in [
+            ([22, 22, 22], Ordering::NestedDissection, 1),
+            ([30, 30, 15], Ordering::NestedDissection, 3),
+            ([20, 20, 20], Ordering::MinimumDegree, 0),
+            ([14, 14, 14], Ordering::NestedDissection, 0),
+        ] {
+            let (symbolic, interior) = grid(sides, &ordering);
+            let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a solid") };
+            let forest = Forest::new(raw, interior);
+            assert!(forest.end <= interior && forest.count() > 1);
+            let mut order = Vec::new();
+            let found = flatten(&forest.plan, &forest, &mut order);
+            assert!(order.into_iter().eq(0..forest.count()));
+            assert!(found >= forks, "{sides:?}: {found} forks");
+        }
+    }
+
+    #[test]
+    fn rows_find_their_places_in_the_parent() {
+        let (symbolic, interior) = grid([15, 14, 13], &Ordering::NestedDissection);
+        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a solid") };
+        let forest = Forest::new(raw, interior);
+        let mut seen = 0;
+        for parent in 0..forest.count() {
+            let rows: Vec<usize> =
+                forest.columns(parent).chain(raw.supernode(parent).pattern().iter().copied()).collect();
+            for &child in forest.children(parent) {
+                assert!(child < parent);
+                let places = forest.places(child).iter().map(|&place| rows[place]);
+                assert!(places.eq(raw.supernode(child).pattern().iter().copied()), "{child} in {parent}");
+                seen += 1;
+            }
+        }
+        for &root in &forest.roots {
+            let rows = forest.places(root).iter().map(|place| place + forest.end);
+            assert!(rows.eq(raw.supernode(root).pattern().iter().copied()));
+        }
+        assert_eq!(seen + forest.roots.len(), forest.count());
+    }
+}
