@@ -150,7 +150,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn costs(all: &[Combination], elements: usize, repetitions: usize) -> Vec<Option<f64>> {
     let scene = Collision::paper(elements, 1e-3);
     let time = |row: &Combination| scene.time_per_step(row, repetitions).ok().filter(|time| time.is_finite());
-    let base = time(&Combination::reference());
+    let base = time(&combinations::reference());
     all.iter().map(|row| Some(time(row)? / base?)).collect()
 }
 

@@ -1,6 +1,7 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
 pub mod bars;
+pub mod combinations;
 pub mod disc;
 pub mod drops;
 pub mod hyperelastic;
