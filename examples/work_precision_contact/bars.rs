@@ -1,5 +1,6 @@
 //! Bars: two that collide, one that bounces.
 
+use crate::rows::Row;
 use crate::scene::{Errors, Model, Scene, force_errors};
 use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{Result, Simulation};
@@ -53,7 +54,7 @@ impl Scene for Colliding {
         self.title
     }
 
-    fn budget(&self) -> f64 {
+    fn budget(&self, _: &Row) -> f64 {
         2.8e6
     }
 
@@ -115,7 +116,7 @@ impl Scene for Bouncing {
         "A bar that bounces, four impacts"
     }
 
-    fn budget(&self) -> f64 {
+    fn budget(&self, _: &Row) -> f64 {
         2.8e6
     }
 

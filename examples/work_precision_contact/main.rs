@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         },
     };
     let references = rows::UNRELATED.map(|number| &rows[number]);
-    let (meshes, finest): (&[usize], _) = if output.quick { (&[4], 6) } else { (&[4, 8, 12, 16], 32) };
+    let (meshes, finest): (&[usize], _) = if output.quick { (&[4], 6) } else { (&[4, 8, 12, 16, 24], 32) };
     let block = Block::new(meshes, finest, references)?;
 
     let scenes: [(&dyn Scene, Targets, (i32, i32), i32); 4] = [

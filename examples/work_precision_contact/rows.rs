@@ -130,6 +130,10 @@ impl Row {
         self.combination.correctors(transit)
     }
 
+    pub(crate) fn is_explicit(&self) -> bool {
+        self.integrator().is_ok_and(|scheme| scheme.tableau().stages.iter().all(|stage| stage.balance.u.z == 0.0))
+    }
+
     pub(crate) fn step(&self, body: &Body, h: f64) -> Result<f64> {
         self.combination.step(body, h)
     }

@@ -28,7 +28,7 @@ pub(crate) trait Scene {
     fn key(&self) -> &'static str;
     fn title(&self) -> &'static str;
     /// Dof-steps a run may have.
-    fn budget(&self) -> f64;
+    fn budget(&self, row: &Row) -> f64;
     /// Numbers of elements, ascending.
     fn meshes(&self) -> Vec<usize>;
     fn body(&self, elements: usize) -> Body;
@@ -77,13 +77,13 @@ pub(crate) fn measure(scene: &dyn Scene, row: &Row, extent: &Extent) -> Vec<Poin
         for &asked in &extent.courants {
             let wanted = asked * scene.transit(elements);
             let Ok(h) = row.step(&body, wanted) else { continue };
-            // An explicit scheme far beyond its limit has had this step already.
-            if h < 0.7 * wanted {
+            // An explicit scheme so far beyond its limit has had this step already: Courant numbers double.
+            if h < 0.5 * wanted {
                 continue;
             }
             let model = Model { row, elements, h };
             let Ok((_, until)) = scene.simulation(&model, 0.5) else { continue };
-            if until / h * body.consistent.nrows() as f64 > extent.share * scene.budget() {
+            if until / h * body.consistent.nrows() as f64 > extent.share * scene.budget(row) {
                 continue;
             }
             points.extend(point(scene, &model, asked * h / wanted, extent));
