@@ -6,6 +6,7 @@ use contact_dynamics::mass::affine_motions;
 use contact_dynamics::{ContactLaw, LinearRows, Result, Simulation};
 use contact_dynamics_scenes::masses::Body;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::tables::decimal;
 use std::collections::BTreeMap;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -125,11 +126,11 @@ impl Block {
         let Self { finest, uncertainty: [mean, rms], losses, .. } = self;
         format!(
             "Reference of the block: conservative preset, {finest} elements a side, Courant number ½. The composite scheme with \
-             λ_v/λ_a on a blend differs from it by {:.1} % in the mean, {:.1} % RMS; they lose {:.2} and {:.2} % of the energy.",
+             λ_v/λ_a on a blend differs from it by {:.1} % in the mean, {:.1} % RMS; they lose {} and {} % of the energy.",
             100.0 * mean,
             100.0 * rms,
-            100.0 * losses[0],
-            100.0 * losses[1]
+            decimal(100.0 * losses[0], 2),
+            decimal(100.0 * losses[1], 2)
         )
     }
 }
