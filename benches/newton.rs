@@ -109,7 +109,7 @@ fn parts(scene: &Scene<Hyperelastic<3>, 3>) -> Vec<Row> {
         }),
         row("bare solve", move || {
             x.fill(1.0);
-            solver.solve(&mut x);
+            solver.solve(&mut x).expect("a direct solve");
             black_box(&x);
             1
         }),

@@ -107,7 +107,7 @@ impl Row {
         let factor = time(|| self.factor.factorize(a.as_ref()).expect("positive definite"));
         let solve = time(|| {
             self.x.fill(1.0);
-            self.factor.solve(&mut self.x);
+            self.factor.solve(&mut self.x).expect("a direct solve");
             black_box(&self.x);
         });
         if counts {

@@ -150,6 +150,32 @@ pub enum Error {
         /// Degree of freedom of the failing pivot.
         dof: usize,
     },
+    /// An iteration has met a direction along which a matrix that must be positive definite is not.
+    #[error(
+        "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of conjugate \
+         gradients, least of all at dof {dof}; look for a negative stiffness"
+    )]
+    Indefinite {
+        /// pᵀAp over pᵀdiag(A)p.
+        curvature: f64,
+        /// Degree of freedom with the smallest share in pᵀAp.
+        dof: usize,
+    },
+    /// The iterative solution of a linear system did not converge.
+    #[error(
+        "{method} not converged after {iterations} iterations: relative residual {residual:e}, tolerance {tolerance:e}; take \
+         smaller steps, allow more iterations, or use `Cholesky`"
+    )]
+    LinearNotConverged {
+        /// The iteration.
+        method: &'static str,
+        /// Iterations spent.
+        iterations: usize,
+        /// The residual reached, over the right-hand side.
+        residual: f64,
+        /// What it must be.
+        tolerance: f64,
+    },
     /// A factorization does not fit into memory or its index range.
     #[error("no memory for {what}")]
     OutOfMemory {
@@ -359,6 +385,7 @@ impl Error {
                 | Self::ContradictoryContacts { .. }
                 | Self::ContactLost { .. }
                 | Self::NewtonNotConverged { .. }
+                | Self::LinearNotConverged { .. }
                 | Self::IndefiniteTangent { .. }
                 | Self::Inadmissible { .. }
                 | Self::StepNotFinite { .. }

@@ -29,7 +29,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 /// let mut factor = solver.analyze(a.symbolic(), &[])?;
 /// factor.factorize(a.as_ref())?;
 /// let mut x = [1.0, 2.0];
-/// factor.solve(&mut x);
+/// factor.solve(&mut x)?;
 /// assert!((x[0] - 1.0 / 11.0).abs() < 1e-15 && (x[1] - 7.0 / 11.0).abs() < 1e-15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -69,8 +69,16 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 
     /// Solves in place; `rhs` holds one or more columns of the system's size, one after the other.
     ///
-    /// Does not allocate for a single column. Call after a successful [`factorize`](Self::factorize) only.
-    fn solve(&mut self, rhs: &mut [T]);
+    /// Does not allocate for a single column. Call after a successful [`factorize`](Self::factorize) only. A right-hand
+    /// side that is not finite is no error: its solution is not finite either, and the step says so.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::LinearNotConverged`](crate::Error::LinearNotConverged) or
+    /// [`Error::Indefinite`](crate::Error::Indefinite) of an iteration, [`Error::Host`](crate::Error::Host) or, if a smaller
+    /// step may help, [`Error::Inadmissible`](crate::Error::Inadmissible) of a host's own solver. `rhs` then holds nothing of
+    /// use, and the step is undone. Direct factorizations do not fail here.
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()>;
 
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
@@ -118,6 +126,16 @@ pub trait Condensation<T: Real> {
     /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the solution
     /// on the interface. Does not allocate.
     fn condense(&mut self, rhs: &[T], interface: &mut [T]);
+
+    /// Whether the last [`condense`](Self::condense) has solved what there was to solve apart from the interface: asked once
+    /// after each. [`ByBody`] solves for the bodies that contact does not touch then, by solvers that may iterate.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Factorization::solve`].
+    fn completed(&mut self) -> Result<()> {
+        Ok(())
+    }
 
     /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
     /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.

@@ -108,7 +108,10 @@ impl<T: Real> InverseMass<T> {
                 for &dof in fixed.iter() {
                     x[dof] = T::zero();
                 }
-                factor.solve(x);
+                if factor.solve(x).is_err() {
+                    // Direct factors do not fail; if one ever does, whoever reads the response finds that it is none.
+                    x.fill(T::nan());
+                }
             }
         }
     }

@@ -151,9 +151,9 @@ impl<T: Real> Factorization<T> for CountingFactor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         self.inner.factorize(a)
     }
-    fn solve(&mut self, rhs: &mut [T]) {
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         self.calls.fetch_add(1, Ordering::Relaxed);
-        self.inner.solve(rhs);
+        self.inner.solve(rhs)
     }
     fn stored_values(&self) -> usize {
         self.inner.stored_values()

@@ -77,8 +77,8 @@ impl Factorization<f64> for PlainFactor {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
         self.0.factorize(a)
     }
-    fn solve(&mut self, rhs: &mut [f64]) {
-        self.0.solve(rhs);
+    fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
+        self.0.solve(rhs)
     }
     fn stored_values(&self) -> usize {
         self.0.stored_values()

@@ -33,7 +33,7 @@ use std::ops::Range;
 /// let mut factor = solver.analyze(a.symbolic(), &[])?;
 /// factor.factorize(a.as_ref())?;
 /// let mut x = [1.0, 0.0, 0.0, 6.0];
-/// factor.solve(&mut x);
+/// factor.solve(&mut x)?;
 /// assert!(x.iter().zip([1.0, 1.0, 1.0, 2.0]).all(|(x, exact)| (x - exact).abs() < 1e-15));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -121,7 +121,7 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
         let scratch = vec![T::zero(); largest(|part| part.dofs.len())];
         let on_interface = vec![T::zero(); COLUMNS * largest(|part| part.interface.len())];
         let entries = pattern.row_idx().len();
-        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, scratch, on_interface }))
+        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, scratch, on_interface, failure: None }))
     }
 }
 
@@ -283,6 +283,7 @@ fn in_system(error: Error, whole: impl Fn(usize) -> usize) -> Error {
     match error {
         // That the matrix of a part is diagonal is no concern of the host.
         Error::Singular { dof, .. } => Error::Singular { matrix: "effective matrix", dof: whole(dof) },
+        Error::Indefinite { curvature, dof } => Error::Indefinite { curvature, dof: whole(dof) },
         Error::Mass { dof, value } => Error::Mass { dof: whole(dof), value },
         Error::MatrixNotFinite { matrix, row, column, value } => {
             Error::MatrixNotFinite { matrix, row: whole(row), column: whole(column), value }
@@ -304,6 +305,8 @@ struct Factors<T: Real> {
     /// Columns of a part, and of its interface: of the latter room for `COLUMNS`, or as many as were ever asked for.
     scratch: Vec<T>,
     on_interface: Vec<T>,
+    /// Why the last `condense` has not solved for every body that contact does not touch.
+    failure: Option<Error>,
 }
 
 /// Room for that many values; allocates if there was never need for so many.
@@ -323,24 +326,27 @@ impl<T: Real> Factorization<T> for Factors<T> {
         self.parts.iter_mut().try_for_each(|part| part.factorize(a.val()))
     }
 
-    fn solve(&mut self, rhs: &mut [T]) {
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         let Self { parts, size, scratch, .. } = self;
         for Part { dofs, factor, .. } in parts {
             match dofs {
-                Selection::Range(range) if rhs.len() == *size => factor.solve(&mut rhs[range.clone()]),
+                Selection::Range(range) if rhs.len() == *size => {
+                    factor.solve(&mut rhs[range.clone()]).map_err(|error| in_system(error, |dof| dofs.at(dof)))?;
+                }
                 _ => {
                     let height = dofs.len();
                     let columns = room(scratch, rhs.len() / *size * height);
                     for (rhs, column) in rhs.chunks_exact(*size).zip(columns.chunks_exact_mut(height)) {
                         dofs.gather(rhs, column);
                     }
-                    factor.solve(columns);
+                    factor.solve(columns).map_err(|error| in_system(error, |dof| dofs.at(dof)))?;
                     for (rhs, column) in rhs.chunks_exact_mut(*size).zip(columns.chunks_exact(height)) {
                         dofs.scatter(column, rhs);
                     }
                 }
             }
         }
+        Ok(())
     }
 
     fn stored_values(&self) -> usize {
@@ -356,17 +362,25 @@ impl<T: Real> Factorization<T> for Factors<T> {
 /// Parts that contact acts on are condensed: `condensation` has asked them all whether they can. The others are solved.
 impl<T: Real> Condensation<T> for Factors<T> {
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
-        let Self { parts, scratch, on_interface, .. } = self;
+        let Self { parts, scratch, on_interface, failure, .. } = self;
+        *failure = None;
         for part in parts {
             if !part.touches() {
                 part.dofs.gather(rhs, &mut part.solution);
-                part.factor.solve(&mut part.solution);
+                let solved = part.factor.solve(&mut part.solution);
+                if let (Err(error), None) = (solved, &*failure) {
+                    *failure = Some(in_system(error, |dof| part.dofs.at(dof)));
+                }
             } else if let Some(condensed) = part.factor.condensation() {
                 let own = &mut on_interface[..part.interface.len()];
                 condensed.condense(part.dofs.read(rhs, scratch), own);
                 part.interface.scatter(own, interface);
             }
         }
+    }
+
+    fn completed(&mut self) -> Result<()> {
+        self.failure.take().map_or(Ok(()), Err)
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) {

@@ -290,7 +290,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
         }
     }
 
-    fn solve(&mut self, rhs: &mut [T]) {
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         let size = self.size();
         let columns = rhs.len().checked_div(size).unwrap_or(0);
         if self.kind == Kind::Llt && columns > 1 {
@@ -299,13 +299,14 @@ impl<T: Real> Factorization<T> for Factor<T> {
                 self.columns = columns;
             }
             T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
-            return;
+            return Ok(());
         }
         for column in rhs.chunks_exact_mut(size) {
             self.forward(column, size);
             self.backward(size);
             self.give(column);
         }
+        Ok(())
     }
 
     fn stored_values(&self) -> usize {

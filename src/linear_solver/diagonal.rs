@@ -51,12 +51,13 @@ impl<T: Real> Factorization<T> for Inverse<T> {
         Ok(())
     }
 
-    fn solve(&mut self, rhs: &mut [T]) {
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         for column in rhs.chunks_exact_mut(self.reciprocals.len()) {
             for (x, &inverse) in column.iter_mut().zip(&self.reciprocals) {
                 *x *= inverse;
             }
         }
+        Ok(())
     }
 
     fn stored_values(&self) -> usize {

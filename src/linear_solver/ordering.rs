@@ -36,7 +36,7 @@ use faer::sparse::linalg::cholesky::{
 /// for (solver, x) in [(outward, &mut x), (inward, &mut y)] {
 ///     let mut factor: Box<dyn contact_dynamics::Factorization<f64>> = solver.analyze(a.symbolic(), &[])?;
 ///     factor.factorize(a.as_ref())?;
-///     factor.solve(x);
+///     factor.solve(x)?;
 /// }
 /// assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-14));
 /// # Ok::<(), Box<dyn std::error::Error>>(())

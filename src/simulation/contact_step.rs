@@ -364,7 +364,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         self.place(new, work);
         if self.constraints.has_compliant() {
             self.compliant_gaps(new, work)?;
-            if self.press_without_coupling(operator, work) {
+            if self.press_without_coupling(operator, work)? {
                 self.place(new, work);
                 self.compliant_gaps(new, work)?;
             }
@@ -448,7 +448,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 
     /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are any.
-    fn press_without_coupling(&mut self, operator: &mut Operator<T>, work: &mut Workspace<T>) -> bool {
+    fn press_without_coupling(&mut self, operator: &mut Operator<T>, work: &mut Workspace<T>) -> Result<bool> {
         let Self { constraints, g, .. } = self;
         let Workspace { interface, rows, trial, .. } = work;
         let mut pressed = false;
@@ -463,10 +463,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         if pressed {
             interface.response.copy_from_slice(&interface.forces);
-            operator.respond(&mut interface.response);
+            operator.respond(&mut interface.response)?;
             T::axpy(T::one(), &interface.response, &mut interface.increment);
         }
-        pressed
+        Ok(pressed)
     }
 
     /// Adds e times the rate at the start of the stage to the rows under Newton's impact law.
@@ -577,7 +577,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 bounds.push(constraints.law(j).into());
             }
             let compliance_of = |k: usize| compliance[problem[k]] / weight[problem[k]];
-            let (delassus, version) = operator.delassus(g, problem, compliance_of, versions);
+            let (delassus, version) = operator.delassus(g, problem, compliance_of, versions)?;
             let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance, version };
             let solved = solver.solve(&data, multipliers);
             statistics.contact_solves += 1;

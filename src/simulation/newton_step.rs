@@ -114,11 +114,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 self.factorize(iteration, newton, new, past, work)?;
             }
             newton.residual.copy_from_slice(&work.increment);
-            self.operator.begin(&mut work.increment, &mut work.interface.increment);
+            self.operator
+                .begin(&mut work.increment, &mut work.interface.increment)
+                .map_err(|error| self.in_iteration(error, iteration))?;
             self.statistics.linear_solves += 1;
             self.statistics.newton_iterations += 1;
             let settled = self.press(newton, new, past, work)?;
-            self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+            self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
             self.refuse_nan(&work.increment, "the increment")?;
             // The increment, kept while `work.increment` becomes the residual it leaves.
             let before = Norms { residual: self.loaded_norm(&newton.residual, &work.interface.forces), ..norms };
@@ -272,12 +274,18 @@ impl<T: Real> StageSolve<'_, '_, T> {
         };
         let at = At { t: self.clock.at(self.stage.load), u: &motion.u, v: &motion.v, path };
         self.statistics.factorizations += 1;
-        self.operator.factorize(self.system, self.clock.h, at).map_err(|error| match error {
-            Error::Singular { dof, .. } => {
+        let factorized = self.operator.factorize(self.system, self.clock.h, at);
+        factorized.map_err(|error| self.in_iteration(error, iteration))
+    }
+
+    /// A matrix that is not positive definite, found by a factorization or by an iteration, is that of this iterate.
+    fn in_iteration(&self, error: Error, iteration: usize) -> Error {
+        match error {
+            Error::Singular { dof, .. } | Error::Indefinite { dof, .. } => {
                 Error::IndefiniteTangent { t: self.clock.at(0.0), h: self.clock.h, iteration: iteration + 1, dof }
             }
             other => other,
-        })
+        }
     }
 
     /// Adds contact to the increment on the interface, with rows that fit where it ends. Says whether they do.

@@ -125,12 +125,12 @@ impl<T: Real> Operator<T> {
         };
         match operator.factorize(system, h, at) {
             // Another state, or a smaller step, may do: the step will say.
-            Err(Error::Singular { .. }) if operator.varies() => {}
+            Err(Error::Singular { .. }) if operator.varies() => return Ok(operator),
             other => other?,
         }
         if !operator.full.is_empty() {
             // Memory for that many columns is allocated now.
-            operator.factor.solve(&mut operator.full);
+            operator.factor.solve(&mut operator.full)?;
         }
         Ok(operator)
     }
@@ -181,21 +181,24 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
+    // Where the solver iterates, what solves with A can fail: nothing is kept then that was not solved for.
+
     /// Begins `A d = r` with r in `increment`, and writes d on the interface.
-    pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) {
+    pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) -> Result<()> {
         if let Some(condensed) = condensation(self.contact, &mut *self.factor).filter(|_| !on_interface.is_empty()) {
             condensed.condense(increment, on_interface);
-            return;
+            return condensed.completed();
         }
-        self.factor.solve(increment);
+        self.factor.solve(increment)?;
         for (x, &dof) in on_interface.iter_mut().zip(&self.interface) {
             *x = increment[dof];
         }
+        Ok(())
     }
 
     /// Finishes what [`begin`](Self::begin) began: `increment` becomes d with contact `forces` on the interface, which
     /// have changed d there to `on_interface`.
-    pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) {
+    pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
             condensed.expand(on_interface, increment);
@@ -205,21 +208,22 @@ impl<T: Real> Operator<T> {
             for (&force, &dof) in forces.iter().zip(interface.iter()) {
                 column[dof] = force;
             }
-            factor.solve(column);
+            factor.solve(column)?;
             T::axpy(T::one(), column, increment);
             for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
                 increment[dof] = x;
             }
         }
+        Ok(())
     }
 
     /// `f ← A⁻¹ f` on the interface, for one column of forces there.
-    pub(crate) fn respond(&mut self, forces: &mut [T]) {
-        respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces);
+    pub(crate) fn respond(&mut self, forces: &mut [T]) -> Result<()> {
+        respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces)
     }
 
     /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response) for ascending rows.
-    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
+    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         let mut rest = rows;
         while let Some(&first) = rest.first() {
             // Rows that follow one another go together.
@@ -230,14 +234,15 @@ impl<T: Real> Operator<T> {
                 let column = &mut self.columns[row * size..(row + 1) * size];
                 column.fill(T::zero());
                 g.interface_scatter(row, T::one(), column);
-                self.computed[row] = true;
             }
             if end > first {
                 let values = &mut self.columns[first * size..end * size];
-                respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, values);
+                respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, values)?;
+                self.computed[first..end].fill(true);
             }
             rest = &rest[(end - first).max(1)..];
         }
+        Ok(())
     }
 
     /// A⁻¹ G_rowᵀ on the interface.
@@ -253,8 +258,8 @@ impl<T: Real> Operator<T> {
         rows: &[usize],
         compliance: impl Fn(usize) -> T,
         versions: &mut u64,
-    ) -> (&[T], u64) {
-        self.prepare(g, rows);
+    ) -> Result<(&[T], u64)> {
+        self.prepare(g, rows)?;
         let Self { delassus: Delassus { rows: assembled, values, diagonal, version }, columns, interface, .. } = self;
         let (size, on_interface) = (rows.len(), interface.len());
         let mut changed = assembled != rows || *version == 0;
@@ -279,7 +284,7 @@ impl<T: Real> Operator<T> {
             *versions += 1;
             *version = *versions;
         }
-        (values, *version)
+        Ok((values, *version))
     }
 
     /// Forgets responses to other rows than those of this version.
@@ -335,10 +340,10 @@ fn respond<T: Real>(
     interface: &[usize],
     full: &mut [T],
     forces: &mut [T],
-) {
+) -> Result<()> {
     if let Some(condensed) = condensation(path, factor) {
         condensed.solve(forces);
-        return;
+        return Ok(());
     }
     let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
     for forces in forces.chunks_mut(COLUMNS * height) {
@@ -349,13 +354,14 @@ fn respond<T: Real>(
                 column[dof] = force;
             }
         }
-        factor.solve(columns);
+        factor.solve(columns)?;
         for (column, forces) in columns.chunks_exact(size).zip(forces.chunks_exact_mut(height)) {
             for (x, &dof) in forces.iter_mut().zip(interface) {
                 *x = column[dof];
             }
         }
     }
+    Ok(())
 }
 
 /// The pattern of an effective matrix: no larger than what has a part in it.

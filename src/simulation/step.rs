@@ -21,8 +21,8 @@ impl<T: Real> Simulation<'_, T> {
     /// # Errors
     ///
     /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
-    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], or what the host's own parts
-    /// return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
+    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::LinearNotConverged`], or
+    /// what the host's own parts return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
     /// were.
     pub fn step(&mut self) -> Result<()> {
         match self.judge {
@@ -255,13 +255,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
     fn directly(&mut self, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) -> Result<()> {
         let Self { stage, clock, system, operator, .. } = self;
         residual(stage, clock.at(stage.load), &mut **system, new, work)?;
-        operator.begin(&mut work.increment, &mut work.interface.increment);
+        operator.begin(&mut work.increment, &mut work.interface.increment)?;
         work.interface.forces.fill(T::zero());
         self.statistics.linear_solves += 1;
         if self.constraints.len() > 0 && T::all_finite(&work.interface.increment) {
             self.contact(None, new, past, work)?;
         }
-        self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces);
+        self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
         let recovery = &self.stage.recovery;
         let accumulate = if recovery.reads_past(2) { Accumulate::Add } else { Accumulate::Replace };
         match T::recover(recovery.weights(), &work.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
