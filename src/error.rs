@@ -153,7 +153,7 @@ pub enum Error {
     /// An iteration has met a direction along which a matrix that must be positive definite is not.
     #[error(
         "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of conjugate \
-         gradients, least of all at dof {dof}; look for a negative stiffness"
+         gradients, least of all at dof {dof}; look for a body without mass or support, or a negative stiffness"
     )]
     Indefinite {
         /// pᵀAp over pᵀdiag(A)p.

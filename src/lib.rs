@@ -35,7 +35,9 @@ pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
 pub use error::{Error, Result};
 pub use faer;
 pub use integrator::*;
-pub use linear_solver::{Automatic, ByBody, Cholesky, Condensation, Diagonal, Factorization, LinearSolver};
+pub use linear_solver::{
+    Automatic, ByBody, Cholesky, Condensation, ConjugateGradients, Diagonal, Factorization, LinearSolver,
+};
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};
 pub use preset::Preset;

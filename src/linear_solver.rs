@@ -2,6 +2,7 @@
 
 mod by_body;
 mod cholesky;
+mod conjugate_gradients;
 mod diagonal;
 mod dissection;
 pub(crate) mod forest;
@@ -9,6 +10,7 @@ mod ordering;
 
 pub use by_body::ByBody;
 pub use cholesky::Cholesky;
+pub use conjugate_gradients::{ConjugateGradients, Preconditioner};
 pub use diagonal::Diagonal;
 pub use ordering::Ordering;
 
@@ -83,6 +85,11 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
 
+    /// Iterations of the last solve, of its longest column; zero for what does not iterate.
+    fn iterations(&self) -> usize {
+        0
+    }
+
     /// The factorization as a static condensation on the dofs that were to be eliminated last, if it can do that.
     ///
     /// With it a step in contact costs one sweep forward and one backward, as without contact, plus work on the
@@ -149,6 +156,9 @@ pub trait Condensation<T: Real> {
 pub(crate) const COLUMNS: usize = 16;
 
 /// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, else [`Cholesky`].
+///
+/// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many contacts
+/// press, which a pattern does not tell, and a factorization is exact to rounding at any step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Automatic;
 

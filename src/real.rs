@@ -14,6 +14,7 @@ use num_traits::{Float, NumAssign};
 use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 
+mod iteration;
 mod sweep;
 
 /// A real scalar, `f32` or `f64` (sealed).
@@ -31,7 +32,7 @@ pub trait Real:
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
-    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw, sweep};
+    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw, iteration, sweep};
     use crate::linear_solver::forest::Forest;
     use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
     use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
@@ -76,6 +77,64 @@ pub(crate) mod kernels {
         pub skipped: usize,
         /// Room for the rows below any supernode, once a column.
         pub scratch: &'a mut [T],
+    }
+
+    /// Blocks below the diagonal of a symmetric matrix, row by row, each stored column by column.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Blocks<'a, T> {
+        pub pointers: &'a [usize],
+        pub columns: &'a [u32],
+        pub values: &'a [T],
+    }
+
+    /// Preconditioners of conjugate gradients for a matrix with identities as diagonal blocks.
+    #[derive(Clone, Copy, Debug)]
+    pub enum Sweeps<'a, T> {
+        /// None but that scaling.
+        Nodes,
+        /// (1 + L)(1 + Lᵀ).
+        GaussSeidel,
+        /// An incomplete factor, with the inverses of its diagonal blocks.
+        Incomplete { factor: Blocks<'a, T>, inverses: &'a [T] },
+    }
+
+    /// Conjugate gradients for a scaled matrix.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Iteration<'a, T> {
+        pub lower: Blocks<'a, T>,
+        /// C⁻¹ of each diagonal block C Cᵀ of the matrix.
+        pub scaling: &'a [T],
+        pub sweeps: Sweeps<'a, T>,
+        /// Of the preconditioned residual, over that of the right-hand side.
+        pub tolerance: f64,
+        pub limit: usize,
+    }
+
+    /// Memory of conjugate gradients.
+    #[derive(Debug)]
+    pub struct Vectors<'a, T> {
+        pub x: &'a mut [T],
+        pub r: &'a mut [T],
+        pub p: &'a mut [T],
+        pub t: &'a mut [T],
+        pub q: &'a mut [T],
+    }
+
+    /// How conjugate gradients ended.
+    #[derive(Clone, Copy, Debug)]
+    pub enum Outcome {
+        Converged {
+            iterations: usize,
+        },
+        NotConverged {
+            iterations: usize,
+            residual: f64,
+        },
+        /// pᵀAp over pᵀdiag(A)p of a direction, and the dof with the smallest share in the former.
+        Indefinite {
+            curvature: f64,
+            dof: usize,
+        },
     }
 
     /// Whether a pass adds to what is there.
@@ -150,6 +209,30 @@ pub(crate) mod kernels {
         fn dense_cholesky_scratch(size: usize) -> faer::dyn_stack::StackReq;
         /// Solves L Lᵀ x = b in place.
         fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]);
+        /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which become their inverses;
+        /// `Err` is the dof of a pivot that is not positive.
+        fn scale_blocks(
+            size: usize,
+            pattern: (&[usize], &[u32]),
+            values: &mut [Self],
+            diagonal: &mut [Self],
+        ) -> Result<(), usize>;
+        /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; says whether all pivots
+        /// were positive.
+        fn incomplete_cholesky(
+            size: usize,
+            lower: &Blocks<'_, Self>,
+            shift: Self,
+            values: &mut [Self],
+            inverses: &mut [Self],
+        ) -> bool;
+        /// Solves in place with a matrix in blocks of `size`².
+        fn conjugate_gradients(
+            size: usize,
+            iteration: &Iteration<'_, Self>,
+            b: &mut [Self],
+            vectors: Vectors<'_, Self>,
+        ) -> Outcome;
         /// Scratch for factorizing and for solving `columns` right-hand sides.
         fn cholesky_scratch(
             kind: Factorization,
@@ -582,6 +665,43 @@ pub(crate) mod kernels {
                     let mut x = MatMut::from_column_major_slice_mut(x, size, 1);
                     solve_lower_triangular_in_place(l, x.rb_mut(), Par::Seq);
                     solve_upper_triangular_in_place(l.transpose(), x, Par::Seq);
+                }
+                fn scale_blocks(
+                    size: usize,
+                    pattern: (&[usize], &[u32]),
+                    values: &mut [Self],
+                    diagonal: &mut [Self],
+                ) -> Result<(), usize> {
+                    match size {
+                        3 => iteration::scale::<$scalar, 3>(pattern, values, diagonal),
+                        2 => iteration::scale::<$scalar, 2>(pattern, values, diagonal),
+                        _ => iteration::scale::<$scalar, 1>(pattern, values, diagonal),
+                    }
+                }
+                fn incomplete_cholesky(
+                    size: usize,
+                    lower: &Blocks<'_, Self>,
+                    shift: Self,
+                    values: &mut [Self],
+                    inverses: &mut [Self],
+                ) -> bool {
+                    match size {
+                        3 => iteration::factorize::<$scalar, 3>(lower, shift, values, inverses),
+                        2 => iteration::factorize::<$scalar, 2>(lower, shift, values, inverses),
+                        _ => iteration::factorize::<$scalar, 1>(lower, shift, values, inverses),
+                    }
+                }
+                fn conjugate_gradients(
+                    size: usize,
+                    iteration: &Iteration<'_, Self>,
+                    b: &mut [Self],
+                    vectors: Vectors<'_, Self>,
+                ) -> Outcome {
+                    match size {
+                        3 => iteration::solve::<$scalar, 3>(iteration, b, vectors),
+                        2 => iteration::solve::<$scalar, 2>(iteration, b, vectors),
+                        _ => iteration::solve::<$scalar, 1>(iteration, b, vectors),
+                    }
                 }
                 fn cholesky_scratch(
                     kind: Factorization,

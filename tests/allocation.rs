@@ -1,13 +1,14 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
-use contact_dynamics::contact::{ContactLaw, Side, Sphere};
+use contact_dynamics::contact::{ContactLaw, Plane, Side, Sphere};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
+use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::partitioned::{self, Frame};
 use contact_dynamics::{
-    ByBody, Composite, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
-    NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
+    ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
+    LinearSystem, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
@@ -22,6 +23,7 @@ fn steps_do_not_allocate() {
     solids();
     large_motion();
     bodies_apart();
+    iterations();
     frames();
 }
 
@@ -201,6 +203,33 @@ fn bodies_apart() {
     });
     assert!(changes >= 10, "{changes} changes");
     assert_eq!(counted.count_total, 0);
+}
+
+/// A block dropped on its edge: conjugate gradients, full solves for contact.
+fn iterations() {
+    for preconditioner in [Preconditioner::Nodes, Preconditioner::GaussSeidel, Preconditioner::IncompleteCholesky] {
+        let block = Solid::block([1.0; 3], [4; 3], Material { young: 100.0, poisson: 0.3, density: 1.0 });
+        let bottom: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][2] < 0.01).collect();
+        let floor = Plane::new([0.0, 0.0, -0.02], [0.2, 0.0, 1.0]).unwrap();
+        let contact = NodesOnObstacle::new(floor, &block.nodes, &block.node_dofs(), &bottom).unwrap();
+        let mut run = Simulation::builder(block.system(), Composite, 0.01)
+            .velocity(block.uniform([0.0, 0.0, -1.0]))
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .linear_solver(ConjugateGradients::default().preconditioner(preconditioner))
+            .build()
+            .unwrap();
+        run.step().unwrap();
+        let mut changes = 0;
+        let counted = allocation_counter::measure(|| {
+            for _ in 0..100 {
+                run.step().unwrap();
+            }
+            changes = run.statistics().contact_changes;
+        });
+        assert!(changes >= 4, "{changes} changes");
+        assert_eq!(counted.count_total, 0, "{preconditioner:?}");
+    }
 }
 
 /// A frame whose nodes close one by one, and are held one by one.

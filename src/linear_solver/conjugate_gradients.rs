@@ -1,0 +1,357 @@
+//! Preconditioned conjugate gradients: large bodies at small steps.
+
+use super::{Factorization, LinearSolver};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::real::Real;
+use crate::real::kernels::{Blocks, Iteration, Outcome, Sweeps, Vectors};
+use crate::sparse;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use std::ops::Range;
+
+/// The preconditioner of [`ConjugateGradients`]. All work on blocks of the two or three dofs of a node, where the pattern of
+/// the matrix shows such.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Preconditioner {
+    /// The diagonal blocks. For comparison: the other two need fewer iterations.
+    Nodes,
+    /// A forward and a backward sweep of Gauss–Seidel, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci. Stat.
+    /// Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no memory of its own.
+    #[default]
+    GaussSeidel,
+    /// Incomplete Cholesky factorization without fill (Meijerink and van der Vorst, Math. Comput. 31, 1977), with a
+    /// growing shift of the diagonal where it breaks down (Manteuffel, Math. Comput. 34, 1980). Fewer iterations, of
+    /// twice the cost, and as much memory again as the matrix.
+    IncompleteCholesky,
+}
+
+/// Preconditioned conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) for symmetric positive
+/// definite matrices: an iteration instead of a factor, for large solid bodies at small steps.
+///
+/// At small steps inertia dominates the effective matrix w_ā/h² M + K: its condition number is about 1 + Co² with the
+/// Courant number Co of the step, whatever the size of the body, and few iterations do. `docs/performance.md` has the Courant
+/// number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky). Memory is that of
+/// half the matrix, where factors of solids hold ten to a hundred times as much.
+///
+/// Every solve starts from zero and remembers nothing of earlier ones. Steps solve for the increment from the predicted
+/// motion, so that zero is the prediction: the start is as warm as a scheme can make it, and a run that is resumed from a
+/// clone goes on bit for bit.
+///
+/// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), over that of the right-hand side, which does not
+/// depend on the units of the dofs: nearly the error in the energy norm of A. An iteration ends at the
+/// [`tolerance`](Self::tolerance), or where a step changes nothing more that the scalar resolves (as it always does in `f32`
+/// with the default tolerance).
+///
+/// Offers no [`condensation`](Factorization::condensation): contact takes a full solve for each row that presses (kept
+/// as long as rows and matrix are) and one more a step. For hundreds of contacts that move, take a factorization.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{ConjugateGradients, LinearRows, LinearSystem, Newmark, Simulation};
+///
+/// // A bar of 100 elements against a wall, at a Courant number of one.
+/// let n = 100;
+/// let stiffness: Vec<_> = (0..n)
+///     .flat_map(|e| [(e, e, 1.0), (e + 1, e + 1, 1.0), (e, e + 1, -1.0), (e + 1, e, -1.0)])
+///     .map(|(i, j, k)| Triplet::new(i, j, k))
+///     .collect();
+/// let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &stiffness)?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0; n + 1], stiffness)?, Newmark::trapezoidal(), 1.0)
+///     .velocity(vec![0.1; n + 1])
+///     .constraint(LinearRows::new().unilateral(&[(n, -1.0)], 0.25))
+///     .linear_solver(ConjugateGradients::default())
+///     .build()?;
+/// run.run_until(50.0, &mut ())?;
+/// assert!(run.state().contacts().closed()[0] && run.gaps()[0].abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+///
+/// A factorization refuses what [`Cholesky`](super::Cholesky) refuses of entries and symmetry, and diagonal blocks
+/// that are not positive definite: [`Error::Singular`]. A solve fails with [`Error::LinearNotConverged`], and with
+/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is found out only
+/// if a right-hand side leads there. [`Error::Dimension`] for right-hand sides of another size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConjugateGradients {
+    tolerance: f64,
+    iterations: usize,
+    preconditioner: Preconditioner,
+}
+
+impl Default for ConjugateGradients {
+    /// Tolerance 1e-10, at most 1000 iterations, [`Preconditioner::GaussSeidel`].
+    fn default() -> Self {
+        Self { tolerance: 1e-10, iterations: 1000, preconditioner: Preconditioner::default() }
+    }
+}
+
+impl ConjugateGradients {
+    /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by default.
+    ///
+    /// Momentum and energy of a run are conserved to about this share of what a step changes of them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless 0 ≤ tolerance < 1. With zero a solve goes on to rounding.
+    pub fn tolerance(self, tolerance: f64) -> Result<Self> {
+        match (0.0..1.0).contains(&tolerance) {
+            true => Ok(Self { tolerance, ..self }),
+            false => {
+                let name = "the tolerance of conjugate gradients";
+                Err(Error::Parameter { name, value: tolerance, range: "at least zero and less than one" })
+            }
+        }
+    }
+
+    /// The largest number of iterations of a solve, 1000 by default; at least one is made.
+    #[must_use]
+    pub fn iterations(self, iterations: usize) -> Self {
+        Self { iterations, ..self }
+    }
+
+    /// The preconditioner, [`Preconditioner::GaussSeidel`] by default.
+    #[must_use]
+    pub fn preconditioner(self, preconditioner: Preconditioner) -> Self {
+        Self { preconditioner, ..self }
+    }
+}
+
+/// A matrix in blocks, scaled, and memory for the iteration.
+struct Matrix<T: Real> {
+    settings: ConjugateGradients,
+    dofs: usize,
+    entries: usize,
+    /// Dofs of a block: 1, 2 or 3.
+    size: usize,
+    /// Blocks below the diagonal, row by row: their columns, ascending, and values.
+    pointers: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<T>,
+    /// C⁻¹ of the diagonal blocks C Cᵀ.
+    scaling: Vec<T>,
+    /// The incomplete factor, if there is one: blocks below the diagonal, and the inverses of those on it.
+    factor: Vec<T>,
+    inverses: Vec<T>,
+    /// Five vectors.
+    vectors: Vec<T>,
+    /// Memory of the check of symmetry.
+    cursor: Vec<usize>,
+    state: Ready,
+    iterations: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ready {
+    No,
+    Yes,
+}
+
+impl<T: Real> std::fmt::Debug for Matrix<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (dofs, blocks) = (self.dofs, self.columns.len());
+        let debug = &mut f.debug_struct("Matrix");
+        debug.field("settings", &self.settings).field("dofs", &dofs).field("size", &self.size);
+        debug.field("blocks", &blocks).finish_non_exhaustive()
+    }
+}
+
+/// Pointers and columns of the blocks of `size`² below the diagonal, row by row.
+fn blocks(pattern: SymbolicSparseColMatRef<'_, usize>, size: usize) -> Result<(Vec<usize>, Vec<u32>)> {
+    let nodes = pattern.ncols() / size;
+    let (mut pointers, mut columns) = (Vec::with_capacity(nodes + 1), Vec::<u32>::new());
+    pointers.push(0);
+    for node in 0..nodes {
+        let start = columns.len();
+        // The pattern is symmetric: columns are rows.
+        for dof in node * size..(node + 1) * size {
+            let others = pattern.row_idx_of_col_raw(dof).iter().map(|other| other / size);
+            for other in others.take_while(|other| *other < node) {
+                let other = u32::try_from(other).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits" })?;
+                if columns.len() == start || columns[columns.len() - 1] != other {
+                    columns.push(other);
+                }
+            }
+        }
+        columns[start..].sort_unstable();
+        let mut kept = start;
+        for at in start..columns.len() {
+            if at == start || columns[at] != columns[kept - 1] {
+                columns[kept] = columns[at];
+                kept += 1;
+            }
+        }
+        columns.truncate(kept);
+        pointers.push(kept);
+    }
+    Ok((pointers, columns))
+}
+
+impl<T: Real> LinearSolver<T> for ConjugateGradients {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        _last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        let dofs = pattern.ncols();
+        if pattern.nrows() != dofs {
+            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: dofs });
+        }
+        sparse::check_pattern("effective", pattern)?;
+        // The size that needs the least memory: zeros are stored in blocks, an index is half a number.
+        let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
+        for size in [3, 2, 1].into_iter().filter(|size| dofs % size == 0) {
+            let (pointers, columns) = blocks(pattern, size)?;
+            let cost = |size: usize, blocks: usize| blocks * (2 * size * size + 1);
+            if best.as_ref().is_none_or(|(other, _, least)| cost(size, columns.len()) < cost(*other, least.len())) {
+                best = Some((size, pointers, columns));
+            }
+        }
+        let Some((size, pointers, columns)) = best else {
+            return Err(Error::Empty { what: "the pattern", remedy: "a system has at least one dof" });
+        };
+        let what = "a matrix in blocks";
+        let square = size * size;
+        let values = memory::zeros(columns.len(), square, what)?;
+        let scaling = memory::zeros(dofs, size, what)?;
+        let (blocks, diagonal) = match self.preconditioner {
+            Preconditioner::IncompleteCholesky => (columns.len(), dofs),
+            Preconditioner::Nodes | Preconditioner::GaussSeidel => (0, 0),
+        };
+        Ok(Box::new(Matrix {
+            settings: *self,
+            dofs,
+            entries: pattern.row_idx().len(),
+            size,
+            pointers,
+            columns,
+            values,
+            scaling,
+            factor: memory::zeros(blocks, square, what)?,
+            inverses: memory::zeros(diagonal, size, what)?,
+            vectors: memory::zeros(dofs, 5, "the vectors of conjugate gradients")?,
+            cursor: Vec::with_capacity(dofs),
+            state: Ready::No,
+            iterations: 0,
+        }))
+    }
+}
+
+impl<T: Real> Matrix<T> {
+    /// Takes the entries of a symmetric matrix.
+    fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let Self { size, pointers, columns, values, scaling, .. } = self;
+        let size = *size;
+        values.fill(T::zero());
+        scaling.fill(T::zero());
+        for dof in 0..a.ncols() {
+            let (row, place) = (dof / size, dof % size);
+            let own: Range<usize> = pointers[row]..pointers[row + 1];
+            let mut at = own.start;
+            for (&other, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
+                let (column, within) = (other / size, other % size);
+                if column >= row {
+                    if column == row {
+                        scaling[(row * size + within) * size + place] = value;
+                    }
+                    continue;
+                }
+                while at < own.end && (columns[at] as usize) < column {
+                    at += 1;
+                }
+                if at == own.end || columns[at] as usize != column {
+                    let part = "conjugate gradients".into();
+                    return Err(Error::Incompatible {
+                        part,
+                        reason: "the matrix has another pattern than was analyzed",
+                    });
+                }
+                values[(at * size + within) * size + place] = value;
+            }
+        }
+        Ok(())
+    }
+
+    fn incomplete(&mut self) -> Result<()> {
+        let Self { size, pointers, columns, values, factor, inverses, .. } = self;
+        let lower = Blocks { pointers, columns, values };
+        // Doubled from a thousandth of the diagonal: with the shift the factor of any matrix with a unit diagonal exists in the
+        // end.
+        let shifts = std::iter::successors(Some(1e-3), |shift| Some(2.0 * shift)).take_while(|shift| *shift < 1e6);
+        for shift in std::iter::once(0.0).chain(shifts) {
+            if T::incomplete_cholesky(*size, &lower, T::of(shift), factor, inverses) {
+                return Ok(());
+            }
+        }
+        Err(Error::Singular { matrix: "effective matrix", dof: 0 })
+    }
+}
+
+impl<T: Real> Factorization<T> for Matrix<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        self.state = Ready::No;
+        for (what, expected, found) in [
+            ("the effective matrix", self.dofs, a.ncols()),
+            ("the entries of the effective matrix", self.entries, a.val().len()),
+        ] {
+            if expected != found {
+                return Err(Error::Dimension { what, expected, found });
+            }
+        }
+        sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
+        self.fill(a)?;
+        T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)
+            .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })?;
+        if self.settings.preconditioner == Preconditioner::IncompleteCholesky {
+            self.incomplete()?;
+        }
+        self.state = Ready::Yes;
+        Ok(())
+    }
+
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
+        let Self { settings, dofs, size, pointers, columns, values, scaling, factor, inverses, vectors, .. } = self;
+        if self.state == Ready::No {
+            let part = "conjugate gradients".into();
+            return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
+        }
+        if rhs.len() % *dofs != 0 {
+            return Err(Error::Dimension { what: "right-hand side", expected: *dofs, found: rhs.len() });
+        }
+        let sweeps = match settings.preconditioner {
+            Preconditioner::Nodes => Sweeps::Nodes,
+            Preconditioner::GaussSeidel => Sweeps::GaussSeidel,
+            Preconditioner::IncompleteCholesky => {
+                Sweeps::Incomplete { factor: Blocks { pointers, columns, values: factor }, inverses }
+            }
+        };
+        let lower = Blocks { pointers, columns, values };
+        let (tolerance, limit) = (settings.tolerance, settings.iterations);
+        let iteration = Iteration { lower, scaling, sweeps, tolerance, limit };
+        self.iterations = 0;
+        for column in rhs.chunks_exact_mut(*dofs) {
+            let mut parts = vectors.chunks_exact_mut(*dofs);
+            let mut next = || parts.next().unwrap_or_default();
+            let vectors = Vectors { x: next(), r: next(), p: next(), t: next(), q: next() };
+            let iterations = match T::conjugate_gradients(*size, &iteration, column, vectors) {
+                Outcome::Converged { iterations } => iterations,
+                Outcome::NotConverged { iterations, residual } => {
+                    let method = "conjugate gradients";
+                    return Err(Error::LinearNotConverged { method, iterations, residual, tolerance });
+                }
+                Outcome::Indefinite { curvature, dof } => return Err(Error::Indefinite { curvature, dof }),
+            };
+            self.iterations = self.iterations.max(iterations);
+        }
+        Ok(())
+    }
+
+    fn stored_values(&self) -> usize {
+        [&self.values, &self.scaling, &self.factor, &self.inverses, &self.vectors].iter().map(|part| part.len()).sum()
+    }
+
+    fn iterations(&self) -> usize {
+        self.iterations
+    }
+}
