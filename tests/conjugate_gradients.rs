@@ -1,4 +1,5 @@
 //! Conjugate gradients: solutions, units, what they refuse, and steps with them.
+#![allow(clippy::float_cmp)] // the same to the last bit is meant
 
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
@@ -14,28 +15,29 @@ const ALL: [Preconditioner; 3] =
     [Preconditioner::Nodes, Preconditioner::GaussSeidel, Preconditioner::IncompleteCholesky];
 
 type Matrix<T> = SparseColMat<usize, T>;
+type Entry = (usize, usize, f64);
 
-fn matrix<T: Real>(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix<T> {
+fn matrix<T: Real>(n: usize, entries: impl IntoIterator<Item = Entry>) -> Matrix<T> {
     let triplets: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
     let (pattern, values) = Matrix::<f64>::try_new_from_triplets(n, n, &triplets).unwrap().into_parts();
     SparseColMat::new(pattern, values.into_iter().map(T::of).collect())
 }
 
-fn entries(a: &Matrix<f64>) -> Vec<(usize, usize, f64)> {
+fn entries(a: &Matrix<f64>) -> Vec<Entry> {
     let a = a.as_ref();
     let column = |j: usize| a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)).map(move |(&i, &x)| (i, j, x));
     (0..a.ncols()).flat_map(column).collect()
 }
 
 /// M/dt² + K of a solid at a Courant number.
-fn effective<const D: usize>(solid: &Solid<D>, size: f64, courant: f64) -> Vec<(usize, usize, f64)> {
+fn effective<const D: usize>(solid: &Solid<D>, size: f64, courant: f64) -> Vec<Entry> {
     let inertia = 4.0 * (SOFT.wave_speed() / (courant * size)).powi(2);
     let mass = solid.lumped_mass::<f64>();
     let mass = mass.into_iter().enumerate().map(|(i, m)| (i, i, inertia * m));
     entries(&solid.stiffness()).into_iter().chain(mass).collect()
 }
 
-fn chain(n: usize, shift: f64) -> Vec<(usize, usize, f64)> {
+fn chain(n: usize, shift: f64) -> Vec<Entry> {
     let springs = (1..n).flat_map(|i| [(i - 1, i - 1, 1.0), (i, i, 1.0), (i - 1, i, -1.0), (i, i - 1, -1.0)]);
     springs.chain((0..n).map(|i| (i, i, shift))).collect()
 }
@@ -57,11 +59,11 @@ fn difference<T: Real>(x: &[T], y: &[T]) -> f64 {
 }
 
 /// Matrices with blocks of one, two and three dofs, with fixed dofs among them.
-fn cases() -> Vec<(usize, Vec<(usize, usize, f64)>)> {
+fn cases() -> Vec<(usize, Vec<Entry>)> {
     let block = Solid::block([1.0; 3], [4; 3], SOFT);
     let plate = Solid::rectangle([1.0; 2], [9; 2], SOFT);
-    let fixed = |entries: Vec<(usize, usize, f64)>, dofs: &'static [usize]| {
-        let free = move |&(i, j, _): &(usize, usize, f64)| !dofs.contains(&i) && !dofs.contains(&j);
+    let fixed = |entries: Vec<Entry>, dofs: &'static [usize]| {
+        let free = move |&(i, j, _): &Entry| !dofs.contains(&i) && !dofs.contains(&j);
         entries.into_iter().filter(free).chain(dofs.iter().map(|&dof| (dof, dof, 1.0))).collect::<Vec<_>>()
     };
     vec![
@@ -250,7 +252,7 @@ fn zero_and_nan_come_back_as_they_are() {
 
 #[test]
 fn what_cannot_be_solved_is_refused() {
-    let refused = |solver: ConjugateGradients, n: usize, entries: Vec<(usize, usize, f64)>| {
+    let refused = |solver: ConjugateGradients, n: usize, entries: Vec<Entry>| {
         let a = matrix::<f64>(n, entries);
         let mut factor = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap();
         let result = factor.factorize(a.as_ref()).and_then(|()| factor.solve(&mut rhs::<f64>(n)));

@@ -96,13 +96,11 @@ impl ConjugateGradients {
     ///
     /// [`Error::Parameter`] unless 0 ≤ tolerance < 1. With zero a solve goes on to rounding.
     pub fn tolerance(self, tolerance: f64) -> Result<Self> {
-        match (0.0..1.0).contains(&tolerance) {
-            true => Ok(Self { tolerance, ..self }),
-            false => {
-                let name = "the tolerance of conjugate gradients";
-                Err(Error::Parameter { name, value: tolerance, range: "at least zero and less than one" })
-            }
+        if (0.0..1.0).contains(&tolerance) {
+            return Ok(Self { tolerance, ..self });
         }
+        let name = "the tolerance of conjugate gradients";
+        Err(Error::Parameter { name, value: tolerance, range: "at least zero and less than one" })
     }
 
     /// The largest number of iterations of a solve, 1000 by default; at least one is made.
@@ -201,7 +199,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
         sparse::check_pattern("effective", pattern)?;
         // The size that needs the least memory: zeros are stored in blocks, an index is half a number.
         let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
-        for size in [3, 2, 1].into_iter().filter(|size| dofs % size == 0) {
+        for size in [3, 2, 1].into_iter().filter(|size| dofs.is_multiple_of(*size)) {
             let (pointers, columns) = blocks(pattern, size)?;
             let cost = |size: usize, blocks: usize| blocks * (2 * size * size + 1);
             if best.as_ref().is_none_or(|(other, _, least)| cost(size, columns.len()) < cost(*other, least.len())) {
@@ -316,7 +314,7 @@ impl<T: Real> Factorization<T> for Matrix<T> {
             let part = "conjugate gradients".into();
             return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
         }
-        if rhs.len() % *dofs != 0 {
+        if !rhs.len().is_multiple_of(*dofs) {
             return Err(Error::Dimension { what: "right-hand side", expected: *dofs, found: rhs.len() });
         }
         let sweeps = match settings.preconditioner {

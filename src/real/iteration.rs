@@ -43,8 +43,8 @@ fn inverse_factor<T: Real, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B
     for c in 0..B {
         for r in c..B {
             let mut sum = a[c][r];
-            for k in 0..c {
-                sum -= l[k][r] * l[k][c];
+            for column in &l[..c] {
+                sum -= column[r] * column[c];
             }
             l[c][r] = if r > c {
                 sum / l[c][c]
@@ -241,16 +241,12 @@ pub(super) fn factorize<T: Real, const B: usize>(
                 }
             }
             let inverse = &inverses[column * B * B..(column + 1) * B * B];
-            for r in 0..B {
-                let scaled = lower_product::<T, B>(inverse, std::array::from_fn(|c| own[c][r]));
-                for (c, x) in scaled.into_iter().enumerate() {
-                    own[c][r] = x;
-                }
-            }
-            for c in 0..B {
-                for r in 0..B {
-                    for k in 0..B {
-                        diagonal[c][r] -= own[k][r] * own[k][c];
+            let rows: Block<T, B> = std::array::from_fn(|r| lower_product(inverse, std::array::from_fn(|c| own[c][r])));
+            own = std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]));
+            for (c, column) in diagonal.iter_mut().enumerate() {
+                for (r, sum) in column.iter_mut().enumerate() {
+                    for own in &own {
+                        *sum -= own[r] * own[c];
                     }
                 }
             }
@@ -329,7 +325,9 @@ pub(super) fn solve<T: Real, const B: usize>(
     #[allow(clippy::cast_possible_truncation)]
     let exponent = (largest.value().log2().floor() as i32).max(-1000);
     let (down, up) = (T::of(2.0_f64.powi(-exponent)), T::of(2.0_f64.powi(exponent)));
-    r.iter_mut().for_each(|r| *r *= down);
+    for r in r.iter_mut() {
+        *r *= down;
+    }
     x.fill(T::zero());
     let mut judge = Judge::new(iteration);
     let outcome = match sweeps {
