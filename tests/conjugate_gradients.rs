@@ -2,13 +2,15 @@
 #![allow(clippy::float_cmp)] // the same to the last bit is meant
 
 use contact_dynamics::contact::Plane;
-use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::{
     ByBody, Cholesky, Composite, ConjugateGradients, Error, Factorization, LinearSolver, LinearSystem, Newmark,
-    NodesOnObstacle, PersistencyCorrection, Real, Simulation, SimulationBuilder, StepControl,
+    NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, SimulationBuilder, StepControl,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SOFT: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
 const ALL: [Preconditioner; 3] =
@@ -278,6 +280,11 @@ fn what_cannot_be_solved_is_refused() {
         let found = refused(solver, 50, chain(50, -0.5));
         assert!(matches!(found, Error::Indefinite { dof: 0..50, curvature } if curvature < 0.0), "{found:?}");
         assert!(found.to_string().contains("not positive definite") && !found.is_recoverable());
+        // A negative spring amid others: it is named.
+        let mut negative = chain(50, 0.5);
+        negative.extend([(30, 30, -0.5), (31, 31, -0.5), (30, 31, 4.0), (31, 30, 4.0)]);
+        let found = refused(solver, 50, negative);
+        assert!(matches!(found, Error::Indefinite { dof: 30 | 31, curvature } if curvature < 0.0), "{found:?}");
         let mut nan = chain(50, 0.1);
         nan.extend([(3, 4, f64::NAN), (4, 3, f64::NAN)]);
         assert!(matches!(refused(solver, 50, nan), Error::MatrixNotFinite { .. }));
@@ -432,6 +439,73 @@ fn a_solve_that_fails_leaves_the_step_undone() {
         }
     };
     assert!(matches!(error, Error::LinearNotConverged { iterations: 1, .. }), "{error:?}");
+}
+
+/// Conjugate gradients that refuse one of their solves, counted from now: there are so many before it.
+#[derive(Clone, Debug, Default)]
+struct Refusing(Arc<AtomicUsize>);
+
+#[derive(Debug)]
+struct RefusingFactor(Box<dyn Factorization<f64>>, Refusing);
+
+impl LinearSolver<f64> for Refusing {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<f64>>> {
+        Ok(Box::new(RefusingFactor(ConjugateGradients::default().analyze(pattern, last)?, self.clone())))
+    }
+}
+
+impl Factorization<f64> for RefusingFactor {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
+        self.0.factorize(a)
+    }
+    fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
+        match self.1.0.fetch_sub(1, Ordering::Relaxed) {
+            0 => Err(Error::Inadmissible { callback: "linear solver", source: "refused".into() }),
+            _ => self.0.solve(rhs),
+        }
+    }
+    fn stored_values(&self) -> usize {
+        self.0.stored_values()
+    }
+}
+
+#[test]
+fn a_step_is_undone_whichever_of_its_solves_fails() {
+    let h = 0.25 / SOFT.wave_speed();
+    let refusing = Refusing::default();
+    refusing.0.store(usize::MAX, Ordering::Relaxed);
+    let (mut run, mut expected) = (falling(refusing.clone(), h), falling(ConjugateGradients::default(), h));
+    let mut most = 0;
+    for _ in 0..25 {
+        expected.step().unwrap();
+        let before = run.state().clone();
+        let mut refused = 0;
+        loop {
+            // Responses that have been solved for are kept: the count of solves is not that of a step that succeeds at once.
+            refusing.0.store(refused, Ordering::Relaxed);
+            match run.step() {
+                Ok(()) => break,
+                Err(error) => {
+                    assert!(matches!(error, Error::Inadmissible { .. }), "{error:?}");
+                    let after = run.state();
+                    assert_eq!(before.displacement(), after.displacement());
+                    assert_eq!(before.velocity(), after.velocity());
+                    assert_eq!(before.contacts().forces(), after.contacts().forces());
+                }
+            }
+            refused += 1;
+        }
+        most = most.max(refused);
+        assert_eq!(run.state().displacement(), expected.state().displacement(), "t = {}", run.time());
+        assert_eq!(run.state().velocity(), expected.state().velocity());
+        assert_eq!(run.state().contacts().forces(), expected.state().contacts().forces());
+    }
+    // Before contact, for its responses and after it.
+    assert!(most >= 3, "{most}");
 }
 
 #[test]
