@@ -90,7 +90,9 @@ impl Default for ConjugateGradients {
 impl ConjugateGradients {
     /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by default.
     ///
-    /// Momentum and energy of a run are conserved to about this share of what a step changes of them.
+    /// The default leaves energy, momentum and displacements of a run with impacts to about a fifth of itself of those by
+    /// [`Cholesky`](super::Cholesky) (`cargo bench --bench iterative`): below the error of any step in practice, for an
+    /// iteration more a digit. Errors do not grow as steps become smaller: each solve is for the increment of its step.
     ///
     /// # Errors
     ///
