@@ -98,7 +98,7 @@ fn measure(n: usize) {
             x.fill(1.0);
             clock(3, &mut || {
                 let condensed = factors[i].condensation().expect("Cholesky condenses");
-                condensed.condense(&x, &mut ends);
+                condensed.condense(&x, &mut ends).expect("a factor");
                 condensed.expand(&ends, &mut x);
             });
             clock(4, &mut || runs[i].step().expect("a well-posed step"));

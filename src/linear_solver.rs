@@ -120,7 +120,7 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 ///
 /// let mut x = [1.0, 0.0, -4.0];
 /// let mut interface = [0.0];
-/// condensed.condense(&x, &mut interface); // x_c without contact force
+/// condensed.condense(&x, &mut interface)?; // x_c without contact force
 /// let mut response = [1.0];
 /// condensed.solve(&mut response); // x_c for a unit force on the interface
 /// let force = -interface[0] / response[0]; // the force that brings dof 2 to zero
@@ -132,17 +132,12 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 pub trait Condensation<T: Real> {
     /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the solution
     /// on the interface. Does not allocate.
-    fn condense(&mut self, rhs: &[T], interface: &mut [T]);
-
-    /// Whether the last [`condense`](Self::condense) has solved what there was to solve apart from the interface: asked once
-    /// after each. [`ByBody`] solves for the bodies that contact does not touch then, by solvers that may iterate.
     ///
     /// # Errors
     ///
-    /// Those of [`Factorization::solve`].
-    fn completed(&mut self) -> Result<()> {
-        Ok(())
-    }
+    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for the bodies that contact does not
+    /// touch by whatever solver they have).
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()>;
 
     /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
     /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.

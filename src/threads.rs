@@ -32,3 +32,27 @@ pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     first();
     second();
 }
+
+/// Whether parts with factors of these sizes, in scalars, are worth a thread each.
+pub(crate) fn worthwhile(scalars: impl Iterator<Item = usize>) -> bool {
+    /// A tenth of a millisecond of reading.
+    const GRAIN: usize = 1 << 18;
+    cfg!(feature = "rayon") && scalars.filter(|scalars| *scalars >= GRAIN).count() > 1
+}
+
+/// Does something to every part, on several threads. What fails first in the order of the parts is told.
+pub(crate) fn try_each<P: Send, E: Send>(
+    parts: &mut [P],
+    act: &(impl Fn(&mut P) -> Result<(), E> + Sync),
+) -> Result<(), E> {
+    match parts {
+        [] => Ok(()),
+        [part] => act(part),
+        _ => {
+            let (first, second) = parts.split_at_mut(parts.len() / 2);
+            let (mut one, mut other) = (Ok(()), Ok(()));
+            join(|| one = try_each(first, act), || other = try_each(second, act));
+            one.and(other)
+        }
+    }
+}

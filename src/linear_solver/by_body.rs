@@ -3,8 +3,9 @@
 use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, LinearSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::sparse;
+use crate::{sparse, threads};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use std::convert::Infallible;
 use std::ops::Range;
 
 /// Factorizes each body on its own.
@@ -117,11 +118,11 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
         for (body, solver) in bodies.drain(..).zip(solvers).filter(|(body, _)| body.len() > 1) {
             parts.push(Part::new(body, pattern, last, solver, &mut places)?);
         }
-        let largest = |size: fn(&Part<T>) -> usize| parts.iter().map(size).max().unwrap_or(0);
-        let scratch = vec![T::zero(); largest(|part| part.dofs.len())];
-        let on_interface = vec![T::zero(); COLUMNS * largest(|part| part.interface.len())];
+        let widest = parts.iter().map(|part| part.interface.len()).max().unwrap_or(0);
+        let on_interface = vec![T::zero(); COLUMNS * widest];
         let entries = pattern.row_idx().len();
-        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, scratch, on_interface, failure: None }))
+        let apart = threads::worthwhile(parts.iter().map(|part| part.factor.stored_values()));
+        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, columns: Vec::new(), on_interface, apart }))
     }
 }
 
@@ -228,8 +229,11 @@ struct Part<T: Real> {
     factor: Box<dyn Factorization<T>>,
     /// Where its dofs of contact are on the interface of the system.
     interface: Selection,
-    /// Without dofs of contact: its solution between `condense` and `expand`.
-    solution: Vec<T>,
+    /// A column of its dofs: where they are not side by side, and, without dofs of contact or beside other threads, its
+    /// solution.
+    column: Vec<T>,
+    /// A column of its dofs of contact.
+    on_interface: Vec<T>,
 }
 
 impl<T: Real> Part<T> {
@@ -260,17 +264,43 @@ impl<T: Real> Part<T> {
             Ok(factor) => factor,
             Err(error) => return Err(in_system(error, |dof| dofs[dof])),
         };
-        let solution = vec![T::zero(); if interface.is_empty() { dofs.len() } else { 0 }];
+        let (column, on_interface) = (vec![T::zero(); dofs.len()], vec![T::zero(); interface.len()]);
         let entries = Selection::new(entries);
         let values = vec![T::zero(); if matches!(entries, Selection::List(_)) { entries.len() } else { 0 }];
         let (dofs, interface) = (Selection::new(dofs), Selection::new(interface));
-        Ok(Self { dofs, pattern: own, entries, values, factor, interface, solution })
+        Ok(Self { dofs, pattern: own, entries, values, factor, interface, column, on_interface })
     }
 
     fn factorize(&mut self, values: &[T]) -> Result<()> {
         let Self { dofs, pattern, entries, values: own, factor, .. } = self;
         let a = SparseColMatRef::new(pattern.as_ref(), entries.read(values, own));
         factor.factorize(a).map_err(|error| in_system(error, |dof| dofs.at(dof)))
+    }
+
+    /// Solves for its dofs of a right-hand side; the solution is in `column`.
+    fn solve(&mut self, rhs: &[T]) -> Result<()> {
+        let Self { dofs, factor, column, .. } = self;
+        dofs.gather(rhs, column);
+        factor.solve(column).map_err(|error| in_system(error, |dof| dofs.at(dof)))
+    }
+
+    /// Condenses, what contact touches; the solution on its part of the interface is in `on_interface`. What contact does
+    /// not touch is solved.
+    fn condense(&mut self, rhs: &[T]) -> Result<()> {
+        if !self.touches() {
+            return self.solve(rhs);
+        }
+        let Self { dofs, factor, column, on_interface, .. } = self;
+        let Some(condensed) = factor.condensation() else { return Ok(()) };
+        let condensed = condensed.condense(dofs.read(rhs, column), on_interface);
+        condensed.map_err(|error| in_system(error, |dof| dofs.at(dof)))
+    }
+
+    /// Completes the solution in `column`.
+    fn expand(&mut self, interface: &[T]) {
+        if let Some(condensed) = self.factor.condensation().filter(|_| self.interface.len() > 0) {
+            condensed.expand(self.interface.read(interface, &mut self.on_interface), &mut self.column);
+        }
     }
 
     fn touches(&self) -> bool {
@@ -302,11 +332,12 @@ struct Factors<T: Real> {
     size: usize,
     height: usize,
     entries: usize,
-    /// Columns of a part, and of its interface: of the latter room for `COLUMNS`, or as many as were ever asked for.
-    scratch: Vec<T>,
+    /// Columns of a part and of its interface: room for as many as were ever asked for, of the interface at least for
+    /// `COLUMNS`.
+    columns: Vec<T>,
     on_interface: Vec<T>,
-    /// Why the last `condense` has not solved for every body that contact does not touch.
-    failure: Option<Error>,
+    /// Whether threads are worth waking: single columns are then solved for part by part in memory of their own.
+    apart: bool,
 }
 
 /// Room for that many values; allocates if there was never need for so many.
@@ -323,27 +354,26 @@ impl<T: Real> Factorization<T> for Factors<T> {
             let what = "the entries of the effective matrix";
             return Err(Error::Dimension { what, expected: self.entries, found: a.val().len() });
         }
-        self.parts.iter_mut().try_for_each(|part| part.factorize(a.val()))
+        match self.apart {
+            true => threads::try_each(&mut self.parts, &|part| part.factorize(a.val())),
+            false => self.parts.iter_mut().try_for_each(|part| part.factorize(a.val())),
+        }
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { parts, size, scratch, .. } = self;
+        let Self { parts, size, columns, apart, .. } = self;
+        if rhs.len() == *size {
+            return if *apart { solve_apart(parts, rhs) } else { solve_in_turn(parts, rhs) };
+        }
         for Part { dofs, factor, .. } in parts {
-            match dofs {
-                Selection::Range(range) if rhs.len() == *size => {
-                    factor.solve(&mut rhs[range.clone()]).map_err(|error| in_system(error, |dof| dofs.at(dof)))?;
-                }
-                _ => {
-                    let height = dofs.len();
-                    let columns = room(scratch, rhs.len() / *size * height);
-                    for (rhs, column) in rhs.chunks_exact(*size).zip(columns.chunks_exact_mut(height)) {
-                        dofs.gather(rhs, column);
-                    }
-                    factor.solve(columns).map_err(|error| in_system(error, |dof| dofs.at(dof)))?;
-                    for (rhs, column) in rhs.chunks_exact_mut(*size).zip(columns.chunks_exact(height)) {
-                        dofs.scatter(column, rhs);
-                    }
-                }
+            let height = dofs.len();
+            let columns = room(columns, rhs.len() / *size * height);
+            for (rhs, column) in rhs.chunks_exact(*size).zip(columns.chunks_exact_mut(height)) {
+                dofs.gather(rhs, column);
+            }
+            factor.solve(columns).map_err(|error| in_system(error, |dof| dofs.at(dof)))?;
+            for (rhs, column) in rhs.chunks_exact_mut(*size).zip(columns.chunks_exact(height)) {
+                dofs.scatter(column, rhs);
             }
         }
         Ok(())
@@ -359,44 +389,59 @@ impl<T: Real> Factorization<T> for Factors<T> {
     }
 }
 
-/// Parts that contact acts on are condensed: `condensation` has asked them all whether they can. The others are solved.
-impl<T: Real> Condensation<T> for Factors<T> {
-    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
-        let Self { parts, scratch, on_interface, failure, .. } = self;
-        *failure = None;
-        for part in parts {
-            if !part.touches() {
-                part.dofs.gather(rhs, &mut part.solution);
-                let solved = part.factor.solve(&mut part.solution);
-                if let (Err(error), None) = (solved, &*failure) {
-                    *failure = Some(in_system(error, |dof| part.dofs.at(dof)));
-                }
-            } else if let Some(condensed) = part.factor.condensation() {
-                let own = &mut on_interface[..part.interface.len()];
-                condensed.condense(part.dofs.read(rhs, scratch), own);
-                part.interface.scatter(own, interface);
+fn solve_apart<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
+    threads::try_each(parts, &|part| part.solve(rhs))?;
+    parts.iter().for_each(|part| part.dofs.scatter(&part.column, rhs));
+    Ok(())
+}
+
+/// As `solve_apart`; dofs that are side by side are solved for in place.
+fn solve_in_turn<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
+    for part in parts {
+        match &part.dofs {
+            Selection::Range(range) => {
+                let solved = part.factor.solve(&mut rhs[range.clone()]);
+                solved.map_err(|error| in_system(error, |dof| range.start + dof))?;
+            }
+            Selection::List(_) => {
+                part.solve(rhs)?;
+                part.dofs.scatter(&part.column, rhs);
             }
         }
     }
+    Ok(())
+}
 
-    fn completed(&mut self) -> Result<()> {
-        self.failure.take().map_or(Ok(()), Err)
+/// Parts that contact acts on are condensed: `condensation` has asked them all whether they can. The others are solved.
+impl<T: Real> Condensation<T> for Factors<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
+        match self.apart {
+            true => threads::try_each(&mut self.parts, &|part| part.condense(rhs))?,
+            false => self.parts.iter_mut().try_for_each(|part| part.condense(rhs))?,
+        }
+        self.parts.iter().for_each(|part| part.interface.scatter(&part.on_interface, interface));
+        Ok(())
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) {
-        let Self { parts, scratch, on_interface, .. } = self;
-        for part in parts {
-            if !part.touches() {
-                part.dofs.scatter(&part.solution, solution);
-            } else if let Some(condensed) = part.factor.condensation() {
-                let own = part.interface.read(interface, on_interface);
-                match &part.dofs {
-                    Selection::Range(range) => condensed.expand(own, &mut solution[range.clone()]),
-                    Selection::List(_) => {
-                        let column = &mut scratch[..part.dofs.len()];
-                        condensed.expand(own, column);
-                        part.dofs.scatter(column, solution);
-                    }
+        if self.apart {
+            let Ok(()) = threads::try_each(&mut self.parts, &|part| {
+                part.expand(interface);
+                Ok::<(), Infallible>(())
+            });
+            self.parts.iter().for_each(|part| part.dofs.scatter(&part.column, solution));
+            return;
+        }
+        for part in &mut self.parts {
+            let Part { dofs, factor, interface: places, on_interface, .. } = part;
+            match (dofs, factor.condensation().filter(|_| places.len() > 0)) {
+                // In place.
+                (Selection::Range(range), Some(condensed)) => {
+                    condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
+                }
+                _ => {
+                    part.expand(interface);
+                    part.dofs.scatter(&part.column, solution);
                 }
             }
         }

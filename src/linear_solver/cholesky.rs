@@ -319,7 +319,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
 }
 
 impl<T: Real> Condensation<T> for Factor<T> {
-    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
         let trailing = self.trailing();
         self.forward(rhs, trailing.start);
         let Self { symbolic, values, sweep: x, below, trailing: on_interface, interface: places, .. } = self;
@@ -330,6 +330,7 @@ impl<T: Real> Condensation<T> for Factor<T> {
         for (x, &place) in interface.iter_mut().zip(places.iter()) {
             *x = on_interface[place];
         }
+        Ok(())
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) {

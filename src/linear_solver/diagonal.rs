@@ -70,13 +70,14 @@ impl<T: Real> Factorization<T> for Inverse<T> {
 }
 
 impl<T: Real> Condensation<T> for Inverse<T> {
-    fn condense(&mut self, rhs: &[T], interface: &mut [T]) {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
         for ((x, &b), &inverse) in self.solution.iter_mut().zip(rhs).zip(&self.reciprocals) {
             *x = b * inverse;
         }
         for (x, &dof) in interface.iter_mut().zip(&self.interface) {
             *x = self.solution[dof];
         }
+        Ok(())
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) {

@@ -186,8 +186,7 @@ impl<T: Real> Operator<T> {
     /// Begins `A d = r` with r in `increment`, and writes d on the interface.
     pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) -> Result<()> {
         if let Some(condensed) = condensation(self.contact, &mut *self.factor).filter(|_| !on_interface.is_empty()) {
-            condensed.condense(increment, on_interface);
-            return condensed.completed();
+            return condensed.condense(increment, on_interface);
         }
         self.factor.solve(increment)?;
         for (x, &dof) in on_interface.iter_mut().zip(&self.interface) {
