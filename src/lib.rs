@@ -36,7 +36,7 @@ pub use error::{Error, Result};
 pub use faer;
 pub use integrator::*;
 pub use linear_solver::{
-    Automatic, ByBody, Cholesky, Condensation, ConjugateGradients, Diagonal, Factorization, LinearSolver,
+    Automatic, ByBody, Cholesky, Condensation, ConjugateGradients, Diagonal, Factorization, LinearSolver, Lu,
 };
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};

@@ -6,12 +6,14 @@ mod conjugate_gradients;
 mod diagonal;
 mod dissection;
 pub(crate) mod forest;
+mod lu;
 mod ordering;
 
 pub use by_body::ByBody;
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::{ConjugateGradients, Preconditioner};
 pub use diagonal::Diagonal;
+pub use lu::Lu;
 pub use ordering::Ordering;
 
 use crate::error::Result;
@@ -154,6 +156,7 @@ pub(crate) const COLUMNS: usize = 16;
 ///
 /// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many contacts
 /// press, which a pattern does not tell, and a factorization is exact to rounding at any step.
+/// Nor [`Lu`]: whether values are symmetric a pattern does not say.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Automatic;
 

@@ -15,13 +15,25 @@ use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 
 mod iteration;
+pub(crate) mod lu;
 mod sweep;
 
 /// A real scalar, `f32` or `f64` (sealed).
 ///
 /// Time, step size and scheme coefficients are `f64` in every run; `Real` is the type of matrices and vectors.
 pub trait Real:
-    kernels::Kernels + Float + NumAssign + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
+    kernels::Kernels
+    + lu::LuKernels
+    + Float
+    + NumAssign
+    + Default
+    + Debug
+    + Display
+    + LowerExp
+    + Sum
+    + Send
+    + Sync
+    + 'static
 {
     /// The scalar nearest to `x`.
     fn of(x: f64) -> Self;

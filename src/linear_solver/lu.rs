@@ -1,0 +1,351 @@
+//! Sparse LU through faer: matrices that are not symmetric, or not definite.
+
+use super::{Factorization, LinearSolver};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::real::Real;
+use crate::real::lu::Side;
+use crate::sparse;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::linalg::{LuError, qr};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+
+/// Sparse LU factorization with partial pivoting, for any regular matrix: tangents that are not symmetric (loads that
+/// follow the motion, gyroscopic and circulatory matrices), and indefinite ones.
+///
+/// Columns are eliminated in an order with little fill for every choice of pivots (COLAMD), rows as the pivots demand. Rows and
+/// columns are first scaled by powers of two, each to a largest entry of about one: pivots do not depend on the units of
+/// translations and rotations, or on a stiff body beside a soft one.
+///
+/// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16 ε) (Hager's
+/// estimate of the 1-norm). A generic right-hand side shows it, so it takes one solve a factorization, and three more only where
+/// that one grows. The dof named is the one that moves most in the null vector.
+///
+/// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
+/// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact takes a full solve for
+/// each contact that presses, and one more. [`stored_values`](Factorization::stored_values) is a bound that holds for every choice
+/// of pivots; the factor may hold much less. Factorizing again does not allocate for long thin structures, where faer works column
+/// by column; for plates and solids it works in blocks and allocates some for each.
+///
+/// An **indefinite** matrix is factorized without complaint: where a step is too long for a negative stiffness, Newton's
+/// method is not told so, as by Cholesky.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{Damping, LinearSystem, Lu, Newmark, Simulation, System};
+///
+/// let matrix = |entries: &[(usize, usize, f64)]| {
+///     let entries: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
+///     SparseColMat::try_new_from_triplets(2, 2, &entries)
+/// };
+/// // A disc on a shaft, turning fast: C is skew. Seen from the shaft a push along x drives it along y too.
+/// let shaft = matrix(&[(0, 0, 100.0), (1, 1, 100.0)])?;
+/// let gyroscopic = matrix(&[(0, 1, 15.0), (1, 0, -15.0)])?;
+/// let rotor = LinearSystem::lumped(vec![1.0, 1.0], shaft)?.damping(gyroscopic)?;
+///
+/// // Its circular whirls have ω² ± 15 ω = 100: the forward one turns with 20, the backward one with −5.
+/// let period = 2.0 * std::f64::consts::PI / 20.0;
+/// let mut run = Simulation::builder(rotor, Newmark::trapezoidal(), period / 1000.0)
+///     .linear_solver(Lu)
+///     .displacement(vec![1.0, 0.0])
+///     .velocity(vec![0.0, -20.0])
+///     .build()?;
+/// run.run_until(period, &mut ())?;
+/// assert!((run.state().displacement()[0] - 1.0).abs() < 1e-4);
+/// assert!(run.state().displacement()[1].abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lu;
+
+struct Factor<T: Real> {
+    symbolic: SymbolicLu<usize>,
+    numeric: NumericLu<usize, T>,
+    state: State,
+    /// The pattern analyzed, and the scaled values R A C in it.
+    pattern: SymbolicSparseColMat<usize>,
+    scaled: Vec<T>,
+    /// Diagonals of R and C.
+    rows: Vec<T>,
+    columns: Vec<T>,
+    memory: MemBuffer,
+    /// Right-hand sides that `memory` has room for.
+    room: usize,
+    /// Largest number of scalars that L and U can have.
+    bound: usize,
+    /// Vectors of the estimate of the condition.
+    probe: Vec<T>,
+}
+
+/// Whether there is a factor to solve with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    None,
+    Factorized,
+}
+
+impl<T: Real> std::fmt::Debug for Factor<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Factor").field("size", &self.rows.len()).field("state", &self.state).finish_non_exhaustive()
+    }
+}
+
+impl<T: Real> LinearSolver<T> for Lu {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        _last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        let n = pattern.ncols();
+        if pattern.nrows() != n {
+            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: n });
+        }
+        sparse::check_pattern("effective", pattern)?;
+        let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU" };
+        let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(no_memory)?;
+        let bound = bound(pattern, &symbolic)?;
+        let memory = MemBuffer::try_new(T::lu_scratch(&symbolic, 1))
+            .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch" })?;
+        let pattern = pattern.to_owned().map_err(no_memory)?;
+        let zero = |columns| memory::zeros(n, columns, "a sparse LU");
+        Ok(Box::new(Factor {
+            symbolic,
+            numeric: NumericLu::new(),
+            state: State::None,
+            scaled: memory::zeros(pattern.row_idx().len(), 1, "a sparse LU")?,
+            pattern,
+            rows: zero(1)?,
+            columns: zero(1)?,
+            memory,
+            room: 1,
+            bound,
+            probe: zero(1)?,
+        }))
+    }
+}
+
+/// The largest number of entries of L and U with this order of columns, whatever the pivots: U fits into the triangular factor of
+/// AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8, 1987).
+fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usize>) -> Result<usize> {
+    let n = pattern.ncols();
+    let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU" };
+    let transposed = pattern.transpose().to_col_major().map_err(|_| no_memory())?;
+    let scratch = qr::col_etree_scratch::<usize>(n, n)
+        .or(qr::postorder_scratch::<usize>(n))
+        .or(qr::column_counts_aat_scratch::<usize>(n, n));
+    let mut memory = MemBuffer::try_new(scratch).map_err(|_| no_memory())?;
+    let stack = MemStack::new(&mut memory);
+    let order = Some(symbolic.col_perm());
+    let [mut parents, mut post, mut counts, mut first] = [(); 4].map(|()| vec![0; n]);
+    let tree = qr::col_etree(pattern, order, &mut parents, stack);
+    qr::postorder(&mut post, tree, stack);
+    qr::column_counts_ata(&mut counts, &mut first, transposed.as_ref(), order, tree, &post, stack);
+    // Row i joins at its first column, and goes on to the parent of each column but for the pivot row left there.
+    let mut heights = vec![0_usize; n];
+    for &column in first.iter().filter(|&&column| column < n) {
+        heights[column] += 1;
+    }
+    for (column, &parent) in tree.into_inner().iter().enumerate() {
+        if let Ok(parent) = usize::try_from(parent) {
+            heights[parent] += heights[column].saturating_sub(1);
+        }
+    }
+    Ok(heights.iter().sum::<usize>() + counts.iter().sum::<usize>())
+}
+
+/// The power of two that brings a positive number into [1, 2), if there is one.
+fn reciprocal_power<T: Real>(x: T) -> T {
+    let (mantissa, exponent, _) = x.integer_decode();
+    let power = T::of(2.0).powi(-(i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed()));
+    if power.is_normal() { power } else { T::one() }
+}
+
+/// A number between −1 and 1 that looks as if drawn at random; never near zero.
+fn scatter<T: Real>(index: usize) -> T {
+    let mixed = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let size = 0.5 + 0.5 * ((mixed >> 32) & 0xffff) as f64 / 65536.0;
+    T::of(if mixed & (1 << 50) == 0 { size } else { -size })
+}
+
+fn sum_of_sizes<T: Real>(x: &[T]) -> T {
+    x.iter().map(|x| x.abs()).sum()
+}
+
+/// Index of the entry of largest size; the first that is not finite, if there is one.
+fn largest<T: Real>(x: &[T]) -> usize {
+    let larger = |best: usize, i: usize| if x[i].abs() > x[best].abs() { i } else { best };
+    x.iter().position(|x| !x.is_finite()).unwrap_or_else(|| (0..x.len()).fold(0, larger))
+}
+
+impl<T: Real> Factor<T> {
+    /// Refuses another pattern than the one analyzed, and NaN and infinity.
+    fn check(&self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let pattern = self.pattern.as_ref();
+        let n = sparse::square("effective matrix", a)?;
+        if n != pattern.ncols() {
+            return Err(Error::Dimension { what: "effective matrix", expected: pattern.ncols(), found: n });
+        }
+        if a.col_nnz().is_some() || a.col_ptr() != pattern.col_ptr() || a.row_idx() != pattern.row_idx() {
+            let reason = "its pattern is not the one that was analyzed; analyze it again";
+            return Err(Error::Incompatible { part: "the effective matrix".into(), reason });
+        }
+        match a.val().iter().position(|value| !value.is_finite()) {
+            Some(at) => {
+                let column = a.col_ptr().partition_point(|&start| start <= at) - 1;
+                let (row, value) = (a.row_idx()[at], a.val()[at].value());
+                Err(Error::MatrixNotFinite { matrix: "effective", row, column, value })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Forms R A C; `Err` names a dof without entries.
+    fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
+        let Self { rows, columns, scaled, .. } = self;
+        rows.fill(T::zero());
+        for (&row, &value) in a.row_idx().iter().zip(a.val()) {
+            rows[row] = rows[row].max(value.abs());
+        }
+        if let Some(dof) = rows.iter().position(|&largest| largest == T::zero()) {
+            return Err(dof);
+        }
+        rows.iter_mut().for_each(|row| *row = reciprocal_power(*row));
+        for (dof, column) in columns.iter_mut().enumerate() {
+            let range = a.col_range(dof);
+            let entries =
+                a.row_idx()[range.clone()].iter().zip(&a.val()[range.clone()]).zip(&mut scaled[range.clone()]);
+            let mut largest = T::zero();
+            for ((&row, &value), scaled) in entries {
+                *scaled = value * rows[row];
+                largest = largest.max(scaled.abs());
+            }
+            if largest == T::zero() {
+                return Err(dof);
+            }
+            *column = reciprocal_power(largest);
+            scaled[range].iter_mut().for_each(|scaled| *scaled *= *column);
+        }
+        Ok(())
+    }
+
+    /// Factorizes the scaled values; `Err(Ok(dof))` where no pivot is left.
+    fn eliminate(&mut self) -> std::result::Result<(), std::result::Result<usize, Error>> {
+        let Self { symbolic, numeric, pattern, scaled, memory, .. } = self;
+        let a = SparseColMatRef::new(pattern.as_ref(), &scaled[..]);
+        T::lu(symbolic, a, numeric, memory).map_err(|error| match error {
+            LuError::SymbolicSingular { index } => {
+                let order = symbolic.col_perm().arrays().0;
+                Ok(order.get(index).copied().unwrap_or(0))
+            }
+            LuError::Generic(_) => Err(Error::OutOfMemory { what: "a sparse LU" }),
+        })
+    }
+
+    /// Solves with R A C, or its transpose, for the probe.
+    fn solve_probe(&mut self, side: Side) {
+        let Self { symbolic, numeric, probe, memory, .. } = self;
+        T::lu_solve((symbolic, numeric), side, probe, 1, memory);
+    }
+
+    /// Whether R A C has a condition number that leaves digits; `Err` holds the dof that moves most in its null vector, and whether
+    /// that is known.
+    fn judge(&mut self) -> std::result::Result<(), (usize, bool)> {
+        let norm = (0..self.rows.len())
+            .map(|dof| sum_of_sizes(&self.scaled[self.pattern.as_ref().col_range(dof)]))
+            .fold(T::zero(), T::max);
+        let verdict = |probe: &[T]| (largest(probe), T::all_finite(probe));
+        // A generic right-hand side: were the matrix singular, its null vector would outgrow all else.
+        self.probe.iter_mut().enumerate().for_each(|(i, x)| *x = scatter(i));
+        let size = sum_of_sizes(&self.probe);
+        self.solve_probe(Side::Given);
+        let generic = norm * sum_of_sizes(&self.probe) / size;
+        if generic <= T::epsilon().powf(T::of(-2.0 / 3.0)) {
+            return Ok(());
+        }
+        if !generic.is_finite() {
+            return Err(verdict(&self.probe));
+        }
+        self.probe.iter_mut().for_each(|x| *x = x.signum());
+        self.solve_probe(Side::Transposed);
+        let worst = largest(&self.probe);
+        self.probe.fill(T::zero());
+        self.probe[worst] = T::one();
+        self.solve_probe(Side::Given);
+        let condition = generic.max(norm * sum_of_sizes(&self.probe));
+        // Written so that NaN is refused too.
+        match condition * T::of(16.0) * T::epsilon() <= T::one() {
+            true => Ok(()),
+            false => Err(verdict(&self.probe)),
+        }
+    }
+
+    /// The dof to name where elimination has met an exact zero: that of the null vector of a matrix off by rounding.
+    fn name_singular(&mut self, found: usize) -> usize {
+        for (at, value) in self.scaled.iter_mut().enumerate() {
+            *value += *value * scatter::<T>(at) * T::of(8.0) * T::epsilon();
+        }
+        match self.eliminate() {
+            Ok(()) => match self.judge() {
+                Err((dof, true)) => dof,
+                _ => found,
+            },
+            Err(_) => found,
+        }
+    }
+}
+
+impl<T: Real> Factorization<T> for Factor<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        self.state = State::None;
+        self.check(a)?;
+        if self.rows.is_empty() {
+            return Ok(());
+        }
+        let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
+        self.scale(a).map_err(singular)?;
+        match self.eliminate() {
+            Ok(()) => {}
+            Err(Ok(dof)) => return Err(singular(dof)),
+            Err(Err(error)) => return Err(error),
+        }
+        match self.judge() {
+            Ok(()) => {
+                self.state = State::Factorized;
+                Ok(())
+            }
+            Err((dof, true)) => Err(singular(dof)),
+            Err((dof, false)) => Err(singular(self.name_singular(dof))),
+        }
+    }
+
+    fn solve(&mut self, rhs: &mut [T]) {
+        let size = self.rows.len();
+        let count = rhs.len().checked_div(size).unwrap_or(0);
+        if count > self.room {
+            self.memory = MemBuffer::new(T::lu_scratch(&self.symbolic, count));
+            self.room = count;
+        }
+        if self.state == State::None {
+            // No factor: nothing may look like a solution.
+            rhs.fill(T::nan());
+            return;
+        }
+        let Self { symbolic, numeric, rows, columns, memory, .. } = self;
+        let scale = |rhs: &mut [T], factors: &[T]| {
+            for column in rhs.chunks_exact_mut(size.max(1)) {
+                column.iter_mut().zip(factors).for_each(|(x, &factor)| *x *= factor);
+            }
+        };
+        scale(rhs, rows);
+        if count > 0 {
+            T::lu_solve((symbolic, numeric), Side::Given, &mut rhs[..count * size], count, memory);
+        }
+        scale(rhs, columns);
+    }
+
+    fn stored_values(&self) -> usize {
+        self.bound
+    }
+}
