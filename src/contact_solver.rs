@@ -35,12 +35,12 @@ impl From<ContactLaw> for Bound {
 
 /// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
 ///
-/// W is the Delassus operator (symmetric, positive semidefinite; definite on independent rows), with the compliances of
-/// the laws on its diagonal. y has the unit of a gap, and so have the tolerances: a residual compares y_i with W_ii λ_i,
+/// W is the Delassus operator (positive semidefinite; definite on independent rows), with the compliances of the laws on its
+/// diagonal. It is as symmetric as the effective matrix A: W = G A⁻¹ Gᵀ. y has the unit of a gap, and so have the tolerances: a residual compares y_i with W_ii λ_i,
 /// never meters with newtons.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactProblem<'a, T> {
-    /// W, column-major, size × size.
+    /// W row by row, size × size: entry (i, j), what λ_j adds to y_i, is at `i · size + j`.
     pub delassus: &'a [T],
     /// q: y at λ = 0.
     pub offset: &'a [T],
@@ -61,10 +61,10 @@ impl<'a, T: Real> ContactProblem<'a, T> {
 
     /// Entry (i, j) of W.
     pub fn delassus(&self, i: usize, j: usize) -> T {
-        self.delassus[i + j * self.size()]
+        self.delassus[i * self.size() + j]
     }
 
-    /// Row i of W, which is symmetric: its column i.
+    /// Row i of W.
     pub fn row(&self, i: usize) -> &'a [T] {
         &self.delassus[i * self.size()..(i + 1) * self.size()]
     }
@@ -115,6 +115,13 @@ pub enum ContactFailure<T> {
         /// Its residual, in the unit of y.
         residual: T,
     },
+    /// W is not symmetric, and the solver is for symmetric ones; nothing was done.
+    Unsymmetric {
+        /// The pair of rows whose entries across the diagonal differ most.
+        row: usize,
+        /// The other row.
+        other: usize,
+    },
 }
 
 impl<T: Real> std::fmt::Display for ContactFailure<T> {
@@ -127,6 +134,13 @@ impl<T: Real> std::fmt::Display for ContactFailure<T> {
             Self::NotConverged { iterations, row, residual } => {
                 let residual = residual.value();
                 write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
+            }
+            Self::Unsymmetric { row, other } => {
+                write!(
+                    f,
+                    "rows {row} and {other} answer to each other differently: W is not symmetric; use ActiveSet or \
+                     GaussSeidel"
+                )
             }
         }
     }

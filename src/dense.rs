@@ -1,5 +1,5 @@
 //! Cholesky factorization of the small dense matrices of contact, semidefinite ones included: Delassus operators and
-//! S = G M⁻¹ Gᵀ.
+//! S = G M⁻¹ Gᵀ. LU for Delassus operators that are not symmetric.
 //!
 //! The size is the number of closed contacts. Rows that share no body leave zeros, and these are skipped, so that the
 //! diagonal S of a lumped mass costs next to nothing; large full matrices go to faer's blocked kernel. Redundant contacts
@@ -8,13 +8,13 @@
 use crate::memory::Scratch;
 use crate::real::{Real, kernels::Kernels};
 
-/// Lower factor L of a symmetric positive semidefinite matrix, kept with its memory.
+/// Lower factor L of a symmetric positive semidefinite matrix, or L U of any other, kept with its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DenseCholesky<T> {
     size: usize,
-    /// Size × size: the lower triangle of L row by row, or column by column if it is `blocked`.
+    /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; of an LU both triangles row by row.
     l: Vec<T>,
-    /// First nonzero column of each row of L (its skyline).
+    /// First nonzero column of each row of L (its skyline); of an LU the row that each pivot was exchanged with.
     first: Vec<usize>,
     /// Diagonal of the matrix.
     diagonal: Vec<T>,
@@ -32,6 +32,7 @@ enum Kind {
     #[default]
     Skyline,
     Blocked,
+    General,
 }
 
 /// Smallest size for the blocked kernel.
@@ -126,6 +127,72 @@ impl<T: Real> DenseCholesky<T> {
         Ok(())
     }
 
+    /// Factorizes a matrix that need not be symmetric, with entries `entry(i, j)` and a diagonal that is not negative, by LU with
+    /// partial pivoting. Rows and columns are measured by the roots of the diagonal.
+    ///
+    /// Where a pivot is lost in rounding the factorization is singular, and ends: it cannot be solved with. `Err(row)` as from
+    /// [`factorize`](Self::factorize).
+    pub(crate) fn factorize_general(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
+        let Self { l, first: exchanges, diagonal, independent, kind, .. } = self;
+        (self.size, *kind) = (size, Kind::General);
+        l.clear();
+        exchanges.clear();
+        diagonal.clear();
+        independent.clear();
+        for i in 0..size {
+            l.extend((0..size).map(|j| entry(i, j)));
+            let row = &l[i * size..];
+            diagonal.push(row[i].sqrt());
+            if !(row[i] >= T::zero() && T::all_finite(row)) {
+                return Err(i);
+            }
+        }
+        let dependent = T::of(16.0 * size as f64) * T::epsilon();
+        // `diagonal` goes with the rows; the measure of a column is taken before they are exchanged.
+        for k in 0..size {
+            let measure = entry(k, k).sqrt();
+            let share = |i: usize| l[i * size + k].abs() / diagonal[i];
+            let pivot = (k + 1..size).fold(k, |best, i| if share(i) > share(best) { i } else { best });
+            // Written so that NaN, of a zero diagonal, is singular too.
+            let sound = share(pivot) > dependent * measure;
+            if !sound {
+                return Ok(());
+            }
+            exchanges.push(pivot);
+            independent.push(k);
+            if pivot != k {
+                diagonal.swap(k, pivot);
+                let (upper, lower) = l.split_at_mut(pivot * size);
+                upper[k * size..(k + 1) * size].swap_with_slice(&mut lower[..size]);
+            }
+            let (done, rest) = l.split_at_mut((k + 1) * size);
+            let pivots = &done[k * size..];
+            for row in rest.chunks_exact_mut(size) {
+                let factor = row[k] / pivots[k];
+                row[k] = factor;
+                if factor != T::zero() {
+                    T::axpy(-factor, &pivots[k + 1..], &mut row[k + 1..]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves L U x = b in place.
+    fn solve_general(&self, x: &mut [T]) {
+        let Self { size: n, l, first: exchanges, .. } = self;
+        for (k, &pivot) in exchanges.iter().enumerate() {
+            x.swap(k, pivot);
+        }
+        for i in 0..*n {
+            x[i] -= dot(&l[i * n..i * n + i], &x[..i]);
+        }
+        for i in (0..*n).rev() {
+            let row = &l[i * n..(i + 1) * n];
+            x[i] = (x[i] - dot(&row[i + 1..], &x[i + 1..])) / row[i];
+        }
+    }
+
     /// Whether some row depends on the others.
     pub(crate) fn is_singular(&self) -> bool {
         self.independent.len() < self.size
@@ -150,9 +217,14 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
-    /// Solves A x = b in place; for a singular A the x of least norm among those of least residual.
+    /// Solves A x = b in place; for a singular A the x of least norm among those of least residual (none by a general
+    /// factorization).
     pub(crate) fn solve(&mut self, x: &mut [T]) {
         let n = self.size;
+        if self.kind == Kind::General {
+            self.solve_general(x);
+            return;
+        }
         if self.kind == Kind::Blocked {
             T::dense_cholesky_solve(n, &self.l, x);
             return;
@@ -236,6 +308,37 @@ mod tests {
     fn product(n: usize, rank: usize) -> Vec<Vec<f64>> {
         let b = |i: usize, k: usize| ((i * 7 + k * 13 + i * k) % 11) as f64 - 5.0 + if i == k { 40.0 } else { 0.0 };
         (0..n).map(|i| (0..n).map(|j| (0..rank).map(|k| b(i, k) * b(j, k)).sum()).collect()).collect()
+    }
+
+    #[test]
+    fn general_matrices_are_solved_with_and_singular_ones_found() {
+        for n in [1, 2, 5, 40, 90] {
+            // Skew beside a small symmetric part, in units that differ by rows and columns: (unit i) a (unit j).
+            let unit = |i: usize| [1.0, 1e6, 1e-5][i % 3];
+            let skew = |i: usize, j: usize| ((i * 13 + j * 7) % 11) as f64 - 5.0;
+            let a = |i: usize, j: usize| {
+                let regular = if i == j { 0.1 } else { skew(i.min(j), i.max(j)) * if i < j { 1.0 } else { -1.0 } };
+                unit(i) * unit(j) * regular
+            };
+            let x: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sin() / unit(i)).collect();
+            let mut b: Vec<f64> = (0..n).map(|i| (0..n).map(|j| a(i, j) * x[j]).sum()).collect();
+            let mut factor = DenseCholesky::with_capacity(n);
+            factor.factorize_general(n, a).unwrap();
+            assert!(!factor.is_singular());
+            factor.solve(&mut b);
+            for (i, (b, x)) in b.iter().zip(&x).enumerate() {
+                assert!((b - x).abs() * unit(i) < 1e-9, "{n}, row {i}: {b} {x}");
+            }
+        }
+        let mut factor = DenseCholesky::with_capacity(3);
+        // The third row is the sum of the others.
+        let a = [[2.0, 1.0, 0.5], [-1.0, 3.0, 0.1], [1.0, 4.0, 0.6]];
+        factor.factorize_general(3, |i, j| a[i][j]).unwrap();
+        assert!(factor.is_singular());
+        factor.factorize_general(2, |_, _| 0.0).unwrap();
+        assert!(factor.is_singular());
+        assert_eq!(factor.factorize_general(2, |i, _| if i == 1 { f64::NAN } else { 1.0 }), Err(1));
+        assert_eq!(factor.factorize_general(2, |i, j| if i == j { i as f64 - 1.0 } else { 0.0 }), Err(0));
     }
 
     #[test]

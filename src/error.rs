@@ -55,7 +55,7 @@ pub enum Error {
     /// A matrix that must be symmetric is not; both triangles must be stored.
     #[error(
         "the {matrix} matrix is not symmetric: entry ({row}, {column}) is {value:e}, entry ({column}, {row}) is \
-         {mirrored:e}; store both triangles"
+         {mirrored:e}; store both triangles (an effective matrix that is not to be symmetric takes the linear solver Lu)"
     )]
     Asymmetric {
         /// Which matrix.
@@ -210,6 +210,20 @@ pub enum Error {
         other: ContactId,
         /// The violation, in units of the gap.
         violation: f64,
+    },
+    /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver is for
+    /// symmetric problems.
+    #[error(
+        "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is not \
+         symmetric; solve contact by ActiveSet or GaussSeidel"
+    )]
+    UnsymmetricContacts {
+        /// Time of the stage.
+        t: f64,
+        /// The pair that differs most.
+        contact: ContactId,
+        /// The other contact of the pair.
+        other: ContactId,
     },
     /// The contact problem was not solved.
     #[error(

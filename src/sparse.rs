@@ -31,6 +31,32 @@ pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<
     check_symmetric_in(matrix, a, &mut Vec::new())
 }
 
+/// Whether a matrix is symmetric to rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Symmetry {
+    Symmetric,
+    General,
+}
+
+/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries.
+pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<Symmetry> {
+    match check_symmetric(matrix, a) {
+        Ok(()) => Ok(Symmetry::Symmetric),
+        Err(Error::Asymmetric { .. }) => Ok(Symmetry::General),
+        Err(other) => Err(other),
+    }
+}
+
+impl Symmetry {
+    /// `y += c A x`.
+    pub(crate) fn product<T: Real>(self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+        match self {
+            Self::Symmetric => T::symmetric_product(c, a, x, y),
+            Self::General => T::product(c, a, x, y),
+        }
+    }
+}
+
 /// As [`check_symmetric`], with memory that is kept from one check to the next.
 pub(crate) fn check_symmetric_in<T: Real>(
     matrix: &'static str,
@@ -102,7 +128,7 @@ pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, colum
     rows.binary_search(&row).map_or(T::zero(), |at| a.val_of_col(column)[at])
 }
 
-/// A fixed pattern that holds weighted sums of several symmetric matrices, with rows and columns of some dofs replaced
+/// A fixed pattern that holds weighted sums of several matrices, with rows and columns of some dofs replaced
 /// by those of the identity; entries are moved by precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {

@@ -61,7 +61,8 @@ pub enum Linearity {
 ///
 /// Vectors have full length, supports included; the solver reads prescribed dofs from [`prescribed`](Self::prescribed)
 /// and never solves for them. Evaluations are pure: they may use scratch, but two calls with the same arguments give
-/// the same result; only [`commit`](Self::commit) moves history. M is constant, M and the tangent are symmetric.
+/// the same result; only [`commit`](Self::commit) moves history. M is constant and symmetric. A tangent that is not symmetric takes
+/// [`Lu`](crate::Lu) as the linear solver; the default one refuses it.
 ///
 /// A host writes five methods: [`dofs`](Self::dofs), [`mass`](Self::mass), [`force`](Self::force),
 /// [`pattern`](Self::pattern) and [`tangent`](Self::tangent) (compared with differences of the force by
@@ -133,7 +134,7 @@ pub trait System<T: Real>: Send {
     /// [`Error::Host`](crate::Error::Host); the `callback` of either is the name of the method, here `"force"`.
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()>;
 
-    /// Pattern of K and C together, both triangles, rows sorted in each column; it never changes.
+    /// Pattern of K and C together, both triangles (not necessarily of one shape, for [`Lu`](crate::Lu)), rows sorted in each column; it never changes.
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize>;
 
     /// `out = weights.stiffness K + weights.damping C` at (t, u, v), with K = −∂f/∂u and C = −∂f/∂v: the values of the
@@ -161,7 +162,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
-    /// −2 ∂f/∂to (which is the stiffness where f is linear) and symmetric: what is neglected costs iterations, not accuracy.
+    /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The exact one is not
+    /// symmetric and takes [`Lu`](crate::Lu); without it K must be symmetric.
     /// C is −∂f/∂v, as in [`tangent`](Self::tangent).
     /// Default: the tangent at the mean.
     ///
@@ -187,7 +189,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// Elastic energy (½ uᵀ K u if it is linear), if the system has one; none by default. The potential of loads is not
-    /// part of it.
+    /// part of it. Internal forces whose K is not symmetric have none: say none, and the balance does not take their work for
+    /// energy.
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let _ = u;
         None

@@ -25,6 +25,35 @@ impl<T: Real> ContactProblem<'_, T> {
             Bound::NonNegative => y.min(self.delassus(i, i) * multipliers[i]).abs(),
         }
     }
+
+    /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
+    pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
+        let mut worst = (share, None);
+        for i in 0..self.size() {
+            let own = self.delassus(i, i);
+            for (j, &w) in self.row(i)[..i].iter().enumerate() {
+                let mirrored = self.delassus(j, i);
+                let difference = (w - mirrored).abs();
+                // (Most pairs are equal bit for bit: no root for these.)
+                if difference > T::zero() {
+                    let scale = (own * self.delassus(j, j)).abs().sqrt().max(w.abs() + mirrored.abs());
+                    if difference > worst.0 * scale {
+                        worst = (difference / scale, Some((i, j)));
+                    }
+                }
+            }
+        }
+        worst.1
+    }
+
+    /// Refuses a W that is not symmetric. What rounding of badly conditioned responses makes of a symmetric one passes; that
+    /// little is for the acceptance rule to judge.
+    pub(super) fn check_symmetric(&self) -> std::result::Result<(), ContactFailure<T>> {
+        match self.asymmetry(T::epsilon().sqrt()) {
+            Some((row, other)) => Err(ContactFailure::Unsymmetric { row, other }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// How exactly, and how long, a solver tries.

@@ -10,16 +10,22 @@ use crate::real::Real;
 /// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
 /// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
 /// on only while the number of violations falls, otherwise a single row, the last one, is exchanged until it falls
-/// again. That is finite for every positive definite W. Steady contact takes one iteration, and while W and the active
+/// again. That is finite for every positive definite W, symmetric or not (Murty's rule: for every matrix with positive principal
+/// minors). Steady contact takes one iteration, and while W and the active
 /// rows stay the same no factorization.
 ///
 /// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are then
 /// those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a W, the
 /// problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control Optim.
 /// 14, 1976). Rows that contradict each other are an error that names them.
+///
+/// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant rows always
+/// go the way of proximal steps.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     factor: DenseCholesky<T>,
+    /// Whether W is symmetric, and the version of which that is known.
+    symmetry: (u64, Symmetry),
     /// The version of W and the rows that `factor` belongs to.
     factored: (u64, Vec<usize>),
     active: Vec<bool>,
@@ -34,6 +40,17 @@ pub struct ActiveSet<T = f64> {
     offset: Vec<T>,
     center: Vec<T>,
 }
+
+/// Whether W is symmetric to rounding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Symmetry {
+    #[default]
+    Symmetric,
+    General,
+}
+
+/// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is given.)
+const ROUNDED: f64 = 4096.0;
 
 /// Block exchanges granted without progress before single ones begin.
 const BLOCK_TRIES: usize = 3;
@@ -58,9 +75,10 @@ enum Form {
     Proximal,
 }
 
-/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding.
-fn judge<T: Real>(
+/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding; `column` gives those of W.
+fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     problem: &ContactProblem<'_, T>,
+    column: impl Fn(usize) -> C,
     (offset, shift, form): (&[T], &[T], Form),
     (rows, solution): (&[usize], &[T]),
     y: &mut Vec<T>,
@@ -73,7 +91,7 @@ fn judge<T: Real>(
     own.clear();
     own.extend(offset.iter().map(|q| q.abs()));
     for (&j, &lambda) in rows.iter().zip(solution) {
-        for ((&w, y), own) in problem.row(j).iter().zip(y.iter_mut()).zip(own.iter_mut()) {
+        for ((&w, y), own) in column(j).zip(y.iter_mut()).zip(own.iter_mut()) {
             *y += w * lambda;
             *own += (w * lambda).abs();
         }
@@ -89,10 +107,9 @@ fn judge<T: Real>(
     noise.clear();
     noise.extend_from_slice(own);
     for (j, &own) in own.iter().enumerate() {
-        let row = problem.row(j);
-        let carried = own / row[j];
+        let carried = own / problem.delassus(j, j);
         if carried > T::zero() && carried.is_finite() {
-            for (i, (&w, noise)) in row.iter().zip(noise.iter_mut()).enumerate() {
+            for (i, (&w, noise)) in column(j).zip(noise.iter_mut()).enumerate() {
                 if i != j {
                     *noise += w.abs() * carried;
                 }
@@ -110,7 +127,8 @@ impl<T: Real> ActiveSet<T> {
         form: Form,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { factor, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
+        let Self { factor, symmetry, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
+        let (_, symmetry) = *symmetry;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
         let proximal = form == Form::Proximal;
@@ -131,9 +149,16 @@ impl<T: Real> ActiveSet<T> {
                 factored.0 = 0;
                 let not_finite =
                     |i: usize| ContactFailure::NotConverged { iterations: iteration, row: rows[i], residual: T::nan() };
-                factor.factorize(rows.len(), entry).map_err(not_finite)?;
+                match symmetry {
+                    Symmetry::Symmetric => factor.factorize(rows.len(), entry).map_err(not_finite)?,
+                    Symmetry::General => factor.factorize_general(rows.len(), entry).map_err(not_finite)?,
+                }
                 factored.0 = if proximal { 0 } else { problem.version };
                 factored.1.clone_from(rows);
+            }
+            if symmetry == Symmetry::General && factor.is_singular() {
+                // There is no solution of least norm from an LU.
+                return Ok(Exchanges::Stuck(iteration));
             }
             solution.clear();
             solution.extend(rows.iter().map(|&i| -offset[i]));
@@ -145,7 +170,14 @@ impl<T: Real> ActiveSet<T> {
             if let Some(row) = multipliers.iter().position(|lambda| !lambda.is_finite()) {
                 return Err(ContactFailure::NotConverged { iterations: iteration, row, residual: T::nan() });
             }
-            judge(problem, (offset, shift, form), (rows, solution), y, own, noise);
+            let (given, solved, size) = ((offset, &shift[..], form), (&rows[..], &solution[..]), size.max(1));
+            match symmetry {
+                // Rows lie side by side.
+                Symmetry::Symmetric => judge(problem, |j| problem.row(j).iter(), given, solved, y, own, noise),
+                Symmetry::General => {
+                    judge(problem, |j| problem.delassus[j..].iter().step_by(size), given, solved, y, own, noise);
+                }
+            }
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets go,
             // one that is left violated waits for the others.
             let open = |i: usize| factor.is_singular() && y[i] > noise[i];
@@ -245,6 +277,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         let reals = || Vec::with_capacity(size);
         *self = Self {
             factor: DenseCholesky::with_capacity(size),
+            symmetry: (0, Symmetry::Symmetric),
             factored: (0, Vec::with_capacity(size)),
             active: Vec::with_capacity(size),
             rows: Vec::with_capacity(size),
@@ -263,6 +296,13 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             return Ok(0);
         }
         let acceptance = Settings::default().begin(problem, multipliers)?;
+        if problem.version == 0 || self.symmetry.0 != problem.version {
+            let symmetry = match problem.asymmetry(T::of(ROUNDED) * T::epsilon()) {
+                None => Symmetry::Symmetric,
+                Some(_) => Symmetry::General,
+            };
+            self.symmetry = (problem.version, symmetry);
+        }
         match self.exchange(problem, multipliers, Form::Given)? {
             Exchanges::Solved(iterations) => Ok(iterations),
             Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, acceptance, iterations),

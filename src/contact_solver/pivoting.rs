@@ -28,6 +28,9 @@ use crate::real::Real;
 /// that the residual is more than rounding, sweeps of Gauss–Seidel spread the load to the rows they imply. It does not
 /// use the guess, so the multipliers never depend on it.
 ///
+/// A W that is not symmetric is refused ([`ContactFailure::Unsymmetric`]): the factor is a Cholesky factor, and the argument that no
+/// set comes twice needs an energy.
+///
 /// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen,
 /// and limited); a row whose independence is rounding counts as dependent.
 ///
@@ -339,6 +342,7 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
         let size = problem.size();
         multipliers.fill(T::zero());
         let mut acceptance = Settings::default().begin(problem, multipliers)?;
+        problem.check_symmetric()?;
         self.basis.clear(size);
         self.status.clear();
         self.status.resize(size, Status::Inactive);

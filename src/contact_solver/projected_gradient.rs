@@ -20,7 +20,8 @@ use crate::real::Real;
 /// then unique, the multipliers are not: with free rows only it finds the solution nearest to the guess in the norm
 /// √(Σ W_ii λ_i²), from zero the smallest one; with unilateral rows one near it, which depends on the guess.
 ///
-/// The acceptance rule is that of `GaussSeidel`, as is the treatment of the guess.
+/// The acceptance rule is that of `GaussSeidel`, as is the treatment of the guess. A W that is not symmetric is refused
+/// ([`ContactFailure::Unsymmetric`]): there is nothing to minimize.
 ///
 /// Known weakness: iterations grow with the root of the condition of W (Gauss–Seidel: with the condition), and the last
 /// digits come slowly where contacts are about to open. The tolerance is one for all rows: small gaps beside large ones
@@ -175,6 +176,7 @@ impl<T: Real> ContactSolver<T> for ProjectedGradient<T> {
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let Self { settings, memory } = self;
         let mut acceptance = settings.begin(problem, multipliers)?;
+        problem.check_symmetric()?;
         let bound = memory.begin(problem, multipliers);
         let (mut lipschitz, mut age) = (T::one(), T::one());
         for iteration in 0..settings.iterations {

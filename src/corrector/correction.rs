@@ -614,5 +614,8 @@ pub(crate) fn contact_error<T: Real>(
         ContactFailure::NotConverged { iterations, row, residual } => {
             Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
         }
+        ContactFailure::Unsymmetric { row, other } => {
+            Error::UnsymmetricContacts { t, contact: id(row), other: id(other) }
+        }
     }
 }

@@ -53,7 +53,7 @@ const DEAR: f64 = 1.25;
 #[derive(Debug)]
 struct Delassus<T> {
     rows: Vec<usize>,
-    /// Column-major, with the compliances of the laws on the diagonal.
+    /// Row by row, with the compliances of the laws on the diagonal.
     values: Vec<T>,
     /// The diagonal without them.
     diagonal: Vec<T>,
@@ -266,10 +266,13 @@ impl<T: Real> Operator<T> {
             assembled.clear();
             assembled.extend_from_slice(rows);
             values.clear();
+            values.resize(size * size, T::zero());
             diagonal.clear();
             for (k, &j) in rows.iter().enumerate() {
                 let response = &columns[j * on_interface..(j + 1) * on_interface];
-                values.extend(rows.iter().map(|&i| g.interface_product(i, response)));
+                for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
+                    *entry = g.interface_product(i, response);
+                }
                 diagonal.push(values[k * size + k]);
             }
         }

@@ -4,15 +4,20 @@ use super::{Damping, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
-use crate::sparse::{self, Combination};
+use crate::sparse::{self, Combination, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
 type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 
-/// `M a + C v + K u = F(t) + Gᵀ λ` with symmetric M, C and K (both triangles stored).
+/// `M a + C v + K u = F(t) + Gᵀ λ` with constant M, C and K (both triangles stored), M symmetric.
 ///
 /// A mass matrix without entries off the diagonal is recognized as lumped. Without damping nothing is paid for damping.
+///
+/// C (gyroscopic forces) and K (circulatory ones, loads that follow the motion) need not be symmetric; a scheme that has them in its
+/// effective matrix then takes [`Lu`](crate::Lu) as its linear solver, others refuse it by [`Error::Asymmetric`]. A K that is not
+/// symmetric has no potential: [`Energy::potential`](crate::Energy) is then none, and what all of K u does is in the remainder
+/// of the energy balance. A gyroscopic C does no work, and the balance holds as with any other.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -34,6 +39,8 @@ type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 pub struct LinearSystem<'a, T: Real> {
     mass: StoredMass<T>,
     stiffness: SparseColMat<usize, T>,
+    /// Whether K is symmetric.
+    symmetry: Symmetry,
     damping: StoredDamping<T>,
     /// K and a general C in one pattern; K's own pattern is enough without C.
     union: Option<Combination>,
@@ -55,7 +62,7 @@ enum StoredDamping<T> {
         mass: T,
         stiffness: T,
     },
-    General(SparseColMat<usize, T>),
+    General(SparseColMat<usize, T>, Symmetry),
 }
 
 impl<T: Real> std::fmt::Debug for LinearSystem<'_, T> {
@@ -73,7 +80,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], or [`Error::Mass`]
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for M, or [`Error::Mass`]
     /// for a diagonal mass that is negative (zero is allowed: on dofs that are fixed or
     /// driven, and elsewhere with schemes that take [dofs without mass](crate::analysis::massless_factor)).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
@@ -109,10 +116,11 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
         }
         same_size("stiffness matrix", n, stiffness.as_ref())?;
-        sparse::check_symmetric("stiffness", stiffness.as_ref())?;
+        let symmetry = sparse::symmetry("stiffness", stiffness.as_ref())?;
         Ok(Self {
             mass,
             stiffness,
+            symmetry,
             damping: StoredDamping::None,
             union: None,
             load: None,
@@ -126,12 +134,12 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// As [`new`](Self::new), for C.
+    /// [`Error::Dimension`], [`Error::MatrixNotFinite`].
     pub fn damping(mut self, damping: SparseColMat<usize, T>) -> Result<Self> {
         same_size("damping matrix", self.dofs(), damping.as_ref())?;
-        sparse::check_symmetric("damping", damping.as_ref())?;
+        let symmetry = sparse::symmetry("damping", damping.as_ref())?;
         self.union = Some(Combination::new(self.dofs(), &[], &[self.stiffness.symbolic(), damping.symbolic()])?);
-        self.damping = StoredDamping::General(damping);
+        self.damping = StoredDamping::General(damping, symmetry);
         Ok(self)
     }
 
@@ -256,16 +264,18 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             T::axpy(*stiffness, v, &mut self.scratch);
         }
         let moved = if let StoredDamping::Rayleigh { .. } = &self.damping { &self.scratch[..] } else { u };
-        match &mut self.load {
-            None => T::symmetric_product_into(minus, self.stiffness.as_ref(), moved, out),
-            Some(load) => {
+        match (&mut self.load, self.symmetry) {
+            (None, Symmetry::Symmetric) => T::symmetric_product_into(minus, self.stiffness.as_ref(), moved, out),
+            (load, symmetry) => {
                 out.fill(T::zero());
-                load(t, out);
-                T::symmetric_product(minus, self.stiffness.as_ref(), moved, out);
+                if let Some(load) = load {
+                    load(t, out);
+                }
+                symmetry.product(minus, self.stiffness.as_ref(), moved, out);
             }
         }
         match &self.damping {
-            StoredDamping::General(c) => T::symmetric_product(minus, c.as_ref(), v, out),
+            StoredDamping::General(c, symmetry) => symmetry.product(minus, c.as_ref(), v, out),
             StoredDamping::Rayleigh { mass, .. } if *mass > T::zero() => self.mass.view().product(-*mass, v, out),
             StoredDamping::None | StoredDamping::Rayleigh { .. } => {}
         }
@@ -280,7 +290,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         let TangentWeights { stiffness: ku, damping: kv } = weights;
         let k = self.stiffness.val();
         match (&self.union, &self.damping) {
-            (Some(union), StoredDamping::General(c)) => union.fill(&[(ku, k), (kv, c.val())], None, out),
+            (Some(union), StoredDamping::General(c, _)) => union.fill(&[(ku, k), (kv, c.val())], None, out),
             (Some(union), StoredDamping::Rayleigh { mass, stiffness }) => match &self.mass {
                 StoredMass::Lumped(m) => union.fill(&[(ku + kv * *stiffness, k)], Some((kv * *mass, m)), out),
                 StoredMass::Consistent(m) => {
@@ -296,13 +306,13 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     fn damping_force(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Damping {
         match &self.damping {
             StoredDamping::None => return Damping::None,
-            StoredDamping::General(c) => {
+            StoredDamping::General(c, symmetry) => {
                 out.fill(T::zero());
-                T::symmetric_product(T::one(), c.as_ref(), v, out);
+                symmetry.product(T::one(), c.as_ref(), v, out);
             }
             StoredDamping::Rayleigh { mass, stiffness } => {
                 out.fill(T::zero());
-                T::symmetric_product(*stiffness, self.stiffness.as_ref(), v, out);
+                self.symmetry.product(*stiffness, self.stiffness.as_ref(), v, out);
                 self.mass.view().product(*mass, v, out);
             }
         }
@@ -310,6 +320,9 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     }
 
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
+        if self.symmetry == Symmetry::General {
+            return None;
+        }
         let k = self.stiffness.as_ref();
         let energy = |j: usize| {
             let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
