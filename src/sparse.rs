@@ -38,11 +38,15 @@ pub(crate) enum Symmetry {
     General,
 }
 
-/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries.
+/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries. One with entries on one side
+/// of the diagonal alone is taken for half of a symmetric one, and refused.
 pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<Symmetry> {
+    let stored = |side: fn(&usize, &usize) -> bool| {
+        (0..a.ncols()).any(|column| a.row_idx_of_col_raw(column).iter().any(|row| side(row, &column)))
+    };
     match check_symmetric(matrix, a) {
         Ok(()) => Ok(Symmetry::Symmetric),
-        Err(Error::Asymmetric { .. }) => Ok(Symmetry::General),
+        Err(Error::Asymmetric { .. }) if stored(usize::gt) && stored(usize::lt) => Ok(Symmetry::General),
         Err(other) => Err(other),
     }
 }

@@ -105,7 +105,13 @@ fn wrong_sizes_are_refused() {
 #[test]
 fn asymmetric_matrices_are_refused_with_the_worst_entry() {
     let k = matrix(2, &[(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
-    refused!(LinearSystem::lumped(vec![1.0; 2], k), Error::Asymmetric { .. }, "stiffness", "-4e0", "-3e0");
+    // Cholesky cannot factorize it, and names who can.
+    let system = LinearSystem::lumped(vec![4.0; 2], k).unwrap();
+    let built = Simulation::builder(system, Newmark::trapezoidal(), 2.0).build();
+    refused!(built, Error::Asymmetric { matrix: "effective", .. }, "-4e0", "-3e0", "Lu");
+    let m = matrix(2, &[(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
+    let k = matrix(2, &[(0, 0, 1.0), (1, 1, 1.0)]);
+    refused!(LinearSystem::new(m, k), Error::Asymmetric { matrix: "mass", .. }, "-4e0", "-3e0");
     // One triangle alone is the usual way to get there.
     let lower = matrix(2, &[(0, 0, 4.0), (1, 0, -4.0), (1, 1, 4.0)]);
     refused!(LinearSystem::lumped(vec![1.0; 2], lower), Error::Asymmetric { row: 1, column: 0, .. }, "both triangles");

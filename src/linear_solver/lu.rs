@@ -44,12 +44,12 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// let gyroscopic = matrix(&[(0, 1, 15.0), (1, 0, -15.0)])?;
 /// let rotor = LinearSystem::lumped(vec![1.0, 1.0], shaft)?.damping(gyroscopic)?;
 ///
-/// // Its circular whirls have ω² ± 15 ω = 100: the forward one turns with 20, the backward one with −5.
+/// // Its circular whirls have ω² − 15 ω = 100: the forward one turns with 20, the backward one with −5.
 /// let period = 2.0 * std::f64::consts::PI / 20.0;
 /// let mut run = Simulation::builder(rotor, Newmark::trapezoidal(), period / 1000.0)
 ///     .linear_solver(Lu)
 ///     .displacement(vec![1.0, 0.0])
-///     .velocity(vec![0.0, -20.0])
+///     .velocity(vec![0.0, 20.0])
 ///     .build()?;
 /// run.run_until(period, &mut ())?;
 /// assert!((run.state().displacement()[0] - 1.0).abs() < 1e-4);

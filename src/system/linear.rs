@@ -80,7 +80,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for M, or [`Error::Mass`]
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an M that is not symmetric and a K
+    /// of one triangle (store a zero in the other one if that is meant), or [`Error::Mass`]
     /// for a diagonal mass that is negative (zero is allowed: on dofs that are fixed or
     /// driven, and elsewhere with schemes that take [dofs without mass](crate::analysis::massless_factor)).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
@@ -134,7 +135,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`], [`Error::MatrixNotFinite`].
+    /// [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for a C of one triangle.
     pub fn damping(mut self, damping: SparseColMat<usize, T>) -> Result<Self> {
         same_size("damping matrix", self.dofs(), damping.as_ref())?;
         let symmetry = sparse::symmetry("damping", damping.as_ref())?;
