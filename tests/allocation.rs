@@ -4,11 +4,12 @@ use contact_dynamics::contact::{ContactLaw, Plane, Side, Sphere};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::partitioned::{self, Frame};
 use contact_dynamics::{
-    ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
-    LinearSystem, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
+    ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows, LinearSolver,
+    LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
@@ -25,6 +26,52 @@ fn steps_do_not_allocate() {
     bodies_apart();
     iterations();
     frames();
+    rotors();
+}
+
+/// A chain of gyroscopic pairs that hits a stop: solves by LU in contact and away, and factorizations of it.
+fn rotors() {
+    let n = 40;
+    let matrix = |entries: Vec<(usize, usize, f64)>| {
+        let entries: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+        SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).unwrap()
+    };
+    let held = (0..n).map(|i| (i, i, 3.0));
+    let springs = (2..n).flat_map(|i| [(i, i, 9.0), (i - 2, i - 2, 9.0), (i, i - 2, -9.0), (i - 2, i, -9.0)]);
+    let stiffness = matrix(held.chain(springs).collect());
+    let gyroscopic = matrix((0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, -2.0)]).collect());
+    let mut factor = Lu.analyze(stiffness.symbolic(), &[]).unwrap();
+    factor.factorize(stiffness.as_ref()).unwrap();
+    let mut x = vec![1.0; n];
+    let counted = allocation_counter::measure(|| {
+        factor.factorize(stiffness.as_ref()).unwrap();
+        factor.solve(&mut x).unwrap();
+    });
+    assert_eq!(counted.count_total, 0, "LU of a chain");
+
+    let stops =
+        (0..n).step_by(3).fold(LinearRows::new(), |rows, dof| rows.unilateral(&[(dof, 1.0), (n - 1, 0.1)], 0.01));
+    let mut run = Simulation::builder(
+        LinearSystem::lumped(vec![1.0; n], stiffness).unwrap().damping(gyroscopic).unwrap(),
+        Newmark::trapezoidal(),
+        0.05,
+    )
+    .velocity((0..n).map(|i| (i as f64).sin()).collect())
+    .linear_solver(Lu)
+    .constraint(stops)
+    .corrector(PersistencyCorrection::with_history_projection())
+    .build()
+    .unwrap();
+    run.step().unwrap();
+    let mut changes = 0;
+    let counted = allocation_counter::measure(|| {
+        for _ in 0..200 {
+            run.step().unwrap();
+        }
+        changes = run.statistics().contact_changes;
+    });
+    assert!(changes > 20, "{changes} changes");
+    assert_eq!(counted.count_total, 0, "rotors by LU");
 }
 
 /// Blocks at large strains that bounce: Newton's method, factorizations, rows that follow a curved floor.

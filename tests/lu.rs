@@ -112,7 +112,13 @@ fn flow(side: usize, random: &mut Random) -> Entries {
     entries
 }
 
-fn check<T: Real>(name: &str, n: usize, entries: &Entries, tolerance: f64, factor: &mut Option<Box<dyn Factorization<T>>>) {
+fn check<T: Real>(
+    name: &str,
+    n: usize,
+    entries: &Entries,
+    tolerance: f64,
+    factor: &mut Option<Box<dyn Factorization<T>>>,
+) {
     let a = matrix::<T>(n, entries);
     let factor = factor.get_or_insert_with(|| Lu.analyze(a.symbolic(), &[]).unwrap());
     factor.factorize(a.as_ref()).unwrap();
@@ -394,7 +400,9 @@ fn verification_of_a_tangent_tells_asymmetry_from_error() {
 #[test]
 fn half_a_symmetric_matrix_is_still_found() {
     let whole = || matrix(2, &[(0, 0, 1.0), (1, 1, 1.0)]);
-    for half in [matrix(2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 1, 4.0)]), matrix(2, &[(0, 0, 4.0), (1, 0, 1.0), (1, 1, 4.0)])] {
+    for half in
+        [matrix(2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 1, 4.0)]), matrix(2, &[(0, 0, 4.0), (1, 0, 1.0), (1, 1, 4.0)])]
+    {
         assert!(matches!(LinearSystem::<f64>::lumped(vec![1.0; 2], half.clone()), Err(Error::Asymmetric { .. })));
         let damped = LinearSystem::lumped(vec![1.0; 2], whole()).unwrap().damping(half);
         assert!(matches!(damped, Err(Error::Asymmetric { .. })));
@@ -477,14 +485,17 @@ impl System<f64> for Follower {
         };
         let skew = if self.tangent == Tangent::Exact { self.force / BAR } else { 0.0 };
         // Column by column.
-        out.copy_from_slice(&[entry(0, 0), entry(1, 0) - skew, entry(0, 1) + skew, entry(1, 1)].map(|x| w.stiffness * x));
+        out.copy_from_slice(
+            &[entry(0, 0), entry(1, 0) - skew, entry(0, 1) + skew, entry(1, 1)].map(|x| w.stiffness * x),
+        );
         Ok(())
     }
 }
 
 #[test]
 fn follower_loads_converge_quadratically_with_their_exact_tangent() {
-    let error = verify::tangent(&mut Follower::new(90.0, 40.0, Tangent::Exact), 0.0, &[0.3, 1.1], &[0.0; 2], 1e-5, 1e-5);
+    let error =
+        verify::tangent(&mut Follower::new(90.0, 40.0, Tangent::Exact), 0.0, &[0.3, 1.1], &[0.0; 2], 1e-5, 1e-5);
     assert!(error.unwrap().stiffness.relative < 1e-8);
     let run = |tangent: Tangent| {
         let mut run = Simulation::builder(Follower::new(90.0, 40.0, tangent), Newmark::trapezoidal(), 0.25)
@@ -549,22 +560,20 @@ impl Shaft {
 
     fn system(&self) -> LinearSystem<'static, f64> {
         let n = self.mass.len();
-        LinearSystem::lumped(self.mass.clone(), matrix(n, &self.stiffness)).unwrap().damping(matrix(n, &self.damping)).unwrap()
+        LinearSystem::lumped(self.mass.clone(), matrix(n, &self.stiffness))
+            .unwrap()
+            .damping(matrix(n, &self.damping))
+            .unwrap()
     }
 }
 
 /// Stops on several discs: rows of G and gaps at u = 0.
 fn stops() -> (Dense, Vec<f64>) {
     let mut g = vec![vec![0.0; 2 * DISCS]; 5];
-    for (row, weights) in [
-        &[(0, 1.0)][..],
-        &[(1, -1.0)],
-        &[(2, 0.8), (3, 0.6)],
-        &[(4, -0.6), (5, 0.8), (1, 0.3)],
-        &[(2, -1.0), (4, 1.0)],
-    ]
-    .into_iter()
-    .enumerate()
+    for (row, weights) in
+        [&[(0, 1.0)][..], &[(1, -1.0)], &[(2, 0.8), (3, 0.6)], &[(4, -0.6), (5, 0.8), (1, 0.3)], &[(2, -1.0), (4, 1.0)]]
+            .into_iter()
+            .enumerate()
     {
         weights.iter().for_each(|&(dof, weight)| g[row][dof] = weight);
     }
@@ -632,9 +641,8 @@ impl Reference {
         assert!(skew > 0.05, "the scene is to test a W that is not symmetric: {skew}");
         let q: Vec<f64> = times(&g, &free).iter().zip(&gaps).map(|(q, gap)| q + gap).collect();
         self.lambda = enumerated(&w, &q);
-        let new: Vec<f64> = (0..n)
-            .map(|i| free[i] + self.lambda.iter().zip(&responses).map(|(l, x)| l * x[i]).sum::<f64>())
-            .collect();
+        let new: Vec<f64> =
+            (0..n).map(|i| free[i] + self.lambda.iter().zip(&responses).map(|(l, x)| l * x[i]).sum::<f64>()).collect();
         let new_v: Vec<f64> = (0..n).map(|i| 2.0 / h * (new[i] - u[i]) - v[i]).collect();
         let new_a: Vec<f64> = (0..n).map(|i| 4.0 / (h * h) * (new[i] - u[i]) - 4.0 / h * v[i] - a[i]).collect();
         self.motion = [new, new_v, new_a];
@@ -693,7 +701,8 @@ fn contact_with_an_unsymmetric_matrix_is_that_of_a_dense_reference() {
             for i in 0..n {
                 let rows = g.iter().zip(state.contacts().forces()).zip(start.contacts().forces());
                 let contact: f64 = rows.map(|((g, new), old)| 0.5 * h * g[i] * (new + old)).sum();
-                let change = shaft.mass[i] * (state.velocity()[i] - start.velocity()[i]) + damped[i] + 0.5 * h * elastic[i];
+                let change =
+                    shaft.mass[i] * (state.velocity()[i] - start.velocity()[i]) + damped[i] + 0.5 * h * elastic[i];
                 momentum = momentum.max((change - contact).abs() / scale);
             }
         }
@@ -701,7 +710,8 @@ fn contact_with_an_unsymmetric_matrix_is_that_of_a_dense_reference() {
     assert!(pressed > 200 && together >= 3, "{pressed} steps in contact, {together} rows at once");
     assert!(momentum < 1e-12, "{momentum:e}");
     // The others need a symmetric W and say so.
-    let others: [Box<dyn ContactSolver<f64>>; 2] = [Box::new(Pivoting::default()), Box::new(ProjectedGradient::default())];
+    let others: [Box<dyn ContactSolver<f64>>; 2] =
+        [Box::new(Pivoting::default()), Box::new(ProjectedGradient::default())];
     for solver in others {
         let mut run = build(solver);
         let failure = run.run_until(20.0, &mut ()).unwrap_err();
@@ -757,7 +767,8 @@ fn dense_problems_that_are_not_symmetric() {
         let q: Vec<f64> = (0..m).map(|i| unit[i] * random.next()).collect();
         let (flat, tolerance) = (w.concat(), vec![0.0; m]);
         let bounds = vec![Bound::NonNegative; m];
-        let problem = |version| ContactProblem { delassus: &flat, offset: &q, bounds: &bounds, tolerance: &tolerance, version };
+        let problem =
+            |version| ContactProblem { delassus: &flat, offset: &q, bounds: &bounds, tolerance: &tolerance, version };
         let dimensionless = |i: usize, x: f64| x * unit[i];
         // In sizes of one, for the enumeration.
         let plain: Dense = (0..m).map(|i| (0..m).map(|j| w[i][j] / unit[i] / unit[j]).collect()).collect();
@@ -790,8 +801,13 @@ fn redundant_and_contradictory_rows_of_a_problem_that_is_not_symmetric() {
     let rows = [0, 0, 1];
     let w: Vec<f64> = rows.iter().flat_map(|&i| rows.map(|j| base[i][j])).collect();
     let bounds = [Bound::NonNegative; 3];
-    let problem =
-        ContactProblem { delassus: &w, offset: &[-3.0, -3.0, -1.0], bounds: &bounds, tolerance: &[1e-15; 3], version: 0 };
+    let problem = ContactProblem {
+        delassus: &w,
+        offset: &[-3.0, -3.0, -1.0],
+        bounds: &bounds,
+        tolerance: &[1e-15; 3],
+        version: 0,
+    };
     let exact = solved(vec![base[0].to_vec(), base[1].to_vec()], vec![3.0, 1.0]);
     assert!(exact.iter().all(|&x| x > 0.0));
     for guess in [0.0, 1.0] {
@@ -805,8 +821,13 @@ fn redundant_and_contradictory_rows_of_a_problem_that_is_not_symmetric() {
     let g = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]];
     let answer = |i: usize, j: usize| (0..2).map(|a| (0..2).map(|b| g[i][a] * base[a][b] * g[j][b]).sum::<f64>()).sum();
     let w: Vec<f64> = (0..9).map(|k| answer(k / 3, k % 3)).collect();
-    let problem =
-        ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3], version: 0 };
+    let problem = ContactProblem {
+        delassus: &w,
+        offset: &[-1.0, -1.0, 0.5],
+        bounds: &bounds,
+        tolerance: &[1e-15; 3],
+        version: 0,
+    };
     let failure = ActiveSet::default().solve(&problem, &mut [0.0; 3]);
     assert!(matches!(failure, Err(ContactFailure::Contradictory { row: 0 | 1, other: 0 | 1, .. })), "{failure:?}");
 }
