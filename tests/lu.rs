@@ -189,17 +189,22 @@ fn units_do_not_matter() {
     let mut random = Random(8);
     for n in [30, 200] {
         let entries = strewn(n, 4, 6.0, &mut random);
-        let mut unit = |k: usize| 10_f64.powi(((random.next() * 8.0) as i32) * i32::from(k > 0));
-        let (rows, columns): (Vec<f64>, Vec<f64>) = (0..n).map(|i| (unit(i), unit(i))).unzip();
-        let scaled: Entries = entries.iter().map(|&(i, j, x)| (i, j, rows[i] * x * columns[j])).collect();
-        let x: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
-        let mut b: Vec<f64> = times(&dense(n, &entries), &x).iter().zip(&rows).map(|(b, r)| b * r).collect();
-        let a = matrix::<f64>(n, &scaled);
-        let mut factor = Lu.analyze(a.symbolic(), &[]).unwrap();
-        factor.factorize(a.as_ref()).unwrap();
-        factor.solve(&mut b);
-        let given: Vec<f64> = b.iter().zip(&columns).map(|(b, c)| b * c).collect();
-        assert!(apart(&given, &x) < 1e-9, "{:e}", apart(&given, &x));
+        // Units of dofs, as of translations and rotations, and beside them equations multiplied by anything.
+        for equations in [1.0, 10.0] {
+            let mut power = || 10_f64.powi((random.next() * 12.0) as i32);
+            let columns: Vec<f64> = (0..n).map(|_| power()).collect();
+            let rows: Vec<f64> =
+                columns.iter().map(|unit| if equations > 1.0 { unit * power().sqrt() } else { *unit }).collect();
+            let scaled: Entries = entries.iter().map(|&(i, j, x)| (i, j, rows[i] * x * columns[j])).collect();
+            let x: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
+            let mut b: Vec<f64> = times(&dense(n, &entries), &x).iter().zip(&rows).map(|(b, r)| b * r).collect();
+            let a = matrix::<f64>(n, &scaled);
+            let mut factor = Lu.analyze(a.symbolic(), &[]).unwrap();
+            factor.factorize(a.as_ref()).unwrap();
+            factor.solve(&mut b);
+            let given: Vec<f64> = b.iter().zip(&columns).map(|(b, c)| b * c).collect();
+            assert!(apart(&given, &x) < 1e-9, "{:e}", apart(&given, &x));
+        }
     }
 }
 
@@ -260,6 +265,11 @@ fn singular_matrices_name_what_moves() {
         let a = matrix::<f64>(900, &plate);
         Lu.analyze(a.symbolic(), &[]).unwrap().factorize(a.as_ref()).unwrap();
     }
+    // Two columns that are the same, in integers: an exact zero is met, and one of the two is named.
+    let twice: Entries = chain(12, |_| 1.0).into_iter().chain([(0, 0, 1.0)]).filter(|&(_, j, _)| j != 9).collect();
+    let copy: Entries = twice.iter().filter(|&&(_, j, _)| j == 3).map(|&(i, _, x)| (i, 9, x)).collect();
+    let dof = singular_at::<f64>(12, &[twice, copy].concat());
+    assert!(dof == 3 || dof == 9, "{dof}");
     // Structure alone: an empty row, an empty column, two columns for one row.
     assert_eq!(singular_at::<f64>(3, &vec![(0, 0, 1.0), (2, 2, 1.0), (2, 1, 1.0)]), 1);
     assert_eq!(singular_at::<f64>(3, &vec![(0, 0, 1.0), (2, 2, 1.0), (1, 2, 1.0)]), 1);

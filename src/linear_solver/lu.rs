@@ -154,10 +154,14 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
     Ok(heights.iter().sum::<usize>() + counts.iter().sum::<usize>())
 }
 
-/// The power of two that brings a positive number into [1, 2), if there is one.
-fn reciprocal_power<T: Real>(x: T) -> T {
+/// Passes over the matrix to scale it, at most; each halves the logarithms of what is out of scale.
+const PASSES: usize = 6;
+
+/// The power of two that brings the given root of a positive number into [½, 2), if there is one.
+fn reciprocal_power<T: Real>(x: T, root: i32) -> T {
     let (mantissa, exponent, _) = x.integer_decode();
-    let power = T::of(2.0).powi(-(i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed()));
+    let exponent = i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed();
+    let power = T::of(2.0).powi(-(exponent / root));
     if power.is_normal() { power } else { T::one() }
 }
 
@@ -202,32 +206,58 @@ impl<T: Real> Factor<T> {
     }
 
     /// Forms R A C; `Err` names a dof without entries.
+    ///
+    /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds units that
+    /// belong to dofs, and at last each to one.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
-        let Self { rows, columns, scaled, .. } = self;
-        rows.fill(T::zero());
-        for (&row, &value) in a.row_idx().iter().zip(a.val()) {
-            rows[row] = rows[row].max(value.abs());
-        }
-        if let Some(dof) = rows.iter().position(|&largest| largest == T::zero()) {
-            return Err(dof);
-        }
-        rows.iter_mut().for_each(|row| *row = reciprocal_power(*row));
-        for (dof, column) in columns.iter_mut().enumerate() {
-            let range = a.col_range(dof);
-            let entries =
-                a.row_idx()[range.clone()].iter().zip(&a.val()[range.clone()]).zip(&mut scaled[range.clone()]);
-            let mut largest = T::zero();
-            for ((&row, &value), scaled) in entries {
-                *scaled = value * rows[row];
-                largest = largest.max(scaled.abs());
+        self.scaled.copy_from_slice(a.val());
+        self.rows.fill(T::one());
+        self.columns.fill(T::one());
+        for _ in 0..PASSES {
+            if self.balance(|largest| reciprocal_power(largest, 2), |largest| reciprocal_power(largest, 2))? {
+                break;
             }
+        }
+        self.balance(|largest| reciprocal_power(largest, 1), |_| T::one())?;
+        self.balance(|_| T::one(), |largest| reciprocal_power(largest, 1))?;
+        Ok(())
+    }
+
+    /// Multiplies rows and columns by factors that depend on their largest entry; says whether there was nothing to do.
+    fn balance(
+        &mut self,
+        row_factor: impl Fn(T) -> T,
+        column_factor: impl Fn(T) -> T,
+    ) -> std::result::Result<bool, usize> {
+        let Self { pattern, scaled, rows, columns, probe: factors, .. } = self;
+        factors.fill(T::zero());
+        for (&row, &value) in pattern.row_idx().iter().zip(scaled.iter()) {
+            factors[row] = factors[row].max(value.abs());
+        }
+        let mut balanced = true;
+        for (dof, (row, factor)) in rows.iter_mut().zip(factors.iter_mut()).enumerate() {
+            if *factor == T::zero() {
+                return Err(dof);
+            }
+            *factor = row_factor(*factor);
+            *row *= *factor;
+            balanced &= *factor == T::one();
+        }
+        for (dof, column) in columns.iter_mut().enumerate() {
+            let range = pattern.as_ref().col_range(dof);
+            let entries = &mut scaled[range.clone()];
+            let largest = entries.iter().fold(T::zero(), |largest, value| largest.max(value.abs()));
             if largest == T::zero() {
                 return Err(dof);
             }
-            *column = reciprocal_power(largest);
-            scaled[range].iter_mut().for_each(|scaled| *scaled *= *column);
+            let own = column_factor(largest);
+            *column *= own;
+            balanced &= own == T::one();
+            for (value, &row) in entries.iter_mut().zip(&pattern.row_idx()[range]) {
+                *value *= own * factors[row];
+            }
         }
-        Ok(())
+        Ok(balanced)
     }
 
     /// Factorizes the scaled values; `Err(Ok(dof))` where no pivot is left.
