@@ -15,7 +15,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// follow the motion, gyroscopic and circulatory matrices), and indefinite ones.
 ///
 /// Columns are eliminated in an order with little fill for every choice of pivots (COLAMD), rows as the pivots demand. Rows and
-/// columns are first scaled by powers of two, each to a largest entry of about one: pivots do not depend on the units of
+/// columns are first scaled by powers of two, to largest entries of about one: pivots do not depend on the units of
 /// translations and rotations, or on a stiff body beside a soft one.
 ///
 /// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16 ε) (Hager's
@@ -157,12 +157,11 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
 /// Passes over the matrix to scale it, at most; each halves the logarithms of what is out of scale.
 const PASSES: usize = 6;
 
-/// The power of two that brings the given root of a positive number into [½, 2), if there is one.
-fn reciprocal_power<T: Real>(x: T, root: i32) -> T {
+/// The power of two next to 1/√x for a positive number; one for those within a factor of four of one.
+fn reciprocal_root<T: Real>(x: T) -> T {
     let (mantissa, exponent, _) = x.integer_decode();
     let exponent = i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed();
-    let power = T::of(2.0).powi(-(exponent / root));
-    if power.is_normal() { power } else { T::one() }
+    T::of(2.0).powi(-(exponent / 2))
 }
 
 /// A number between −1 and 1 that looks as if drawn at random; never near zero.
@@ -208,27 +207,21 @@ impl<T: Real> Factor<T> {
     /// Forms R A C; `Err` names a dof without entries.
     ///
     /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds units that
-    /// belong to dofs, and at last each to one.
+    /// belong to dofs.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
         self.scaled.copy_from_slice(a.val());
         self.rows.fill(T::one());
         self.columns.fill(T::one());
         for _ in 0..PASSES {
-            if self.balance(|largest| reciprocal_power(largest, 2), |largest| reciprocal_power(largest, 2))? {
+            if self.balance()? {
                 break;
             }
         }
-        self.balance(|largest| reciprocal_power(largest, 1), |_| T::one())?;
-        self.balance(|_| T::one(), |largest| reciprocal_power(largest, 1))?;
         Ok(())
     }
 
-    /// Multiplies rows and columns by factors that depend on their largest entry; says whether there was nothing to do.
-    fn balance(
-        &mut self,
-        row_factor: impl Fn(T) -> T,
-        column_factor: impl Fn(T) -> T,
-    ) -> std::result::Result<bool, usize> {
+    /// One pass over the matrix; says whether there was nothing to do.
+    fn balance(&mut self) -> std::result::Result<bool, usize> {
         let Self { pattern, scaled, rows, columns, probe: factors, .. } = self;
         factors.fill(T::zero());
         for (&row, &value) in pattern.row_idx().iter().zip(scaled.iter()) {
@@ -239,7 +232,7 @@ impl<T: Real> Factor<T> {
             if *factor == T::zero() {
                 return Err(dof);
             }
-            *factor = row_factor(*factor);
+            *factor = reciprocal_root(*factor);
             *row *= *factor;
             balanced &= *factor == T::one();
         }
@@ -250,7 +243,7 @@ impl<T: Real> Factor<T> {
             if largest == T::zero() {
                 return Err(dof);
             }
-            let own = column_factor(largest);
+            let own = reciprocal_root(largest);
             *column *= own;
             balanced &= own == T::one();
             for (value, &row) in entries.iter_mut().zip(&pattern.row_idx()[range]) {
