@@ -164,8 +164,8 @@ pub trait System<T: Real>: Send {
     /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
     /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The exact one is not
     /// symmetric and takes [`Lu`](crate::Lu); without it K must be symmetric.
-    /// C is −∂f/∂v, as in [`tangent`](Self::tangent).
-    /// Default: the tangent at the mean.
+    /// C is −∂f/∂v, as in [`tangent`](Self::tangent). Default: the tangent at the mean.
+    /// Without `force_along` it is not asked for: the tangent is then that of Simpson's rule.
     ///
     /// # Errors
     ///

@@ -7,12 +7,14 @@ use contact_dynamics::contact_solver::{
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::{
     Bathe, Cholesky, Composite, EnergyMomentum, Error, Factorization, LinearRows, LinearSolver, LinearSystem, Lu, Mass,
-    Newmark, Newton, PersistencyCorrection, Real, Result, Simulation, System, TangentWeights, TimeIntegrator, verify,
+    Newmark, Newton, Path, PathForce, PersistencyCorrection, Real, Result, Simulation, System, TangentWeights,
+    TimeIntegrator, verify,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::solids::Solid;
+use contact_dynamics_scenes::truss::{PendulumReference, Truss};
 
 /// Reproducible numbers (Knuth's linear congruential generator).
 struct Random(u64);
@@ -890,4 +892,123 @@ fn symmetric_systems_run_as_with_cholesky() {
     }
     assert!(one.statistics().contact_changes > 4);
     assert_eq!(one.statistics().newton_iterations, other.statistics().newton_iterations);
+}
+
+/// The stiff elastic pendulum with different forces and tangents of a path.
+struct Pendulum {
+    truss: Truss<2>,
+    along: Along,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Along {
+    /// The mean of three forces.
+    Generic,
+    /// Mean strain on the mean configuration, with a symmetric tangent.
+    Symmetric,
+    /// The same with its exact tangent.
+    Exact,
+}
+
+impl System<f64> for Pendulum {
+    fn dofs(&self) -> usize {
+        self.truss.dofs()
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        self.truss.mass()
+    }
+    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.truss.force(t, u, v, out)
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.truss.pattern()
+    }
+    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        self.truss.tangent(t, u, v, w, out)
+    }
+    fn force_along(&mut self, t: f64, path: Path<'_, f64>, v: &[f64], out: &mut [f64]) -> Result<PathForce> {
+        match self.along {
+            Along::Generic => Ok(PathForce::None),
+            Along::Symmetric | Along::Exact => self.truss.force_along(t, path, v, out),
+        }
+    }
+    fn tangent_along(
+        &mut self,
+        t: f64,
+        path: Path<'_, f64>,
+        v: &[f64],
+        w: TangentWeights<f64>,
+        out: &mut [f64],
+    ) -> Result<()> {
+        assert_ne!(self.along, Along::Generic, "not asked for without a force of the path");
+        self.truss.tangent_along(t, path, v, w, out)?;
+        if self.along == Along::Exact {
+            // EA/L³ x̄ x(to)ᵀ in place of EA/L³ x̄ x̄ᵀ; the support is the first node, the mass the second.
+            let stiffness = w.stiffness * self.truss.axial(0) / PendulumReference::LENGTH.powi(3);
+            let place = |u: &[f64]| [PendulumReference::LENGTH + u[2], u[3]];
+            let (mean, to) = (place(path.mean), place(path.to));
+            let pattern = self.truss.pattern();
+            for column in 2..4 {
+                let range = pattern.col_range(column);
+                for (&row, value) in pattern.row_idx_of_col_raw(column).iter().zip(&mut out[range]) {
+                    if row >= 2 {
+                        *value += stiffness * mean[row - 2] * (to[column - 2] - mean[column - 2]);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        self.truss.potential_energy(u)
+    }
+    fn prescribed(&self) -> &[usize] {
+        self.truss.prescribed()
+    }
+}
+
+/// Iterations a step, and the largest relative deviation of the energy, over ten seconds.
+fn swing(axial: f64, h: f64, along: Along, solver: Box<dyn LinearSolver<f64>>) -> Result<(f64, f64)> {
+    let mut run = Simulation::builder(Pendulum { truss: Truss::pendulum(axial), along }, EnergyMomentum, h)
+        .velocity(Truss::pendulum_velocity())
+        .linear_solver(solver)
+        .build()?;
+    let start = run.energy().total();
+    let mut deviation = 0.0_f64;
+    let steps = (10.0 / h).round();
+    for _ in 0..steps as usize {
+        run.step()?;
+        deviation = deviation.max((run.energy().total() / start - 1.0).abs());
+    }
+    Ok((run.statistics().newton_iterations as f64 / steps, deviation))
+}
+
+#[test]
+fn paths_with_their_tangents() {
+    // The exact tangent of the mean stress saves iterations where the bar is soft.
+    let mut saved = 0;
+    for axial in [1e4, 1e6, 1e7] {
+        for h in [0.01, 0.02, 0.05] {
+            let (few, energy) = swing(axial, h, Along::Exact, Box::new(Lu)).unwrap();
+            let (more, _) = swing(axial, h, Along::Symmetric, Box::new(Cholesky::default())).unwrap();
+            println!("EA = {axial:e}, h = {h}: {few} exact, {more} symmetric; energy {energy:e}");
+            assert!(few <= more + 0.05 && few < 3.1 && energy < 1e-8, "{axial:e}, {h}: {few} {more} {energy:e}");
+            saved += usize::from(few < more - 0.3);
+        }
+    }
+    assert!(saved >= 4, "{saved}");
+    // The mean of three forces, by Simpson's tangent: three iterations where that of the middle took eleven.
+    for (axial, h) in [(1e4, 0.05), (1e6, 0.05), (1e7, 0.02), (1e8, 0.01)] {
+        let (iterations, energy) = swing(axial, h, Along::Generic, Box::new(Cholesky::default())).unwrap();
+        println!("EA = {axial:e}, h = {h}: {iterations} generic; energy {energy:e}");
+        assert!(iterations < 3.2 && energy < 1e-7, "{axial:e}, {h}: {iterations}, {energy:e}");
+    }
+    // Longer steps pass matrices that are not definite: these take Lu.
+    for axial in [1e7, 1e8] {
+        let refused = swing(axial, 0.05, Along::Generic, Box::new(Cholesky::default()));
+        assert!(matches!(refused, Err(Error::IndefiniteTangent { .. })), "{refused:?}");
+        let (iterations, energy) = swing(axial, 0.05, Along::Generic, Box::new(Lu)).unwrap();
+        println!("EA = {axial:e}, h = 0.05: {iterations} generic by LU; energy {energy:e}");
+        assert!(iterations < 7.0 && energy < 1e-7, "{axial:e}: {iterations}, {energy:e}");
+    }
 }

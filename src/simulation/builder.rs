@@ -5,7 +5,7 @@ use super::control::{Judge, StepControl};
 use super::energy::Ledger;
 use super::newton::Newton;
 use super::newton_step::NewtonWork;
-use super::operator::At;
+use super::operator::{At, TangentOf};
 use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
@@ -245,7 +245,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         contact_solver.reserve(rows);
 
         let contact = (rows, constraints.interface());
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
         let h = history.clock.h;
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, contact };
         let program = compiler.compile(&scheme.tableau)?;

@@ -1,7 +1,7 @@
 //! Step-size control: refused steps are taken again with halves of the step, which grow back to the nominal one.
 
 use super::Simulation;
-use super::operator::At;
+use super::operator::{At, TangentOf};
 use crate::analysis::LocalError;
 use crate::error::{Error, Result, positive};
 use crate::observer::Observer;
@@ -243,7 +243,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Factorizes for h what is factorized for another step size.
     fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
         let Self { system, scheme, program, startup, state, .. } = self;
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
         program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
         match startup {
             Some(startup) => startup.set_step_size(&scheme.starter.stages, &mut **system, other, h, at),

@@ -3,8 +3,8 @@
 use super::Workspace;
 use super::contact_step::{Level, advance, keep, restore};
 use super::newton::{Iteration, Newton, TangentUpdate};
-use super::operator::At;
-use super::path::PathWork;
+use super::operator::{At, TangentOf};
+use super::path::{PathForm, PathWork};
 use super::program::ScaledRows;
 use super::step::StageSolve;
 use crate::contact::Candidates;
@@ -268,11 +268,15 @@ impl<T: Real> StageSolve<'_, '_, T> {
         work: &Workspace<T>,
     ) -> Result<()> {
         let motion = self.balanced(new, work.balance.as_ref());
-        let path = match (&newton.path, past.first()) {
-            (Some(_), Some(from)) if self.stage.along_path => Some(Path { from: &from.u, to: &new.u, mean: &motion.u }),
-            _ => None,
+        let of = match (&newton.path, past.first()) {
+            (Some(path), Some(from)) if self.stage.along_path => match path.form {
+                PathForm::Own => TangentOf::Path(Path { from: &from.u, to: &new.u, mean: &motion.u }),
+                PathForm::Middle => TangentOf::State,
+                PathForm::Simpson => TangentOf::Simpson { end: &new.u },
+            },
+            _ => TangentOf::State,
         };
-        let at = At { t: self.clock.at(self.stage.load), u: &motion.u, v: &motion.v, path };
+        let at = At { t: self.clock.at(self.stage.load), u: &motion.u, v: &motion.v, of };
         self.statistics.factorizations += 1;
         let factorized = self.operator.factorize(self.system, self.clock.h, at);
         factorized.map_err(|error| self.in_iteration(error, iteration))

@@ -23,6 +23,8 @@ pub(crate) struct Operator<T> {
     combination: Combination,
     /// Values of the system's tangent and of the effective matrix, kept where the tangent changes.
     part: Vec<T>,
+    /// The part of the tangent that is taken at the end of a path.
+    end: Vec<T>,
     values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
@@ -66,8 +68,18 @@ pub(crate) struct At<'m, T> {
     pub(crate) t: f64,
     pub(crate) u: &'m [T],
     pub(crate) v: &'m [T],
-    /// For schemes that take the force of a path.
-    pub(crate) path: Option<Path<'m, T>>,
+    pub(crate) of: TangentOf<'m, T>,
+}
+
+/// The force that a tangent belongs to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum TangentOf<'m, T> {
+    /// That of the motion.
+    State,
+    /// The system's own of a path.
+    Path(Path<'m, T>),
+    /// Simpson's mean over a path with this end, in whose middle the motion is.
+    Simpson { end: &'m [T] },
 }
 
 /// Whether K and C have a part in an effective matrix.
@@ -113,6 +125,7 @@ impl<T: Real> Operator<T> {
             linearity,
             combination,
             part: Vec::new(),
+            end: Vec::new(),
             values: Vec::new(),
             factor,
             interface,
@@ -150,14 +163,24 @@ impl<T: Real> Operator<T> {
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
-        let Self { weights, tangent, combination, factor, part, values, .. } = self;
+        let Self { weights, tangent, combination, factor, part, end: at_end, values, .. } = self;
         values.resize(combination.len(), T::zero());
         if *tangent == Tangent::Present {
             part.resize(system.pattern().row_idx().len(), T::zero());
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
-            match at.path {
-                None => system.tangent(at.t, at.u, at.v, weights, part)?,
-                Some(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
+            match at.of {
+                TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
+                TangentOf::Path(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
+                TangentOf::Simpson { end } => {
+                    // ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', twice: as ∂f/∂u' of the middle is half of that there.
+                    let third = weights.stiffness / T::of(3.0);
+                    at_end.resize(part.len(), T::zero());
+                    let of_end = TangentWeights { stiffness: third, damping: T::zero() };
+                    system.tangent(at.t, end, at.v, of_end, at_end)?;
+                    let of_middle = TangentWeights { stiffness: third + third, ..weights };
+                    system.tangent(at.t, at.u, at.v, of_middle, part)?;
+                    T::axpy(T::one(), at_end, part);
+                }
             }
         }
         let inertia = T::of(weights[2] / (h * h));

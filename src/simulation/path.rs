@@ -4,18 +4,30 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::system::{Damping, Path, PathForce, System};
 
+/// What the force of a path has been made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PathForm {
+    /// The system's own.
+    Own,
+    /// The force in the middle: there is no potential.
+    Middle,
+    /// Simpson's mean, or one near it.
+    Simpson,
+}
+
 /// Memory for forces along paths.
 #[derive(Debug)]
 pub(super) struct PathWork<T> {
     /// The potential where the step starts.
     start: Option<T>,
+    pub(super) form: PathForm,
     load: Vec<T>,
     scratch: Vec<T>,
 }
 
 impl<T: Real> PathWork<T> {
     pub(super) fn new(dofs: usize) -> Self {
-        Self { start: None, load: vec![T::zero(); dofs], scratch: vec![T::zero(); dofs] }
+        Self { start: None, form: PathForm::Own, load: vec![T::zero(); dofs], scratch: vec![T::zero(); dofs] }
     }
 
     /// Begins a stage that starts at `from`.
@@ -35,11 +47,16 @@ impl<T: Real> PathWork<T> {
         out: &mut [T],
     ) -> Result<()> {
         if system.force_along(t, Path { from, to, mean }, v, out)? == PathForce::Present {
+            self.form = PathForm::Own;
             return Ok(());
         }
-        let Self { start, load, scratch } = self;
+        let Self { start, form, load, scratch } = self;
         system.force(t, mean, v, out)?;
-        let (Some(before), Some(after)) = (*start, system.potential_energy(to)) else { return Ok(()) };
+        let (Some(before), Some(after)) = (*start, system.potential_energy(to)) else {
+            *form = PathForm::Middle;
+            return Ok(());
+        };
+        *form = PathForm::Simpson;
         let work = |force: &[T]| (0..to.len()).map(|i| force[i] * (to[i] - from[i])).sum::<T>();
         // What is not internal: loads and damping, the same in all three.
         system.external_load(t, load);

@@ -1,6 +1,6 @@
 //! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
 
-use super::operator::At;
+use super::operator::{At, TangentOf};
 use super::program::Compiler;
 use super::scheme::Scheme;
 use super::start::{self, Start, Violation, taylor};
@@ -63,7 +63,7 @@ impl<T: Real> Simulation<'_, T> {
         }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, path: None };
+        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
         program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
         if let Some(startup) = startup
             && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h, at)
@@ -150,7 +150,7 @@ impl<T: Real> Simulation<'_, T> {
         let depth = scheme.depth;
         if begun.1.known < depth && startup.is_none() {
             let contact = (rows, constraints.interface());
-            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v, path: None };
+            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v, of: TangentOf::State };
             let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, contact };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;

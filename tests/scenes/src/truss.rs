@@ -98,6 +98,11 @@ impl<const D: usize> Truss<D> {
         bar.stretched(&bar.extension(u)).iter().map(|x| x * x).sum::<f64>().sqrt() / bar.length
     }
 
+    /// EA of a bar.
+    pub fn axial(&self, bar: usize) -> f64 {
+        self.bars[bar].axial
+    }
+
     /// N of a bar.
     pub fn normal_force(&self, bar: usize, u: &[f64]) -> f64 {
         let bar = &self.bars[bar];
