@@ -1,5 +1,7 @@
 //! Matrices that are not symmetric: sparse LU by itself, and runs with gyroscopic, circulatory and follower forces, in contact
 //! and away from it.
+#![allow(clippy::float_cmp)] // exact zeros and small integers are meant exactly
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // small random numbers
 
 use contact_dynamics::contact_solver::{
     ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
@@ -57,8 +59,9 @@ fn solved(mut a: Dense, mut b: Vec<f64>) -> Vec<f64> {
         b.swap(k, pivot);
         for i in k + 1..n {
             let factor = a[i][k] / a[k][k];
-            for j in k..n {
-                a[i][j] -= factor * a[k][j];
+            let pivots = a[k].clone();
+            for (x, pivot) in a[i].iter_mut().zip(pivots) {
+                *x -= factor * pivot;
             }
             b[i] -= factor * b[k];
         }
@@ -79,12 +82,14 @@ fn apart(x: &[f64], y: &[f64]) -> f64 {
 
 type Entries = Vec<(usize, usize, f64)>;
 
+type Make = fn() -> Box<dyn TimeIntegrator>;
+
 /// About `per_column` entries a column at random places, and a diagonal that is strong, weak or missing.
 fn strewn(n: usize, per_column: usize, diagonal: f64, random: &mut Random) -> Entries {
     let mut entries = Vec::new();
     for column in 0..n {
         for _ in 0..per_column {
-            let row = (((random.next() + 1.0) / 2.0 * n as f64) as usize).min(n - 1);
+            let row = ((0.5 + 0.5 * random.next()) * n as f64) as usize;
             entries.push((row, column, random.next()));
         }
         if diagonal != 0.0 {
@@ -258,7 +263,9 @@ fn singular_matrices_name_what_moves() {
         }
         plate.retain(|&(i, j, _)| i != j);
         let mut sums = vec![0.0; 900];
-        plate.iter().for_each(|&(i, _, x)| sums[i] -= x);
+        for &(i, _, x) in &plate {
+            sums[i] -= x;
+        }
         plate.extend(sums.into_iter().enumerate().map(|(i, sum)| (i, i, sum)));
         assert!(singular_at::<f64>(900, &plate) < 900);
         assert!(singular_at::<f32>(900, &plate) < 900);
@@ -325,7 +332,7 @@ fn rotor(g: f64, k: f64) -> LinearSystem<'static, f64> {
 
 #[test]
 fn a_rotor_whirls_with_both_of_its_frequencies() {
-    let schemes: [(fn() -> Box<dyn TimeIntegrator>, bool); 4] = [
+    let schemes: [(Make, bool); 4] = [
         (|| Box::new(Newmark::trapezoidal()), true),
         (|| Box::new(Bathe::default()), false),
         (|| Box::new(Composite), false),
@@ -587,7 +594,9 @@ fn stops() -> (Dense, Vec<f64>) {
             .into_iter()
             .enumerate()
     {
-        weights.iter().for_each(|&(dof, weight)| g[row][dof] = weight);
+        for &(dof, weight) in weights {
+            g[row][dof] = weight;
+        }
     }
     (g, vec![0.05, 0.1, 0.02, 0.08, 0.03])
 }
@@ -679,7 +688,7 @@ fn contact_with_an_unsymmetric_matrix_is_that_of_a_dense_reference() {
             .build()
             .unwrap()
     };
-    let mut runs = [build(Box::new(ActiveSet::default())), build(Box::new(GaussSeidel::default()))];
+    let mut runs = [build(Box::<ActiveSet>::default()), build(Box::<GaussSeidel>::default())];
     let (mut pressed, mut together, mut momentum) = (0, 0, 0.0_f64);
     let (g, _) = stops();
     for step in 0..400 {
@@ -739,9 +748,9 @@ fn corrected_contact_of_a_gyroscopic_system_converges() {
     // Any scheme, with the correction: towards one motion as h falls. W is of M there, hence symmetric.
     let shaft = Shaft::new();
     let velocity: Vec<f64> = (0..2 * DISCS).map(|i| if i % 2 == 0 { -1.0 } else { 0.9 }).collect();
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+    let schemes: [Make; 3] =
         [|| Box::new(Newmark::trapezoidal()), || Box::new(Composite), || Box::new(Bathe::default())];
-    let end = |make: fn() -> Box<dyn TimeIntegrator>, steps: f64| {
+    let end = |make: Make, steps: f64| {
         let mut run = Simulation::builder(shaft.system(), make(), 0.6 / steps)
             .velocity(velocity.clone())
             .linear_solver(Lu)
@@ -856,7 +865,7 @@ fn symmetric_systems_run_as_with_cholesky() {
             .build()
             .unwrap()
     };
-    let (mut one, mut other) = (build(Box::new(Cholesky::default())), build(Box::new(Lu)));
+    let (mut one, mut other) = (build(Box::<Cholesky>::default()), build(Box::new(Lu)));
     for step in 0..300 {
         one.step().unwrap();
         other.step().unwrap();
@@ -883,7 +892,7 @@ fn symmetric_systems_run_as_with_cholesky() {
             .build()
             .unwrap()
     };
-    let (mut one, mut other) = (build(Box::new(Cholesky::default())), build(Box::new(Lu)));
+    let (mut one, mut other) = (build(Box::<Cholesky>::default()), build(Box::new(Lu)));
     for step in 0..60 {
         one.step().unwrap();
         other.step().unwrap();
