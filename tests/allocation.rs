@@ -8,8 +8,9 @@ use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::partitioned::{self, Frame};
 use contact_dynamics::{
-    ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows, LinearSolver,
-    LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation, TimeIntegrator,
+    ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
+    LinearSolver, LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
+    TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;

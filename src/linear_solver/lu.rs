@@ -324,6 +324,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
         self.state = State::None;
         self.check(a)?;
         if self.rows.is_empty() {
+            self.state = State::Factorized;
             return Ok(());
         }
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
@@ -343,17 +344,17 @@ impl<T: Real> Factorization<T> for Factor<T> {
         }
     }
 
-    fn solve(&mut self, rhs: &mut [T]) {
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
+        if self.state == State::None {
+            let reason = "there is none: the last factorization failed, or there was no first one";
+            return Err(Error::Incompatible { part: "the LU of the effective matrix".into(), reason });
+        }
         let size = self.rows.len();
         let count = rhs.len().checked_div(size).unwrap_or(0);
         if count > self.room {
-            self.memory = MemBuffer::new(T::lu_scratch(&self.symbolic, count));
+            self.memory = MemBuffer::try_new(T::lu_scratch(&self.symbolic, count))
+                .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch" })?;
             self.room = count;
-        }
-        if self.state == State::None {
-            // No factor: nothing may look like a solution.
-            rhs.fill(T::nan());
-            return;
         }
         let Self { symbolic, numeric, rows, columns, memory, .. } = self;
         let scale = |rhs: &mut [T], factors: &[T]| {
@@ -366,6 +367,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
             T::lu_solve((symbolic, numeric), Side::Given, &mut rhs[..count * size], count, memory);
         }
         scale(rhs, columns);
+        Ok(())
     }
 
     fn stored_values(&self) -> usize {
