@@ -37,6 +37,7 @@ pub use faer;
 pub use integrator::*;
 pub use linear_solver::{
     Automatic, ByBody, Cholesky, Condensation, ConjugateGradients, Diagonal, Factorization, LinearSolver, Lu,
+    Tridiagonal,
 };
 pub use mass::Mass;
 pub use observer::{Control, Observer, StepView};

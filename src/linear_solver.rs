@@ -8,6 +8,7 @@ mod dissection;
 pub(crate) mod forest;
 mod lu;
 mod ordering;
+mod tridiagonal;
 
 pub use by_body::ByBody;
 pub use cholesky::Cholesky;
@@ -15,6 +16,7 @@ pub use conjugate_gradients::{ConjugateGradients, Preconditioner};
 pub use diagonal::Diagonal;
 pub use lu::Lu;
 pub use ordering::Ordering;
+pub use tridiagonal::Tridiagonal;
 
 use crate::error::Result;
 use crate::real::Real;
@@ -152,7 +154,8 @@ pub trait Condensation<T: Real> {
 /// Columns of forces on the interface that are solved for at once without allocating.
 pub(crate) const COLUMNS: usize = 16;
 
-/// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, else [`Cholesky`].
+/// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, [`Tridiagonal`] for strings with contact
+/// at one end each, else [`Cholesky`].
 ///
 /// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many contacts
 /// press, which a pattern does not tell, and a factorization is exact to rounding at any step.
@@ -168,7 +171,10 @@ impl<T: Real> LinearSolver<T> for Automatic {
     ) -> Result<Box<dyn Factorization<T>>> {
         match diagonal::is_diagonal(pattern) {
             true => Diagonal.analyze(pattern, last),
-            false => Cholesky::default().analyze(pattern, last),
+            false => match tridiagonal::try_analyze(pattern, last) {
+                Some(analyzed) => analyzed,
+                None => Cholesky::default().analyze(pattern, last),
+            },
         }
     }
 }

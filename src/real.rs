@@ -14,6 +14,7 @@ use num_traits::{Float, NumAssign};
 use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 
+pub(crate) mod chain;
 mod iteration;
 pub(crate) mod lu;
 mod sweep;
@@ -43,8 +44,9 @@ pub trait Real:
 
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
 pub(crate) mod kernels {
+    use super::chain::Chains;
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};
-    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw, iteration, sweep};
+    use super::{SparseColMatRef, SupernodalLltRef, SymbolicCholesky, SymbolicCholeskyRaw, chain, iteration, sweep};
     use crate::linear_solver::forest::Forest;
     use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
     use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
@@ -199,6 +201,10 @@ pub(crate) mod kernels {
         fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
         /// The backward sweep over `columns`; entries behind them hold the solution.
         fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
+        /// Down two chains.
+        fn chains_forward(chains: Chains<'_, Self>);
+        /// Up two chains, from what is known behind them.
+        fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]);
         /// The forward sweep over `columns` of a supernodal factor.
         fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
         /// The backward sweep over `columns`; entries behind them hold the solution.
@@ -645,6 +651,12 @@ pub(crate) mod kernels {
                 }
                 fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
                     simplicial_backward(factor, columns, x);
+                }
+                fn chains_forward(chains: Chains<'_, Self>) {
+                    chain::forward(chains);
+                }
+                fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]) {
+                    chain::backward(chains, behind);
                 }
                 fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
                     supernodal_forward(factor, columns, x);

@@ -3,7 +3,9 @@
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use contact_dynamics::{Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result};
+use contact_dynamics::{
+    Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result, Tridiagonal,
+};
 
 /// A symmetric positive definite matrix with the given pairs as off-diagonal entries.
 fn matrix<T: Real>(n: usize, pairs: &[(usize, usize)], shift: f64) -> SparseColMat<usize, T> {
@@ -405,6 +407,74 @@ fn errors_of_a_body_name_dofs_of_the_system() {
     assert!(matches!(found, Err(Error::Singular { dof: 5..10, .. })), "{found:?}");
     let other = matrix::<f64>(10, &chain(10), 1.0);
     assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Dimension { .. })));
+}
+
+/// Several strings of different lengths, a ring of two among single dofs; numbered upward, downward and strewn about.
+#[test]
+fn strings_are_solved_in_any_numbering() {
+    let n = 61;
+    let strings = [0..20, 20..21, 21..24, 24..60];
+    let pairs: Vec<_> = strings.iter().flat_map(|string| string.clone().skip(1).map(|i| (i - 1, i))).collect();
+    let numberings: [fn(usize) -> usize; 3] = [|i| i, |i| 60 - i, |i| i * 17 % 61];
+    for number in numberings {
+        let pairs: Vec<_> = pairs.iter().map(|&(i, j)| (number(i), number(j))).collect();
+        check::<f64>(&Tridiagonal, n, &pairs, 1e-11);
+        check::<f32>(&Tridiagonal, n, &pairs, 2e-3);
+        // Contact at no end, at the ends of some strings, on several dofs of an end, on a whole string and a dof alone.
+        for last in [vec![], vec![0], vec![19, 24], vec![57, 58, 59, 0, 1], vec![21, 22, 23, 60], (0..61).collect()] {
+            let mut last: Vec<usize> = last.into_iter().map(number).collect();
+            last.sort_unstable();
+            check_condensation::<f64>(&Tridiagonal, n, &pairs, &last, 1e-11);
+            check_condensation::<f32>(&Tridiagonal, n, &pairs, &last, 2e-3);
+        }
+    }
+}
+
+#[test]
+fn what_is_no_string_is_refused_by_the_tridiagonal_solver() {
+    let refused = |n: usize, pairs: &[(usize, usize)], last: &[usize]| {
+        let a = matrix::<f64>(n, pairs, 1.0);
+        let analyzed: Result<Box<dyn Factorization<f64>>> = Tridiagonal.analyze(a.symbolic(), last);
+        assert!(matches!(analyzed, Err(Error::Incompatible { .. })), "{pairs:?}, {last:?}");
+        // The automatic choice takes another solver then, with the same solution.
+        check_condensation::<f64>(&Automatic, n, pairs, last, 1e-11);
+    };
+    let ring: Vec<_> = chain(12).into_iter().chain([(11, 0)]).collect();
+    refused(12, &ring, &[]);
+    refused(15, &ring, &[]);
+    refused(12, &arrow(12), &[11]);
+    refused(12, &chain(12), &[5]);
+    refused(12, &chain(12), &[0, 11]);
+    refused(12, &chain(12), &[3, 10, 11]);
+
+    // One-sided patterns are no strings; a matrix with unequal halves is refused when it is factorized.
+    let one_sided = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0)].map(|(i, j, x)| Triplet::new(i, j, x));
+    let one_sided = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &one_sided).unwrap();
+    let analyzed: Result<Box<dyn Factorization<f64>>> = Tridiagonal.analyze(one_sided.symbolic(), &[]);
+    assert!(matches!(analyzed, Err(Error::Incompatible { .. })));
+    let unequal = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -0.9), (1, 1, 2.0)].map(|(i, j, x)| Triplet::new(i, j, x));
+    let unequal = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &unequal).unwrap();
+    let mut factor: Box<dyn Factorization<f64>> = Tridiagonal.analyze(unequal.symbolic(), &[]).unwrap();
+    assert!(matches!(factor.factorize(unequal.as_ref()), Err(Error::Asymmetric { .. })));
+}
+
+#[test]
+fn free_and_indefinite_strings_name_the_pivot() {
+    let a = matrix::<f64>(30, &chain(30), 0.0);
+    let mut factor: Box<dyn Factorization<f64>> = Tridiagonal.analyze(a.symbolic(), &[]).unwrap();
+    assert!(matches!(factor.factorize(a.as_ref()), Err(Error::Singular { dof: 29, .. })));
+    let negative = matrix::<f64>(30, &chain(30), -0.5);
+    assert!(matches!(factor.factorize(negative.as_ref()), Err(Error::Singular { .. })));
+    let mut values = a.val().to_vec();
+    values[0] = f64::NAN;
+    let broken = SparseColMat::new(a.symbolic().to_owned().unwrap(), values);
+    assert!(factor.factorize(broken.as_ref()).is_err());
+    // None of this spoils the analysis.
+    let good = matrix::<f64>(30, &chain(30), 1.0);
+    factor.factorize(good.as_ref()).unwrap();
+    let mut x = vec![1.0; 30];
+    factor.solve(&mut x).unwrap();
+    assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-14));
 }
 
 #[test]

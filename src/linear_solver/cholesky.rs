@@ -99,7 +99,7 @@ struct Factor<T: Real> {
 }
 
 /// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of zero.
-fn negligible<T: Real>(n: usize) -> T {
+pub(super) fn negligible<T: Real>(n: usize) -> T {
     T::of(16.0 * (n as f64).sqrt()) * T::epsilon()
 }
 

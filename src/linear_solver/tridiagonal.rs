@@ -1,0 +1,411 @@
+//! Chains: L D Lᵀ of matrices whose dofs hang together like beads on strings.
+
+use super::cholesky::negligible;
+use super::{Condensation, Factorization, LinearSolver};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::real::chain::Chains;
+use crate::{memory, sparse};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use std::ops::Range;
+
+/// L D Lᵀ of symmetric positive definite matrices that are tridiagonal when their dofs are numbered along strings: bars, and
+/// trains of masses and springs, in any numbering, any number of them. Contact may act on one end of a string.
+///
+/// Two scalars a dof, no indices, and two strings at a time: about half the time of [`Cholesky`](super::Cholesky), whose
+/// errors it shares. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) takes it where it fits.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{Factorization, LinearSolver, Tridiagonal};
+///
+/// // Dofs 2 – 0 – 1, coupled by springs.
+/// let entries = [(0, 0, 3.0), (1, 1, 2.0), (2, 2, 2.0), (0, 1, -1.0), (1, 0, -1.0), (0, 2, -1.0), (2, 0, -1.0)];
+/// let entries = entries.map(|(i, j, a)| Triplet::new(i, j, a));
+/// let a = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &entries)?;
+/// let mut factor: Box<dyn Factorization<f64>> = Tridiagonal.analyze(a.symbolic(), &[1])?;
+/// factor.factorize(a.as_ref())?;
+/// let mut x = [1.0, 1.0, 1.0];
+/// factor.solve(&mut x)?;
+/// assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-15));
+/// assert_eq!(factor.stored_values(), 5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tridiagonal;
+
+impl<T: Real> LinearSolver<T> for Tridiagonal {
+    fn analyze(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Box<dyn Factorization<T>>> {
+        match strings(pattern, last) {
+            Some(strings) => factorization(strings, last),
+            None => Err(Error::Incompatible {
+                part: "the tridiagonal solver".into(),
+                reason: "the effective matrix is not one of strings with contact at one end each; use Cholesky",
+            }),
+        }
+    }
+}
+
+/// The factorization, where the structure is one of strings.
+pub(super) fn try_analyze<T: Real>(
+    pattern: SymbolicSparseColMatRef<'_, usize>,
+    last: &[usize],
+) -> Option<Result<Box<dyn Factorization<T>>>> {
+    strings(pattern, last).map(|strings| factorization(strings, last))
+}
+
+/// The dofs along all strings, one string after the other.
+#[derive(Debug)]
+struct Strings {
+    order: Vec<usize>,
+    /// Where each string begins and where its dofs of contact begin; the next one follows.
+    begins: Vec<[usize; 2]>,
+}
+
+/// Finds the strings, contact at their ends; nothing if the structure is another one, or not symmetric.
+fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Option<Strings> {
+    let n = pattern.ncols();
+    if pattern.nrows() != n {
+        return None;
+    }
+    let neighbors = |dof: usize| pattern.row_idx_of_col_raw(dof).iter().copied().filter(move |&row| row != dof);
+    let is_last = |dof: usize| last.binary_search(&dof).is_ok();
+    let (mut order, mut begins) = (Vec::with_capacity(n), Vec::new());
+    let mut visited = vec![false; n];
+    for start in 0..n {
+        if visited[start] || neighbors(start).nth(1).is_some() {
+            continue;
+        }
+        let begin = order.len();
+        let (mut dof, mut before) = (start, None);
+        loop {
+            visited[dof] = true;
+            order.push(dof);
+            let mut onward = neighbors(dof).filter(|&next| Some(next) != before);
+            let next = onward.next();
+            // A third neighbor; or the entry that led here is not mirrored.
+            if onward.next().is_some() || before.is_some_and(|before| !neighbors(dof).any(|row| row == before)) {
+                return None;
+            }
+            let Some(next) = next.filter(|&next| next < n) else { break };
+            if visited[next] {
+                return None;
+            }
+            (before, dof) = (Some(dof), next);
+        }
+        let string = &mut order[begin..];
+        if is_last(string[0]) && !string.last().is_some_and(|&dof| is_last(dof)) {
+            string.reverse();
+        }
+        let interior = string.iter().position(|&dof| is_last(dof)).unwrap_or(string.len());
+        if !string[interior..].iter().all(|&dof| is_last(dof)) {
+            return None;
+        }
+        begins.push([begin, begin + interior]);
+    }
+    // What is left are rings.
+    (order.len() == n).then_some(Strings { order, begins })
+}
+
+/// How the unknowns along the strings are numbered in the matrix.
+#[derive(Debug)]
+enum Numbering {
+    /// So many dofs side by side, from the first one upward, or downward.
+    Runs(Vec<(usize, Range<usize>, Direction)>),
+    List(Vec<usize>),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Direction {
+    Up,
+    Down,
+}
+
+/// Dofs a run has on average, from which on runs are worth it.
+const RUN: usize = 8;
+
+impl Numbering {
+    fn new(order: Vec<usize>) -> Self {
+        let mut runs: Vec<(usize, Range<usize>, Direction)> = Vec::new();
+        for (place, &dof) in order.iter().enumerate() {
+            match runs.last_mut() {
+                Some((_, dofs, Direction::Up)) if dofs.end == dof => dofs.end += 1,
+                Some((_, dofs, Direction::Down)) if dofs.start == dof + 1 => dofs.start -= 1,
+                Some((_, dofs, direction)) if dofs.len() == 1 && dofs.start == dof + 1 => {
+                    (*dofs, *direction) = (dof..dof + 2, Direction::Down);
+                }
+                _ => runs.push((place, dof..dof + 1, Direction::Up)),
+            }
+        }
+        if RUN * runs.len() <= order.len() { Self::Runs(runs) } else { Self::List(order) }
+    }
+
+    fn gather<T: Copy>(&self, from: &[T], to: &mut [T]) {
+        match self {
+            Self::Runs(runs) => {
+                for (place, dofs, direction) in runs {
+                    let to = &mut to[*place..place + dofs.len()];
+                    match direction {
+                        Direction::Up => to.copy_from_slice(&from[dofs.clone()]),
+                        Direction::Down => {
+                            to.iter_mut().zip(from[dofs.clone()].iter().rev()).for_each(|(to, &from)| *to = from);
+                        }
+                    }
+                }
+            }
+            Self::List(order) => to.iter_mut().zip(order).for_each(|(to, &dof)| *to = from[dof]),
+        }
+    }
+
+    fn scatter<T: Copy>(&self, from: &[T], to: &mut [T]) {
+        match self {
+            Self::Runs(runs) => {
+                for (place, dofs, direction) in runs {
+                    let from = &from[*place..place + dofs.len()];
+                    match direction {
+                        Direction::Up => to[dofs.clone()].copy_from_slice(from),
+                        Direction::Down => {
+                            to[dofs.clone()].iter_mut().rev().zip(from).for_each(|(to, &from)| *to = from);
+                        }
+                    }
+                }
+            }
+            Self::List(order) => from.iter().zip(order).for_each(|(&from, &dof)| to[dof] = from),
+        }
+    }
+
+    /// Calls with every place along the strings and its dof, in that order.
+    fn for_each(&self, mut call: impl FnMut(usize, usize)) {
+        match self {
+            Self::Runs(runs) => {
+                for (place, dofs, direction) in runs {
+                    match direction {
+                        Direction::Up => (*place..).zip(dofs.clone()).for_each(|(place, dof)| call(place, dof)),
+                        Direction::Down => (*place..).zip(dofs.clone().rev()).for_each(|(place, dof)| call(place, dof)),
+                    }
+                }
+            }
+            Self::List(order) => order.iter().enumerate().for_each(|(place, &dof)| call(place, dof)),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Factor<T> {
+    numbering: Numbering,
+    /// Where each string begins, and where its dofs of contact begin; behind the last one the number of dofs.
+    begins: Vec<[usize; 2]>,
+    /// L below the diagonal and 1/D along the strings; zero behind each string.
+    lower: Vec<T>,
+    inverse: Vec<T>,
+    /// One right-hand side along the strings.
+    x: Vec<T>,
+    /// Where the dofs of contact are along the strings, and in the list of the ends of all strings.
+    interface: Vec<usize>,
+    places: Vec<usize>,
+    /// The ends of all strings: those of string s begin at `ends[s]`.
+    ends: Vec<usize>,
+    on_ends: Vec<T>,
+    /// Memory of the check of symmetry.
+    cursor: Vec<usize>,
+}
+
+fn factorization<T: Real>(Strings { order, mut begins }: Strings, last: &[usize]) -> Result<Box<dyn Factorization<T>>> {
+    let n = order.len();
+    let what = "the factor of a tridiagonal matrix";
+    let zeros = || memory::zeros(n, 1, what);
+    let mut place_of = vec![0; n];
+    order.iter().enumerate().for_each(|(place, &dof)| place_of[dof] = place);
+    begins.push([n, n]);
+    let mut ends = vec![0];
+    for pair in begins.windows(2) {
+        ends.push(ends[ends.len() - 1] + pair[1][0] - pair[0][1]);
+    }
+    let interface: Vec<usize> = last.iter().map(|&dof| place_of[dof]).collect();
+    let place = |&place: &usize| {
+        let string = begins.partition_point(|[begin, _]| *begin <= place) - 1;
+        ends[string] + place - begins[string][1]
+    };
+    let places = interface.iter().map(place).collect();
+    Ok(Box::new(Factor {
+        numbering: Numbering::new(order),
+        begins,
+        lower: zeros()?,
+        inverse: zeros()?,
+        x: zeros()?,
+        interface,
+        places,
+        ends,
+        on_ends: vec![T::zero(); last.len()],
+        cursor: Vec::new(),
+    }))
+}
+
+/// The parts of a vector along two strings that follow one another.
+fn two<T>(x: &mut [T], ranges: [Range<usize>; 2]) -> [&mut [T]; 2] {
+    let (first, second) = x.split_at_mut(ranges[1].start);
+    let length = ranges[1].len();
+    [&mut first[ranges[0].clone()], &mut second[..length]]
+}
+
+impl<T: Real> Factor<T> {
+    /// Calls with two strings at a time (the second one of the last pair may be empty): all of them, and what is before
+    /// contact.
+    fn pairs(begins: &[[usize; 2]], mut call: impl FnMut([Range<usize>; 2], [Range<usize>; 2])) {
+        let count = begins.len() - 1;
+        for first in (0..count).step_by(2) {
+            let whole = |s: usize| begins[s.min(count)][0]..begins[(s + 1).min(count)][0];
+            let interior = |s: usize| begins[s.min(count)][0]..begins[s.min(count)][1];
+            call([first, first + 1].map(whole), [first, first + 1].map(interior));
+        }
+    }
+
+    fn forward(&mut self) {
+        let Self { begins, lower, inverse, x, .. } = self;
+        Self::pairs(begins, |whole, _| {
+            let [lower, inverse] = [&*lower, &*inverse].map(|v| whole.clone().map(|range| &v[range]));
+            T::chains_forward(Chains { lower, inverse, x: two(x, whole) });
+        });
+    }
+
+    /// Up the strings from what is known behind `part` of them.
+    fn backward(&mut self, part: Part) {
+        let Self { begins, lower, inverse, x, .. } = self;
+        Self::pairs(begins, |whole, interior| {
+            let ranges = match part {
+                Part::All => whole.clone(),
+                Part::Interior => interior,
+            };
+            let behind = [0, 1].map(|s| match ranges[s].end < whole[s].end {
+                true => x[ranges[s].end],
+                false => T::zero(),
+            });
+            let [lower, inverse] = [&*lower, &*inverse].map(|v| ranges.clone().map(|range| &v[range]));
+            T::chains_backward(Chains { lower, inverse, x: two(x, ranges) }, behind);
+        });
+    }
+
+    /// Solves at the ends of the strings, of `on_ends` that which the interior has left.
+    fn solve_ends(&mut self, direction: Ends) {
+        let Self { begins, lower, inverse, ends, on_ends, .. } = self;
+        for (ends, begins) in ends.windows(2).zip(begins.windows(2)).filter(|(ends, _)| ends[0] < ends[1]) {
+            let own = &mut on_ends[ends[0]..ends[1]];
+            let range = begins[0][1]..begins[1][0];
+            let (lower, inverse) = (&lower[range.clone()], &inverse[range]);
+            if direction == Ends::Both {
+                T::chains_forward(Chains { lower: [lower, &[]], inverse: [inverse, &[]], x: [&mut *own, &mut []] });
+            }
+            let chains = Chains { lower: [lower, &[]], inverse: [inverse, &[]], x: [own, &mut []] };
+            T::chains_backward(chains, [T::zero(); 2]);
+        }
+    }
+}
+
+/// What a backward sweep solves for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    All,
+    Interior,
+}
+
+/// Whether the ends are swept forward too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ends {
+    Backward,
+    Both,
+}
+
+impl<T: Real> Factorization<T> for Factor<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let n = self.x.len();
+        if a.ncols() != n {
+            return Err(Error::Dimension { what: "effective matrix", expected: n, found: a.ncols() });
+        }
+        sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
+        let Self { numbering, begins, lower, inverse, .. } = self;
+        let negligible = negligible::<T>(n);
+        // Lower entry, pivot and dof of the unknown before.
+        let mut before = None;
+        let mut failed = None;
+        let mut string = 0;
+        numbering.for_each(|place, dof| {
+            if begins[string + 1][0] == place {
+                string += 1;
+                before = None;
+            }
+            let entry = sparse::entry(a, dof, dof);
+            let pivot = match before {
+                None => entry,
+                Some((place, other, pivot)) => {
+                    let coupling = sparse::entry(a, dof, other);
+                    lower[place] = coupling / pivot;
+                    entry - lower[place] * coupling
+                }
+            };
+            // Written so that NaN is refused too.
+            if !(pivot > negligible * entry) && failed.is_none() {
+                failed = Some(dof);
+            }
+            inverse[place] = pivot.recip();
+            before = Some((place, dof, pivot));
+        });
+        failed.map_or(Ok(()), |dof| Err(Error::Singular { matrix: "effective matrix", dof }))
+    }
+
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
+        for column in rhs.chunks_exact_mut(self.x.len().max(1)) {
+            self.numbering.gather(column, &mut self.x);
+            self.forward();
+            self.backward(Part::All);
+            self.numbering.scatter(&self.x, column);
+        }
+        Ok(())
+    }
+
+    fn stored_values(&self) -> usize {
+        2 * self.x.len() - (self.begins.len() - 1)
+    }
+
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        Some(self)
+    }
+}
+
+impl<T: Real> Condensation<T> for Factor<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
+        self.numbering.gather(rhs, &mut self.x);
+        self.forward();
+        for (&at, &place) in self.interface.iter().zip(&self.places) {
+            self.on_ends[place] = self.x[at];
+        }
+        self.solve_ends(Ends::Backward);
+        for (x, &place) in interface.iter_mut().zip(&self.places) {
+            *x = self.on_ends[place];
+        }
+        Ok(())
+    }
+
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+        for (&x, &at) in interface.iter().zip(&self.interface) {
+            self.x[at] = x;
+        }
+        self.backward(Part::Interior);
+        self.numbering.scatter(&self.x, solution);
+    }
+
+    fn solve(&mut self, forces: &mut [T]) {
+        for column in forces.chunks_exact_mut(self.places.len().max(1)) {
+            for (&force, &place) in column.iter().zip(&self.places) {
+                self.on_ends[place] = force;
+            }
+            self.solve_ends(Ends::Both);
+            for (x, &place) in column.iter_mut().zip(&self.places) {
+                *x = self.on_ends[place];
+            }
+        }
+    }
+}
