@@ -1,8 +1,11 @@
 //! Recurrences of L D Lᵀ with bidiagonal L, down and up two chains at a time.
 //!
-//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains wait at the same time.
+//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains wait at the same time, and a
+//! product that is fused with its sum waits half as long, on machines that have it.
+#![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
 
 use super::Real;
+use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 /// Of two chains: the entries of L below the diagonal (one for each unknown, the last one to what comes behind), 1/D, and
 /// the unknowns. All slices of a chain are of one length.
@@ -14,28 +17,78 @@ pub struct Chains<'a, T> {
 }
 
 /// `x_k −= l_{k−1} x_{k−1}` down both chains.
-#[inline]
-pub(super) fn forward<T: Real>(Chains { lower, x: [x0, x1], .. }: Chains<'_, T>) {
-    let common = x0.len().min(x1.len());
-    let [(l0, rest_l0), (l1, rest_l1)] = lower.map(|l| l.split_at(common));
-    let ((x0, rest_x0), (x1, rest_x1)) = (x0.split_at_mut(common), x1.split_at_mut(common));
-    let (mut above0, mut above1) = (T::zero(), T::zero());
-    for ((x0, &l0), (x1, &l1)) in x0.iter_mut().zip(l0).zip(x1.iter_mut().zip(l1)) {
-        *x0 -= above0;
-        *x1 -= above1;
-        (above0, above1) = (l0 * *x0, l1 * *x1);
-    }
-    for (x, l, mut above) in [(rest_x0, rest_l0, above0), (rest_x1, rest_l1, above1)] {
-        for (x, &l) in x.iter_mut().zip(l) {
-            *x -= above;
-            above = l * *x;
-        }
+pub(super) fn forward<T: Real>(chains: Chains<'_, T>) {
+    match fuses() {
+        true => Arch::new().dispatch(Down(chains)),
+        false => down(chains, |x, l, y| x - l * y),
     }
 }
 
 /// `x_k = x_k / d_k − l_k x_{k+1}` up both chains, from the unknowns `behind` them.
-#[inline]
-pub(super) fn backward<T: Real>(Chains { lower, inverse, x: [x0, x1] }: Chains<'_, T>, behind: [T; 2]) {
+pub(super) fn backward<T: Real>(chains: Chains<'_, T>, behind: [T; 2]) {
+    match fuses() {
+        true => Arch::new().dispatch(Up(chains, behind)),
+        false => up(chains, behind, |x, l, y| x - l * y),
+    }
+}
+
+/// Whether the machine has fused products: in software they would take a hundred times as long.
+fn fuses() -> bool {
+    cfg!(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64"))
+        && !matches!(Arch::new(), Arch::Scalar)
+}
+
+struct Down<'a, T>(Chains<'a, T>);
+
+impl<T: Real> WithSimd for Down<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        down(self.0, |x, l, y| T::mul_add(-l, y, x));
+    }
+}
+
+struct Up<'a, T>(Chains<'a, T>, [T; 2]);
+
+impl<T: Real> WithSimd for Up<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        up(self.0, self.1, |x, l, y| T::mul_add(-l, y, x));
+    }
+}
+
+/// `eliminate(x, l, y)` is x − l y.
+#[inline(always)]
+fn down<T: Real>(Chains { lower, x: [x0, x1], .. }: Chains<'_, T>, eliminate: impl Fn(T, T, T) -> T) {
+    let common = x0.len().min(x1.len());
+    let [(l0, rest_l0), (l1, rest_l1)] = lower.map(|l| l.split_at(common));
+    let ((x0, rest_x0), (x1, rest_x1)) = (x0.split_at_mut(common), x1.split_at_mut(common));
+    // Kept in registers: a round trip through memory takes longer than the arithmetic.
+    let [mut l_above0, mut l_above1, mut above0, mut above1] = [T::zero(); 4];
+    for ((x0, &l0), (x1, &l1)) in x0.iter_mut().zip(l0).zip(x1.iter_mut().zip(l1)) {
+        above0 = eliminate(*x0, l_above0, above0);
+        above1 = eliminate(*x1, l_above1, above1);
+        (*x0, *x1) = (above0, above1);
+        (l_above0, l_above1) = (l0, l1);
+    }
+    for (x, l, mut l_above, mut above) in [(rest_x0, rest_l0, l_above0, above0), (rest_x1, rest_l1, l_above1, above1)] {
+        for (x, &l) in x.iter_mut().zip(l) {
+            above = eliminate(*x, l_above, above);
+            *x = above;
+            l_above = l;
+        }
+    }
+}
+
+#[inline(always)]
+fn up<T: Real>(
+    Chains { lower, inverse, x: [x0, x1] }: Chains<'_, T>,
+    behind: [T; 2],
+    eliminate: impl Fn(T, T, T) -> T,
+) {
     // What the one has more than the other lies at its front.
     let common = x0.len().min(x1.len());
     let (front0, front1) = (x0.len() - common, x1.len() - common);
@@ -46,13 +99,13 @@ pub(super) fn backward<T: Real>(Chains { lower, inverse, x: [x0, x1] }: Chains<'
     let first = x0.iter_mut().zip(l0.iter().zip(d0)).rev();
     let second = x1.iter_mut().zip(l1.iter().zip(d1)).rev();
     for ((x0, (&l0, &d0)), (x1, (&l1, &d1))) in first.zip(second) {
-        behind0 = *x0 * d0 - l0 * behind0;
-        behind1 = *x1 * d1 - l1 * behind1;
+        behind0 = eliminate(*x0 * d0, l0, behind0);
+        behind1 = eliminate(*x1 * d1, l1, behind1);
         (*x0, *x1) = (behind0, behind1);
     }
     for (x, l, d, mut behind) in [(rest_x0, rest_l0, rest_d0, behind0), (rest_x1, rest_l1, rest_d1, behind1)] {
         for (x, (&l, &d)) in x.iter_mut().zip(l.iter().zip(d)).rev() {
-            behind = *x * d - l * behind;
+            behind = eliminate(*x * d, l, behind);
             *x = behind;
         }
     }
