@@ -16,6 +16,7 @@ pub mod schemes;
 pub mod solids;
 pub mod springs;
 pub mod tables;
+pub mod timing;
 pub mod truss;
 pub mod wall_bar;
 
