@@ -2,29 +2,21 @@
 //!
 //! `cargo bench --bench bodies -- [elements a side]…` (default 10 and 16)
 
-use contact_dynamics::{
-    Automatic, ByBody, Composite, LinearRows, LinearSolver, PersistencyCorrection, Simulation, TimeIntegrator,
-};
+use contact_dynamics::{Automatic, ByBody, Composite, LinearRows, LinearSolver, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::timing::{self, Arguments};
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
 fn main() {
-    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    let sizes = if sizes.is_empty() { vec![10, 16] } else { sizes };
-    for n in sizes {
+    for n in Arguments::read(&[10, 16], &[4]).sizes {
         measure(n);
     }
 }
 
 fn solver(apart: bool) -> Box<dyn LinearSolver<f64>> {
     if apart { Box::new(ByBody::default()) } else { Box::new(Automatic) }
-}
-
-fn median(samples: &mut [f64]) -> f64 {
-    samples.sort_by(f64::total_cmp);
-    samples[samples.len() / 2]
 }
 
 fn measure(n: usize) {
@@ -38,17 +30,7 @@ fn measure(n: usize) {
     interface.sort_unstable();
 
     // The effective matrix of the composite scheme.
-    let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
-    let (k, mass) = (blocks.stiffness::<f64>(), blocks.lumped_mass::<f64>());
-    let (pattern, mut values) = k.into_parts();
-    for (dof, m) in mass.iter().enumerate() {
-        for at in pattern.as_ref().col_range(dof) {
-            if pattern.row_idx()[at] == dof {
-                values[at] += inertia * m;
-            }
-        }
-    }
-    let a = contact_dynamics::faer::sparse::SparseColMat::new(pattern, values);
+    let a = timing::effective(&blocks.stiffness::<f64>(), &blocks.lumped_mass(), &Composite, h);
 
     println!(
         "two blocks of {n}³ elements, {} dofs, {} pairs, median ms of one factor, of a factor each",
@@ -105,9 +87,9 @@ fn measure(n: usize) {
         }
     }
     for (name, [one, apart]) in
-        ["analyze", "factorize", "solve", "condense and expand", "step, corrected"].into_iter().zip(&mut times)
+        ["analyze", "factorize", "solve", "condense and expand", "step, corrected"].into_iter().zip(&times)
     {
-        let (one, apart) = (median(one), median(apart));
+        let (one, apart) = (timing::median(one), timing::median(apart));
         println!("{name:<20} {one:>10.3} {apart:>10.3}   ratio {:.2}", apart / one);
     }
     let sizes = factors.each_ref().map(|factor| factor.stored_values() as f64 / 1e6);

@@ -1,43 +1,48 @@
-//! Cost of a step in contact on a block of hex8 elements, beside the bare solve and the step without contact.
+//! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the work on
+//! the interface alone: condensation, responses, the contact solver.
 //!
 //! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20)
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::{
-    Automatic, Cholesky, Composite, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation, System,
-    TimeIntegrator,
-};
+use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics::{Composite, Factorization, LinearRows, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use std::cell::RefCell;
 use std::hint::black_box;
-use std::time::Instant;
+use std::rc::Rc;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
+const RATIOS: &[Ratio] = &[
+    Ratio { heading: "/ bare solve", to: &["bare solve, free"] },
+    Ratio { heading: "/ open step", to: &["step, open"] },
+];
+
+const INTERFACE: &[Ratio] = &[Ratio { heading: "/ bare solve", to: &["bare solve"] }];
+
 fn main() {
-    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    let sizes = if sizes.is_empty() { vec![10, 20] } else { sizes };
-    for n in sizes {
-        measure(n);
+    let arguments = Arguments::read(&[10, 20], &[4]);
+    for &n in &arguments.sizes {
+        measure(n, &arguments);
     }
-    plate();
+    plate(&arguments);
 }
 
 /// Ten thousand candidates, five hundred of them pressed: a thick plate on a floor, loaded in the middle.
-fn plate() {
-    let cells = [100, 100, 4];
+fn plate(arguments: &Arguments) {
+    let cells = if arguments.quick { [10, 10, 1] } else { [100, 100, 4] };
     let size = [10.0, 10.0, 0.4];
     let plate = Solid::block(size, cells, MATERIAL);
     let h = 2.0 * size[0] / cells[0] as f64 / MATERIAL.wave_speed();
-    let bottom: Vec<usize> = plate.surface_nodes().into_iter().filter(|&node| plate.nodes[node][2] == 0.0).collect();
-    let candidates: Vec<usize> = bottom.iter().map(|&node| Solid::<3>::dof(node, 2)).collect();
+    let (bottom, candidates) = lowest(&plate);
     // A saucer: only the nodes near the middle touch.
     let gap = |node: usize| {
         let [x, y, _] = plate.nodes[node];
         let square = (x - 5.0).powi(2) + (y - 5.0).powi(2);
         if square < 2.4 { 0.0 } else { 1e-2 * (square - 2.4) }
     };
-    let mut rows =
-        vec![bare("bare solve, free order", &plate, h, &[]), bare("bare solve, contact last", &plate, h, &candidates)];
+    let mut table = Table::new(Unit::Milli, RATIOS);
+    bare(&mut table, &plate, &candidates, h);
     for (name, pressed) in [("step, open", false), ("step, in contact", true)] {
         let contact = bottom.iter().zip(&candidates).fold(LinearRows::new(), |rows, (&node, &dof)| {
             rows.unilateral(&[(dof, 1.0)], if pressed { gap(node) } else { 1e3 })
@@ -46,35 +51,46 @@ fn plate() {
         for _ in 0..10 {
             run.step().expect("a well-posed step");
         }
-        let closed = run.state().contacts().closed().iter().filter(|&&closed| closed).count();
-        println!("{name}: {closed} of {} candidates closed", candidates.len());
-        rows.push(Row {
-            name: name.into(),
-            run: Box::new(move || run.step().expect("a well-posed step")),
-            samples: Vec::new(),
-        });
+        println!("{name}: {} of {} candidates closed", closed(&run), candidates.len());
+        table.row(name, move || run.step().expect("a well-posed step"));
     }
     println!("plate of {cells:?} elements, {} dofs", plate.dofs());
-    sample(&mut rows, 9);
+    table.sample(arguments.repeated(9), 1);
+    table.print();
+    println!();
 }
 
-/// A measured operation: runs once.
-struct Row<'a> {
-    name: String,
-    run: Box<dyn FnMut() + 'a>,
-    samples: Vec<f64>,
+/// The nodes at the bottom and their vertical dofs.
+fn lowest(solid: &Solid<3>) -> (Vec<usize>, Vec<usize>) {
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
+    let dofs = bottom.iter().map(|&node| Solid::<3>::dof(node, 2)).collect();
+    (bottom, dofs)
 }
 
-fn measure(n: usize) {
+fn closed(run: &Simulation<'_, f64>) -> usize {
+    run.state().contacts().closed().iter().filter(|&&closed| closed).count()
+}
+
+/// Adds the solves with the composite scheme's effective matrix; returns the number of scalars in the first factor, and the
+/// second one once more.
+fn bare(table: &mut Table<'_>, solid: &Solid<3>, last: &[usize], h: f64) -> (usize, Box<dyn Factorization<f64>>) {
+    let a = timing::effective(&solid.stiffness::<f64>(), &solid.lumped_mass(), &Composite, h);
+    let [free, behind] = [&[][..], last].map(|last| timing::factor(&a, last));
+    let stored = free.stored_values();
+    for (name, factor) in [("bare solve, free order", free), ("bare solve, contact last", behind)] {
+        let name = format!("{name} ({:.1} M)", factor.stored_values() as f64 / 1e6);
+        table.row(name, timing::solve(factor, solid.dofs()));
+    }
+    (stored, timing::factor(&a, last))
+}
+
+fn measure(n: usize, arguments: &Arguments) {
     let block = Solid::block([1.0; 3], [n; 3], MATERIAL);
     let h = 1.0 / n as f64 / MATERIAL.wave_speed();
-    let bottom: Vec<usize> = block.surface_nodes().into_iter().filter(|&node| block.nodes[node][2] == 0.0).collect();
-    let candidates: Vec<usize> = bottom.iter().map(|&node| Solid::<3>::dof(node, 2)).collect();
+    let (_, candidates) = lowest(&block);
     println!("block of {n}³ elements, {} dofs, {} candidates, Courant number 1", block.dofs(), candidates.len());
-    let mut rows =
-        vec![bare("bare solve, free order", &block, h, &[]), bare("bare solve, contact last", &block, h, &candidates)];
-    let stored = Cholesky::default().estimate(effective(&block, h).symbolic(), &[]).expect("memory");
-    let product = product(&block);
+    let mut table = Table::new(Unit::Milli, RATIOS);
+    let (stored, factor) = bare(&mut table, &block, &candidates, h);
     for (name, pressed, corrected) in
         [("step, open", false, false), ("step, all closed", true, false), ("step, all closed, corrected", true, true)]
     {
@@ -82,97 +98,80 @@ fn measure(n: usize) {
         for _ in 0..5 {
             run.step().expect("a well-posed step");
         }
-        let closed = run.state().contacts().closed().iter().filter(|&&closed| closed).count();
-        assert_eq!(closed, if pressed { candidates.len() } else { 0 });
-        rows.push(Row {
-            name: name.into(),
-            run: Box::new(move || run.step().expect("a well-posed step")),
-            samples: Vec::new(),
-        });
+        assert_eq!(closed(&run), if pressed { candidates.len() } else { 0 });
+        table.row(name, move || run.step().expect("a well-posed step"));
     }
-    rows.push(product);
-    rows.push(reading("reading the first factor twice", stored));
-    sample(&mut rows, if n > 25 { 5 } else { 15 });
-}
-
-/// Reads so many numbers from memory, twice: what a solve would take that does nothing else (upper halves of blocks are
-/// stored, and need not be read).
-fn reading(name: &str, entries: usize) -> Row<'static> {
-    let numbers = vec![1.0_f64; entries];
-    let run = move || {
-        for _ in 0..2 {
-            let mut sums = [0.0; 16];
-            for chunk in black_box(&numbers[..]).chunks_exact(16) {
-                for (sum, x) in sums.iter_mut().zip(chunk) {
-                    *sum += x;
-                }
-            }
-            black_box(sums);
-        }
-    };
-    Row { name: name.into(), run: Box::new(run), samples: Vec::new() }
-}
-
-/// One product with K.
-fn product(block: &Solid<3>) -> Row<'static> {
-    let mut system = block.system::<f64>();
-    let (u, v, mut f) = (vec![1.0; block.dofs()], vec![0.0; block.dofs()], vec![0.0; block.dofs()]);
-    let run = move || {
-        system.force(0.0, black_box(&u), &v, &mut f).expect("linear");
-        black_box(&f);
-    };
-    Row { name: "bare K product".into(), run: Box::new(run), samples: Vec::new() }
-}
-
-/// Runs all rows in turn, and prints medians and ratios.
-fn sample(rows: &mut [Row<'_>], samples: usize) {
-    for sample in 0..=samples {
-        for row in &mut *rows {
-            let start = Instant::now();
-            (row.run)();
-            if sample > 0 {
-                row.samples.push(start.elapsed().as_secs_f64() * 1e3);
-            }
-        }
-    }
-    println!("{:<32} {:>10} {:>10} {:>14} {:>14}", "", "median ms", "best ms", "/ bare solve", "/ open step");
-    let median = |samples: &mut [f64]| {
-        samples.sort_by(f64::total_cmp);
-        samples[samples.len() / 2]
-    };
-    let (solve, open) = (median(&mut rows[0].samples), median(&mut rows[2].samples));
-    for row in rows {
-        let (median, best) = (median(&mut row.samples), row.samples[0]);
-        println!("{:<32} {median:>10.3} {best:>10.3} {:>14.2} {:>14.2}", row.name, median / solve, median / open);
-    }
+    table.row("bare K product", timing::force(block.system::<f64>()));
+    table.row("reading the first factor twice", timing::reading::<f64>(stored));
+    let samples = arguments.repeated(if n > 25 { 5 } else { 15 });
+    table.sample(samples, 1);
+    table.print();
+    interface(factor, block.dofs(), candidates.len(), samples);
     println!();
 }
 
-/// The composite scheme's effective matrix.
-fn effective(block: &Solid<3>, h: f64) -> SparseColMat<usize, f64> {
-    let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
-    let (k, mass) = (block.stiffness::<f64>(), block.lumped_mass::<f64>());
-    let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
-    for j in 0..block.dofs() {
-        let k = k.as_ref();
-        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
+/// The work of contact alone, with a factor that eliminates so many candidates last and all of them pressed.
+fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: usize, samples: usize) {
+    println!("the interface alone, contact last");
+    let unit = |row: usize| (0..candidates).map(move |k| f64::from(u8::from(k == row)));
+    let all: Vec<f64> = (0..candidates).flat_map(unit).collect();
+    let mut w = all.clone();
+    factor.condensation().expect("Cholesky condenses").solve(&mut w);
+    let factor = Rc::new(RefCell::new(factor));
+    let mut table = Table::new(Unit::Milli, INTERFACE);
+    let (mut x, ends) = (vec![1.0; dofs], Rc::new(RefCell::new(vec![0.0; candidates])));
+    let own = Rc::clone(&factor);
+    table.reference("bare solve", {
+        move || {
+            x.fill(1.0);
+            own.borrow_mut().solve(&mut x);
+            black_box(&x);
+        }
+    });
+    let (own, out, rhs) = (Rc::clone(&factor), Rc::clone(&ends), vec![1.0; dofs]);
+    table.row("condense", move || {
+        let mut factor = own.borrow_mut();
+        factor.condensation().expect("Cholesky condenses").condense(black_box(&rhs), &mut out.borrow_mut());
+    });
+    let (own, mut solution) = (Rc::clone(&factor), vec![0.0; dofs]);
+    table.row("expand", move || {
+        let mut factor = own.borrow_mut();
+        factor.condensation().expect("Cholesky condenses").expand(&ends.borrow(), &mut solution);
+        black_box(&solution);
+    });
+    for columns in [1, 16, candidates] {
+        let (own, forces) = (Rc::clone(&factor), all[..columns.min(candidates) * candidates].to_vec());
+        let mut work = forces.clone();
+        table.row(format!("responses to {columns} contacts"), move || {
+            work.copy_from_slice(&forces);
+            own.borrow_mut().condensation().expect("Cholesky condenses").solve(&mut work);
+            black_box(&work);
+        });
     }
-    SparseColMat::<usize, f64>::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("triplets")
-}
-
-/// The solve with that.
-fn bare(name: &str, block: &Solid<3>, h: f64, last: &[usize]) -> Row<'static> {
-    let a = effective(block, h);
-    let mut factor: Box<dyn Factorization<f64>> = Automatic.analyze(a.symbolic(), last).expect("memory");
-    factor.factorize(a.as_ref()).expect("positive definite");
-    let name = format!("{name} ({:.1} M)", factor.stored_values() as f64 / 1e6);
-    let mut x = vec![1.0; block.dofs()];
-    let run = move || {
-        x.fill(1.0);
-        factor.solve(&mut x).expect("a direct solve");
-        black_box(&x);
-    };
-    Row { name, run: Box::new(run), samples: Vec::new() }
+    // One step's approach everywhere: all press. First with nothing known of W, then as in the steps after.
+    let w = Rc::new(w);
+    for (name, known) in [("contact solver, first time", false), ("contact solver, nothing changed", true)] {
+        let (w, mut solver) = (Rc::clone(&w), ActiveSet::default());
+        ContactSolver::<f64>::reserve(&mut solver, candidates);
+        let (offset, bounds) = (vec![-1.0; candidates], vec![Bound::NonNegative; candidates]);
+        let (tolerance, mut multipliers) = (vec![1e-14; candidates], vec![0.0; candidates]);
+        table.row(format!("{name}, {candidates} rows"), move || {
+            if !known {
+                multipliers.fill(0.0);
+            }
+            let problem = ContactProblem {
+                delassus: &w,
+                offset: &offset,
+                bounds: &bounds,
+                tolerance: &tolerance,
+                version: u64::from(known),
+            };
+            solver.solve(&problem, &mut multipliers).expect("a definite operator");
+            black_box(&multipliers);
+        });
+    }
+    table.sample(samples, 1);
+    table.print();
 }
 
 /// The block on a floor, pressed on it by its weight, or high above it.

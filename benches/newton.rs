@@ -6,12 +6,12 @@ use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{Automatic, Composite, Factorization, LinearSolver, Newton, Simulation, System, TangentWeights};
 use contact_dynamics_scenes::hyperelastic::Hyperelastic;
 use contact_dynamics_scenes::large::{Scene, Throw};
+use contact_dynamics_scenes::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 
 fn main() {
-    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    for cells in if sizes.is_empty() { vec![6, 10] } else { sizes } {
+    for cells in Arguments::read(&[6, 10], &[2]).sizes {
         measure(cells);
     }
 }
@@ -129,13 +129,7 @@ fn sample(rows: &mut [Row], samples: u32) {
         }
     }
     println!("{:<28} {:>10} {:>12} {:>22}", "", "median ms", "iterations", "/ (iterations × parts)");
-    let medians: Vec<f64> = rows
-        .iter_mut()
-        .map(|row| {
-            row.samples.sort_by(f64::total_cmp);
-            row.samples[row.samples.len() / 2]
-        })
-        .collect();
+    let medians: Vec<f64> = rows.iter().map(|row| timing::median(&row.samples)).collect();
     let whole: f64 = medians[..PARTS].iter().sum();
     for (index, (row, median)) in rows.iter().zip(&medians).enumerate() {
         if index < PARTS {

@@ -2,21 +2,25 @@
 //!
 //! `cargo bench --bench ordering -- [elements a side]…` (default 10 and 20; 30 takes minutes)
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::linear_solver::Ordering;
-use contact_dynamics::{Cholesky, Composite, Factorization, LinearSolver, TimeIntegrator};
+use contact_dynamics::{Cholesky, Composite, Factorization, LinearSolver};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
 fn main() {
-    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    let sizes = if sizes.is_empty() { vec![10, 20] } else { sizes };
-    for n in sizes {
+    let arguments = Arguments::read(&[10, 20], &[4]);
+    for &n in &arguments.sizes {
         let block = Solid::block([1.0; 3], [n; 3], MATERIAL);
-        measure(&format!("block of {n}³ hex8"), &block, 1.0 / n as f64, if n > 25 { 3 } else { 9 });
+        let samples = arguments.repeated(if n > 25 { 3 } else { 9 });
+        measure(&format!("block of {n}³ hex8"), &block, 1.0 / n as f64, samples);
+    }
+    if arguments.quick {
+        return;
     }
     let ball = Solid::quarter_ball(1.0, [12, 12, 20], 0.02, MATERIAL);
     measure("quarter of a ball, 12 × 12 × 20 hex8", &ball, 0.02, 9);
@@ -30,14 +34,8 @@ fn main() {
 
 /// All orders, free and with the lowest nodes last, with the composite scheme's matrix at Courant number one.
 fn measure<const D: usize>(name: &str, solid: &Solid<D>, size: f64, samples: usize) {
-    let inertia = Composite.tableau().stages[0].balance.a.z * (MATERIAL.wave_speed() / size).powi(2);
-    let (k, mass) = (solid.stiffness::<f64>(), solid.lumped_mass::<f64>());
-    let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
-    for j in 0..solid.dofs() {
-        let k = k.as_ref();
-        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
-    }
-    let a = SparseColMat::<usize, f64>::try_new_from_triplets(solid.dofs(), solid.dofs(), &triplets).expect("triplets");
+    let h = size / MATERIAL.wave_speed();
+    let a = timing::effective(&solid.stiffness::<f64>(), &solid.lumped_mass(), &Composite, h);
     let places: Vec<[f64; 3]> = solid
         .nodes
         .iter()
@@ -70,7 +68,7 @@ fn measure<const D: usize>(name: &str, solid: &Solid<D>, size: f64, samples: usi
                 row.sample(&a, sample > 0);
             }
         }
-        let figures: Vec<[f64; 4]> = rows.iter_mut().map(Row::figures).collect();
+        let figures: Vec<[f64; 4]> = rows.iter().map(Row::figures).collect();
         for (row, [fill, analysis, factor, solve]) in rows.iter().zip(&figures) {
             let [first, _, first_factor, first_solve] = figures[0];
             println!(
@@ -117,11 +115,8 @@ impl Row {
     }
 
     /// Scalars of the factor in millions, medians of the times.
-    fn figures(&mut self) -> [f64; 4] {
-        let [analysis, factor, solve] = self.times.each_mut().map(|samples| {
-            samples.sort_by(f64::total_cmp);
-            samples[samples.len() / 2]
-        });
+    fn figures(&self) -> [f64; 4] {
+        let [analysis, factor, solve] = self.times.each_ref().map(|samples| timing::median(samples));
         [self.factor.stored_values() as f64 / 1e6, analysis, factor, solve]
     }
 }

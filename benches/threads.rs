@@ -3,30 +3,23 @@
 //! `cargo bench --features rayon --bench threads -- [elements a side]…` (default 10, 20 and 30)
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::{
-    ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, Simulation, TimeIntegrator,
-};
+use contact_dynamics::{ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
 fn main() {
-    let quick = std::env::args().any(|argument| argument == "--test");
-    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    let sizes = match (quick, sizes.is_empty()) {
-        (true, _) => vec![8],
-        (false, true) => vec![10, 20, 30],
-        (false, false) => sizes,
-    };
+    let arguments = Arguments::read(&[10, 20, 30], &[8]);
     let available = std::thread::available_parallelism().map_or(2, usize::from).max(2);
     println!("one thread beside {available}; medians in ms");
     println!("{:<44} {:>9} {:>9} {:>7}   results", "", "one", "more", "ratio");
-    for n in sizes {
-        let repetitions = if quick { 1 } else { (300 / n).min(15) };
+    for &n in &arguments.sizes {
+        let repetitions = arguments.repeated((300 / n).min(15));
         let block = Solid::block([1.0; 3], [n; 3], MATERIAL);
-        let a = effective(&block, step_size(n));
+        let a = timing::effective(&block.stiffness::<f64>(), &block.lumped_mass(), &Composite, step_size(n));
         let face: Vec<usize> = block
             .surface_nodes()
             .into_iter()
@@ -105,27 +98,14 @@ fn steps(threads: usize, block: &Solid<3>, face: &[usize], h: f64, repetitions: 
 /// The median time in milliseconds of so many runs after a first one.
 fn median(runs: usize, mut run: impl FnMut()) -> f64 {
     run();
-    let mut times: Vec<f64> = (0..runs)
+    let times: Vec<f64> = (0..runs)
         .map(|_| {
             let start = Instant::now();
             run();
             start.elapsed().as_secs_f64() * 1e3
         })
         .collect();
-    times.sort_by(f64::total_cmp);
-    times[runs / 2]
-}
-
-/// The composite scheme's effective matrix.
-fn effective(block: &Solid<3>, h: f64) -> SparseColMat<usize, f64> {
-    let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
-    let (k, mass) = (block.stiffness::<f64>(), block.lumped_mass::<f64>());
-    let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
-    for j in 0..block.dofs() {
-        let k = k.as_ref();
-        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
-    }
-    SparseColMat::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("valid triplets")
+    timing::median(&times)
 }
 
 /// Two bodies with this matrix each.
