@@ -621,9 +621,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Some(aim) = &self.stage.contact else { return Ok(()) };
         let h = T::of(clock.h);
         let t = clock.at(aim.at);
-        aim.row.predict(past, target);
+        // Only on the interface: nothing else is read, and far from contact a body is large.
+        aim.row.predict_at(past, constraints.interface(), target);
         if let Some(d) = self.iterate {
-            T::axpy(aim.row.weight, d, target);
+            for &dof in constraints.interface() {
+                target[dof] += aim.row.weight * d[dof];
+            }
         }
         keep(constraints.interface(), target, &mut interface.target);
         // Displacements of supports, or h times their velocities.
@@ -643,7 +646,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         support(t, target, |support, h| h * support[1])?;
         advance(constraints.interface(), &interface.target, aim.row.weight, &interface.increment, target);
         let t_forecast = clock.at(*at);
-        row.predict(past, forecast);
+        row.predict_at(past, constraints.interface(), forecast);
         support(t_forecast, forecast, |support, _| support[0])?;
         constraints.finite_gaps(t_forecast, forecast, y)?;
         constraints.rates(t, &new.u, &new.v, rates);

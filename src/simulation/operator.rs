@@ -46,6 +46,8 @@ enum ContactPath {
     Condensed,
     /// By full solves, a column a row.
     Full,
+    /// From a diagonal matrix: forces on the interface move nothing else.
+    Apart,
 }
 
 /// Fill beyond that of a free order, above which a matrix that is factorized again and again is not ordered for contact.
@@ -224,6 +226,10 @@ impl<T: Real> Operator<T> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
             condensed.expand(on_interface, increment);
+        } else if *contact == ContactPath::Apart {
+            for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
+                increment[dof] = x;
+            }
         } else if forces.iter().any(|force| *force != T::zero()) {
             let column = &mut full[..increment.len()];
             column.fill(T::zero());
@@ -342,6 +348,10 @@ fn analyze<T: Real>(
     if last.condensation().is_none() {
         return Ok((last, ContactPath::Full));
     }
+    // (The diagonal is always part of the pattern.)
+    if pattern.row_idx().len() == pattern.ncols() {
+        return Ok((last, ContactPath::Apart));
+    }
     if varies && !interface.is_empty() {
         let free = solver.analyze(pattern, &[])?;
         if last.stored_values() as f64 > DEAR * free.stored_values() as f64 {
@@ -355,7 +365,7 @@ fn analyze<T: Real>(
 fn condensation<T: Real>(path: ContactPath, factor: &mut dyn Factorization<T>) -> Option<&mut dyn Condensation<T>> {
     match path {
         ContactPath::Condensed => factor.condensation(),
-        ContactPath::Full => None,
+        ContactPath::Full | ContactPath::Apart => None,
     }
 }
 
@@ -366,7 +376,8 @@ fn respond<T: Real>(
     full: &mut [T],
     forces: &mut [T],
 ) -> Result<()> {
-    if let Some(condensed) = condensation(path, factor) {
+    // What only responds on the interface needs no full solve, whether a step condenses or not.
+    if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
         condensed.solve(forces);
         return Ok(());
     }

@@ -82,10 +82,14 @@ impl<T: Real> ScaledRow<T> {
         T::combine(plain, differences, &newest.u[block.clone()], out);
     }
 
-    /// Writes the part that comes from the past.
-    pub(crate) fn predict(&self, past: &[Motion<T>], out: &mut [T]) {
-        for block in blocks(out.len()) {
-            self.predict_block(past, &block, &mut out[block.clone()]);
+    /// Writes the part that comes from the past at some dofs; without a term nothing is written.
+    pub(crate) fn predict_at(&self, past: &[Motion<T>], dofs: &[usize], out: &mut [T]) {
+        let Some(newest) = past.first().filter(|_| !self.terms.is_empty()) else { return };
+        let (plain, differences) = self.terms.split_at(self.plain);
+        for &dof in dofs {
+            let value = |term: &Term<T>| past[term.state].field(term.field)[dof];
+            let sum = plain.iter().fold(T::zero(), |sum, term| sum + term.c * value(term));
+            out[dof] = differences.iter().fold(sum, |sum, term| sum + term.c * (value(term) - newest.u[dof]));
         }
     }
 }
@@ -291,5 +295,38 @@ impl<T: Real> Compiler<'_, T> {
             });
         }
         Ok(program)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrator::{CdLagrange, Composite, Houbolt, TchamwaWielgosz, TimeIntegrator};
+
+    /// What is predicted for some dofs is what is predicted for all of them, bit for bit.
+    #[test]
+    fn predictions_on_the_interface_are_those_of_all_dofs() {
+        let motion = |state: usize| {
+            let mut motion = Motion::zero(40);
+            for (field, values) in [&mut motion.u, &mut motion.v, &mut motion.a].into_iter().enumerate() {
+                values.iter_mut().enumerate().for_each(|(i, x)| *x = ((7 * i + 3 * field + state + 1) as f64).sin());
+            }
+            motion
+        };
+        let past: Vec<Motion<f64>> = (0..MAX_PAST).map(motion).collect();
+        let schemes: [&dyn TimeIntegrator; 4] =
+            [&CdLagrange, &Composite, &Houbolt, &TchamwaWielgosz::new(1.03).unwrap()];
+        for stage in schemes.iter().flat_map(|scheme| scheme.tableau().stages) {
+            for (power, row) in stage.increment().recovery.each().into_iter().enumerate() {
+                let row = ScaledRow::new(row, power, 0.037);
+                let (mut all, mut some) = (vec![0.5; 40], vec![0.5; 40]);
+                row.predict_block(&past, &(0..40), &mut all);
+                row.predict_at(&past, &[0, 3, 17, 39], &mut some);
+                for dof in 0..40 {
+                    let expected = if [0, 3, 17, 39].contains(&dof) { all[dof] } else { 0.5 };
+                    assert_eq!(some[dof].to_bits(), expected.to_bits());
+                }
+            }
+        }
     }
 }

@@ -64,9 +64,10 @@ impl<'a> Scheme<'a> {
     ) {
         for (field, (shift, shown)) in (1..).zip(self.shifts.into_iter().zip(shown)) {
             if shift != 0.0 {
-                shown.copy_from_slice(new.field(field));
-                if let Some(past) = past {
-                    T::axpy_difference(T::of(-shift), new.field(field), past.field(field), shown);
+                let now = new.field(field);
+                match past {
+                    None => shown.copy_from_slice(now),
+                    Some(past) => T::combine(&[(T::one(), now)], &[(T::of(shift), past.field(field))], now, shown),
                 }
                 for &dof in prescribed {
                     shown[dof] = new.field(field)[dof];
