@@ -54,6 +54,7 @@ pub(crate) mod kernels {
     use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
     use faer::prelude::{Reborrow, ReborrowMut};
     use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+    use faer::traits::pulp::{Arch, Simd, WithSimd};
     use faer::{Accum, MatRef, Spec};
     use std::ops::Range;
 
@@ -288,7 +289,7 @@ pub(crate) mod kernels {
     const LANES: usize = 8;
 
     /// Σ 0 x: zero if every x is finite, NaN otherwise. An early exit would not vectorize.
-    #[inline]
+    #[inline(always)]
     fn all_finite<T: Real>(x: &[T]) -> bool {
         let mut sums = [T::zero(); LANES];
         let chunks = x.chunks_exact(LANES);
@@ -301,10 +302,10 @@ pub(crate) mod kernels {
         sums.into_iter().sum::<T>() + rest == T::zero()
     }
 
-    #[inline]
+    #[inline(always)]
     fn combine<T: Real>(terms: &[(T, &[T])], differences: &[(T, &[T])], y: &[T], out: &mut [T]) {
         /// P terms and D differences; all slices are cut to one length, so that no access is checked.
-        #[inline]
+        #[inline(always)]
         fn fused<T: Real, const P: usize, const D: usize>(
             terms: &[(T, &[T])],
             differences: &[(T, &[T])],
@@ -357,12 +358,12 @@ pub(crate) mod kernels {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn recover<T: Real>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], accumulate: Accumulate) -> bool {
         /// Entries a block: what it touches stays in the first-level cache until it has been looked at.
         const BLOCK: usize = 512;
         /// With or without u, and a replaced or added to.
-        #[inline]
+        #[inline(always)]
         fn pass<T: Real, const MOVES: bool, const ADDS: bool>(w: [T; 3], d: &[T], [u, v, a]: [&mut [T]; 3]) -> bool {
             let n = d.len();
             let (u, v, a) = (&mut u[..n], &mut v[..n], &mut a[..n]);
@@ -597,6 +598,30 @@ pub(crate) mod kernels {
         }
     }
 
+    // Dispatched to the vector units of the machine, with the same bits: nothing is fused.
+
+    struct Combine<'a, T>(&'a [(T, &'a [T])], &'a [(T, &'a [T])], &'a [T], &'a mut [T]);
+
+    impl<T: Real> WithSimd for Combine<'_, T> {
+        type Output = ();
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _: S) {
+            combine(self.0, self.1, self.2, self.3);
+        }
+    }
+
+    struct Recover<'a, T>([T; 3], &'a [T], [&'a mut [T]; 3], Accumulate);
+
+    impl<T: Real> WithSimd for Recover<'_, T> {
+        type Output = bool;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _: S) -> bool {
+            recover(self.0, self.1, self.2, self.3)
+        }
+    }
+
     macro_rules! kernels {
         ($scalar:ty) => {
             impl Kernels for $scalar {
@@ -616,10 +641,10 @@ pub(crate) mod kernels {
                     }
                 }
                 fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]) {
-                    combine(terms, differences, y, out);
+                    Arch::new().dispatch(Combine(terms, differences, y, out));
                 }
                 fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool {
-                    recover(weights, d, motion, a)
+                    Arch::new().dispatch(Recover(weights, d, motion, a))
                 }
                 fn all_finite(x: &[Self]) -> bool {
                     all_finite(x)
