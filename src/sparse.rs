@@ -1,6 +1,7 @@
 //! Checks of sparse input, and linear combinations of sparse matrices in one fixed pattern.
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::real::Real;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 
@@ -132,13 +133,19 @@ pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, colum
     rows.binary_search(&row).map_or(T::zero(), |at| a.val_of_col(column)[at])
 }
 
+/// Whether a source has this very pattern.
+fn kept_as_it_is(source: SymbolicSparseColMatRef<'_, usize>, pointers: &[usize], rows: &[usize]) -> bool {
+    source.col_nnz().is_none() && source.col_ptr() == pointers && source.row_idx() == rows
+}
+
 /// A fixed pattern that holds weighted sums of several matrices, with rows and columns of some dofs replaced
 /// by those of the identity; entries are moved by precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {
     pattern: SymbolicSparseColMat<usize>,
-    /// For each source, the slot of each of its entries; `DROPPED` on the rows and columns left out.
-    slots: Vec<Vec<usize>>,
+    /// For each source, the slot of each of its entries, `DROPPED` on the rows and columns left out; none where a source has
+    /// this pattern itself, as a stiffness matrix without supports does.
+    slots: Vec<Option<Vec<usize>>>,
     diagonal: Vec<usize>,
     identity: Vec<usize>,
 }
@@ -167,10 +174,11 @@ impl Combination {
         patterns: &[SymbolicSparseColMatRef<'_, usize>],
         sources: &[SymbolicSparseColMatRef<'_, usize>],
     ) -> Result<Self> {
-        let out_of_memory = |_| Error::OutOfMemory { what: "the pattern of the effective matrix" };
         let kept = |dof: &usize| identity.binary_search(dof).is_err();
         let mut pointers = Vec::with_capacity(n + 1);
-        let mut rows: Vec<usize> = Vec::new();
+        // (A vector that grew would hold up to twice the memory.)
+        let size = patterns.iter().map(|source| source.row_idx().len()).max().map_or(n, |entries| entries + n);
+        let mut rows: Vec<usize> = memory::reserve(size, 1, "the pattern of the effective matrix")?;
         let mut column_rows: Vec<usize> = Vec::new();
         let mut diagonal = Vec::with_capacity(n);
         pointers.push(0);
@@ -192,6 +200,9 @@ impl Combination {
         let slots = sources
             .iter()
             .map(|source| {
+                if kept_as_it_is(*source, &pointers, &rows) {
+                    return None;
+                }
                 let mut slots = Vec::with_capacity(source.row_idx().len());
                 for column in 0..n {
                     let range = pointers[column]..pointers[column + 1];
@@ -200,11 +211,11 @@ impl Combination {
                         slots.push(found.map_or(DROPPED, |at| range.start + at));
                     }
                 }
-                slots
+                Some(slots)
             })
             .collect();
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows).to_owned().map_err(out_of_memory)?;
+        rows.shrink_to_fit();
+        let pattern = SymbolicSparseColMat::new_checked(n, n, pointers, None, rows);
         Ok(Self { pattern, slots, diagonal, identity: identity.to_vec() })
     }
 
@@ -230,9 +241,12 @@ impl Combination {
     pub(crate) fn fill<T: Real>(&self, sources: &[(T, &[T])], diagonal: Option<(T, &[T])>, out: &mut [T]) {
         out.fill(T::zero());
         for (slots, (weight, values)) in self.slots.iter().zip(sources) {
-            for (&slot, &value) in slots.iter().zip(*values) {
-                if slot != DROPPED {
-                    out[slot] += *weight * value;
+            match slots {
+                None => T::axpy(*weight, values, out),
+                Some(slots) => {
+                    for (&slot, &value) in slots.iter().zip(*values).filter(|(slot, _)| **slot != DROPPED) {
+                        out[slot] += *weight * value;
+                    }
                 }
             }
         }
@@ -291,5 +305,12 @@ mod tests {
         let a = sum.view(&values);
         let dense: Vec<Vec<f64>> = (0..3).map(|i| (0..3).map(|j| entry(a, i, j)).collect()).collect();
         assert_eq!(dense, [[14.0, 0.0, 5.0], [0.0, 1.0, 0.0], [5.0, 0.0, 12.0]]);
+
+        // K alone without supports has the pattern of the sum; C alone has not.
+        let own = Combination::new(3, &[], &[k.symbolic()]).unwrap();
+        assert!(own.slots[0].is_none() && sum.slots.iter().all(Option::is_some));
+        let mut values = vec![0.0; own.len()];
+        own.fill(&[(2.0, k.val())], Some((10.0, &[1.0, 1.0, 1.0])), &mut values);
+        assert_eq!(values, [14.0, -2.0, -2.0, 14.0, -2.0, -2.0, 12.0]);
     }
 }

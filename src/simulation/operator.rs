@@ -165,7 +165,7 @@ impl<T: Real> Operator<T> {
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
-        let Self { weights, tangent, combination, factor, part, end: at_end, values, .. } = self;
+        let Self { weights, tangent, linearity, combination, factor, part, end: at_end, values, .. } = self;
         values.resize(combination.len(), T::zero());
         if *tangent == Tangent::Present {
             part.resize(system.pattern().row_idx().len(), T::zero());
@@ -193,6 +193,10 @@ impl<T: Real> Operator<T> {
             (Mass::Consistent(mass), Tangent::Present) => combination.fill(&[own, (inertia, mass.val())], None, values),
             (Mass::Consistent(mass), Tangent::Absent) => combination.fill(&[(inertia, mass.val())], None, values),
         }
+        // The factorization takes the most memory of a build: what is not read again goes before.
+        if *tangent == Tangent::Absent || *linearity == Linearity::Linear {
+            *part = Vec::new();
+        }
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             let column = combination.pattern().col_ptr().partition_point(|&p| p <= at) - 1;
             let (row, value) = (combination.pattern().row_idx()[at], values[at].value());
@@ -200,7 +204,7 @@ impl<T: Real> Operator<T> {
         }
         factor.factorize(combination.view(values))?;
         if !self.varies() {
-            (self.part, self.values) = (Vec::new(), Vec::new());
+            self.values = Vec::new();
         }
         self.reset();
         Ok(())
