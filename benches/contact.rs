@@ -103,15 +103,16 @@ fn measure(n: usize, arguments: &Arguments) {
     }
     table.row("bare K product", timing::force(block.system::<f64>()));
     table.row("reading the first factor twice", timing::reading::<f64>(stored));
-    let samples = arguments.repeated(if n > 25 { 5 } else { 15 });
-    table.sample(samples, 1);
+    // Operations of small scenes find their memory in the cache in a run as well.
+    let [samples, calls] = [if n > 25 { 5 } else { 15 }, 100_000 / block.dofs()].map(|times| arguments.repeated(times));
+    table.sample(samples, calls);
     table.print();
-    interface(factor, block.dofs(), candidates.len(), samples);
+    interface(factor, block.dofs(), candidates.len(), [samples, calls]);
     println!();
 }
 
 /// The work of contact alone, with a factor that eliminates so many candidates last and all of them pressed.
-fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: usize, samples: usize) {
+fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: usize, [samples, calls]: [usize; 2]) {
     println!("the interface alone, contact last");
     let unit = |row: usize| (0..candidates).map(move |k| f64::from(u8::from(k == row)));
     let all: Vec<f64> = (0..candidates).flat_map(unit).collect();
@@ -174,7 +175,7 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
             black_box(&multipliers);
         });
     }
-    table.sample(samples, 1);
+    table.sample(samples, calls);
     table.print();
 }
 

@@ -40,7 +40,8 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     let (k, mass) = (solid.stiffness::<T>(), solid.lumped_mass::<T>());
     println!("{name}, {} candidates, Courant number 1", candidates.len());
     let samples = arguments.repeated((1_000_000 / solid.dofs()).clamp(7, 41));
-    let calls = arguments.repeated(10_000 / solid.dofs());
+    // (Operations of small scenes find their memory in the cache in a run as well.)
+    let calls = arguments.repeated(100_000 / solid.dofs());
 
     let mut table = Table::new(Unit::Milli, RATIOS);
     let a = timing::effective(&k, &mass, &Composite, h);
