@@ -45,7 +45,8 @@ fn table<T: Real>(scalar: &str, block: &Solid<3>, n: usize) {
             made = Some(factor);
         });
         let factor = made.map_or(0, |factor| factor.stored_values() * size_of::<T>());
-        print_row(name, factor, host, [counted.bytes_max, bytes(counted.bytes_current)], None);
+        let [peak, held] = [counted.bytes_max, bytes(counted.bytes_current)].map(|own| own + host as u64);
+        print_row(name, factor, host, [peak, held], None);
     }
     drop(a);
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =

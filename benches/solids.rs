@@ -39,7 +39,7 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     let candidates: Vec<usize> = bottom.into_iter().map(|node| Solid::<D>::dof(node, D - 1)).collect();
     let (k, mass) = (solid.stiffness::<T>(), solid.lumped_mass::<T>());
     println!("{name}, {} candidates, Courant number 1", candidates.len());
-    let samples = arguments.repeated((1_000_000 / solid.dofs()).clamp(7, 41));
+    let samples = arguments.repeated((200_000 / solid.dofs()).clamp(7, 21));
     // (Operations of small scenes find their memory in the cache in a run as well.)
     let calls = arguments.repeated(100_000 / solid.dofs());
 
