@@ -1,16 +1,17 @@
 //! Sweeps over a supernodal factor for one right-hand side, at the speed of reading the factor once.
 //!
 //! Four columns of a supernode go together: every entry of L is read once, every entry of the vector a quarter as often. The
-//! loops are plain; pulp compiles them for the vector units of the machine that they run on.
+//! loops that do are plain ones in functions of their own, compiled for the vector units of the machine that they run on. (Inlined
+//! into more than that, they would not always be recognized as vector loops.)
 //!
 //! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; what
 //! is eliminated behind it column by column.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for these
+#![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
 use super::Real;
 use super::kernels::{Columns, Supernodal, supernodes};
 use crate::linear_solver::forest::{Forest, Plan};
-use faer::traits::pulp::Arch;
+use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
 /// Columns that go together.
@@ -83,71 +84,43 @@ fn backward_plan<T: Real>(plan: &Plan, interior: &Interior<'_, T>, from: usize, 
 }
 
 fn forward_serial<T: Real>(forward: &Forward<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
-    Arch::new().dispatch(
-        #[inline(always)]
-        move || {
-            let Forward { interior: Interior { factor, forest }, b, order } = *forward;
-            let base = forest.offsets[from];
-            for s in range {
-                let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
-                let panel = Panel::whole(factor, s);
-                let own = &mut rest[..panel.rows];
-                let (top, update) = own.split_at_mut(panel.size);
-                match order {
-                    Some(order) => {
-                        top.iter_mut().zip(&order[forest.columns(s)]).for_each(|(x, &dof)| *x = b[dof]);
-                    }
-                    None => top.copy_from_slice(&b[forest.columns(s)]),
-                }
-                update.fill(T::zero());
-                for &child in forest.children(s) {
-                    let update = &below[forest.update(child).start - base..forest.update(child).end - base];
-                    for (&place, &change) in forest.places(child).iter().zip(update) {
-                        own[place] += change;
-                    }
-                }
-                panel.forward(own);
+    let Forward { interior: Interior { factor, forest }, b, order } = *forward;
+    let (base, arch) = (forest.offsets[from], Arch::new());
+    for s in range {
+        let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
+        let panel = Panel::whole(factor, s);
+        let own = &mut rest[..panel.rows];
+        let (top, update) = own.split_at_mut(panel.size);
+        match order {
+            Some(order) => top.iter_mut().zip(&order[forest.columns(s)]).for_each(|(x, &dof)| *x = b[dof]),
+            None => top.copy_from_slice(&b[forest.columns(s)]),
+        }
+        update.fill(T::zero());
+        for &child in forest.children(s) {
+            let update = &below[forest.update(child).start - base..forest.update(child).end - base];
+            for (&place, &change) in forest.places(child).iter().zip(update) {
+                own[place] += change;
             }
-        },
-    );
+        }
+        panel.forward(arch, own);
+    }
 }
 
 fn backward_serial<T: Real>(interior: &Interior<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
-    Arch::new().dispatch(
-        #[inline(always)]
-        move || {
-            let Interior { factor, forest } = interior;
-            let base = forest.offsets[from];
-            for s in range.rev() {
-                let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
-                let panel = Panel::whole(factor, s);
-                let own = &mut rest[..panel.rows];
-                panel.backward(own);
-                for &child in forest.children(s) {
-                    let known = &mut below[forest.update(child).start - base..forest.update(child).end - base];
-                    for (&place, known) in forest.places(child).iter().zip(known) {
-                        *known = own[place];
-                    }
-                }
+    let Interior { factor, forest } = interior;
+    let (base, arch) = (forest.offsets[from], Arch::new());
+    for s in range.rev() {
+        let (below, rest) = w.split_at_mut(forest.offsets[s] - base);
+        let panel = Panel::whole(factor, s);
+        let own = &mut rest[..panel.rows];
+        panel.backward(arch, own);
+        for &child in forest.children(s) {
+            let known = &mut below[forest.update(child).start - base..forest.update(child).end - base];
+            for (&place, known) in forest.places(child).iter().zip(known) {
+                *known = own[place];
             }
-        },
-    );
-}
-
-/// Forward over `columns` for one right-hand side.
-pub(super) fn forward<T: Real>(factor: &Supernodal<'_, T>, columns: Range<usize>, x: Columns<'_, T>) {
-    Arch::new().dispatch(
-        #[inline(always)]
-        || forward_with(factor, columns, x),
-    );
-}
-
-/// Backward over `columns` for one right-hand side; entries behind them hold the solution.
-pub(super) fn backward<T: Real>(factor: &Supernodal<'_, T>, columns: Range<usize>, x: Columns<'_, T>) {
-    Arch::new().dispatch(
-        #[inline(always)]
-        || backward_with(factor, columns, x),
-    );
+        }
+    }
 }
 
 /// The part of a supernode that a sweep over some columns visits.
@@ -165,7 +138,7 @@ struct Panel<'a, T> {
 }
 
 impl<'a, T> Panel<'a, T> {
-    #[inline(always)]
+    #[inline]
     fn new(factor: &Supernodal<'a, T>, supernode: usize, columns: &Range<usize>) -> Self {
         let symbolic = factor.symbolic;
         let (begin, behind) = (symbolic.supernode_begin()[supernode], symbolic.supernode_end()[supernode]);
@@ -179,19 +152,19 @@ impl<'a, T> Panel<'a, T> {
     }
 
     /// Column j from its row `from` on.
-    #[inline(always)]
+    #[inline]
     fn column(&self, j: usize, from: usize) -> &'a [T] {
         &self.values[j * self.stride + from..j * self.stride + self.rows]
     }
 
     /// How many rows follow the first one directly; the others are `pattern`.
-    #[inline(always)]
+    #[inline]
     fn leading(&self) -> usize {
         self.rows - self.pattern.len()
     }
 
     /// All of a supernode.
-    #[inline(always)]
+    #[inline]
     fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
         let symbolic = factor.symbolic;
         Self::new(factor, supernode, &(symbolic.supernode_begin()[supernode]..symbolic.supernode_end()[supernode]))
@@ -200,8 +173,8 @@ impl<'a, T> Panel<'a, T> {
 
 impl<T: Real> Panel<'_, T> {
     /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
-    #[inline(always)]
-    fn forward(&self, w: &mut [T]) {
+    #[inline]
+    fn forward(&self, arch: Arch, w: &mut [T]) {
         let size = self.size;
         let mut column = 0;
         while column + WIDTH <= size {
@@ -216,33 +189,31 @@ impl<T: Real> Panel<'_, T> {
             }
             let (done, rest) = w.split_at_mut(column + WIDTH);
             let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
-            subtract(std::array::from_fn(|k| done[column + k]), l, rest);
+            arch.dispatch(Subtract { c: std::array::from_fn(|k| done[column + k]), l, y: rest });
             column += WIDTH;
         }
         for j in column..size {
             let l = self.column(j, j);
             let xj = w[j] / l[0];
             w[j] = xj;
-            for (x, &l) in w[j + 1..].iter_mut().zip(&l[1..]) {
-                *x -= l * xj;
-            }
+            arch.dispatch(Subtract { c: [xj], l: [&l[1..]], y: &mut w[j + 1..] });
         }
     }
 
     /// Solves for the columns: `w` has their right-hand sides, then the solution on the rows below.
-    #[inline(always)]
-    fn backward(&self, w: &mut [T]) {
+    #[inline]
+    fn backward(&self, arch: Arch, w: &mut [T]) {
         // The columns that are no group of four are the last ones, as forward.
         let groups = self.size - self.size % WIDTH;
         for j in (groups..self.size).rev() {
             let l = self.column(j, j);
-            w[j] = (w[j] - dot(&l[1..], &w[j + 1..])) / l[0];
+            w[j] = (w[j] - arch.dispatch(Dots { l: [&l[1..]], x: &w[j + 1..] })[0]) / l[0];
         }
         let mut column = groups;
         while column > 0 {
             column -= WIDTH;
             let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
-            let sums = dots(l, &w[column + WIDTH..]);
+            let sums = arch.dispatch(Dots { l, x: &w[column + WIDTH..] });
             for k in (0..WIDTH).rev() {
                 let j = column + k;
                 let l = self.column(j, j);
@@ -256,19 +227,20 @@ impl<T: Real> Panel<'_, T> {
     }
 }
 
-#[inline(always)]
-fn forward_with<T: Real>(
+/// Forward over `columns` for one right-hand side.
+pub(super) fn forward<T: Real>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
     Columns { values: x, skipped, scratch }: Columns<'_, T>,
 ) {
+    let arch = Arch::new();
     for supernode in supernodes(factor, &columns) {
         let panel = Panel::new(factor, supernode, &columns);
         let (start, leading) = (panel.start - skipped, panel.leading());
         let w = &mut scratch[..panel.rows];
         w[..leading].copy_from_slice(&x[start..start + leading]);
         w[leading..].fill(T::zero());
-        panel.forward(w);
+        panel.forward(arch, w);
         x[start..start + leading].copy_from_slice(&w[..leading]);
         for (&row, &change) in panel.pattern.iter().zip(&w[leading..]) {
             x[row - skipped] += change;
@@ -276,12 +248,13 @@ fn forward_with<T: Real>(
     }
 }
 
-#[inline(always)]
-fn backward_with<T: Real>(
+/// Backward over `columns` for one right-hand side; entries behind them hold the solution.
+pub(super) fn backward<T: Real>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
     Columns { values: x, skipped, scratch }: Columns<'_, T>,
 ) {
+    let arch = Arch::new();
     for supernode in supernodes(factor, &columns).rev() {
         let panel = Panel::new(factor, supernode, &columns);
         let (start, size, leading) = (panel.start - skipped, panel.size, panel.leading());
@@ -290,52 +263,61 @@ fn backward_with<T: Real>(
         for (w, &row) in w[leading..].iter_mut().zip(panel.pattern) {
             *w = x[row - skipped];
         }
-        panel.backward(w);
+        panel.backward(arch, w);
         x[start..start + size].copy_from_slice(&w[..size]);
     }
 }
 
 /// `y −= Σ c_k l_k`.
-#[inline(always)]
-fn subtract<T: Real>(c: [T; WIDTH], l: [&[T]; WIDTH], y: &mut [T]) {
-    let n = y.len();
-    let [l0, l1, l2, l3] = l.map(|l| &l[..n]);
-    for (i, y) in y.iter_mut().enumerate() {
-        *y -= (c[0] * l0[i] + c[1] * l1[i]) + (c[2] * l2[i] + c[3] * l3[i]);
+struct Subtract<'a, T, const N: usize> {
+    c: [T; N],
+    l: [&'a [T]; N],
+    y: &'a mut [T],
+}
+
+impl<T: Real, const N: usize> WithSimd for Subtract<'_, T, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { c, l, y } = self;
+        let n = y.len();
+        let l = l.map(|l| &l[..n]);
+        for (i, y) in y.iter_mut().enumerate() {
+            let mut sum = c[0] * l[0][i];
+            for k in 1..N {
+                sum += c[k] * l[k][i];
+            }
+            *y -= sum;
+        }
     }
 }
 
 /// `l_k · x`.
-#[inline(always)]
-fn dots<T: Real>(l: [&[T]; WIDTH], x: &[T]) -> [T; WIDTH] {
-    let n = x.len();
-    let l = l.map(|l| &l[..n]);
-    let mut lanes = [[T::zero(); LANES]; WIDTH];
-    let whole = n - n % LANES;
-    for i in (0..whole).step_by(LANES) {
-        let x = &x[i..i + LANES];
-        for (lanes, l) in lanes.iter_mut().zip(l) {
-            let l = &l[i..i + LANES];
-            for k in 0..LANES {
-                lanes[k] += l[k] * x[k];
-            }
-        }
-    }
-    std::array::from_fn(|k| {
-        let rest: T = l[k][whole..].iter().zip(&x[whole..]).map(|(&l, &x)| l * x).sum();
-        lanes[k].iter().copied().sum::<T>() + rest
-    })
+struct Dots<'a, T, const N: usize> {
+    l: [&'a [T]; N],
+    x: &'a [T],
 }
 
-#[inline(always)]
-fn dot<T: Real>(x: &[T], y: &[T]) -> T {
-    let mut lanes = [T::zero(); LANES];
-    let (a, b) = (x.chunks_exact(LANES), y.chunks_exact(LANES));
-    let rest: T = a.remainder().iter().zip(b.remainder()).map(|(&x, &y)| x * y).sum();
-    for (x, y) in a.zip(b) {
-        for k in 0..LANES {
-            lanes[k] += x[k] * y[k];
+impl<T: Real, const N: usize> WithSimd for Dots<'_, T, N> {
+    type Output = [T; N];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [T; N] {
+        let (x, rest) = self.x.as_chunks::<LANES>();
+        let l = self.l.map(|l| l[..self.x.len()].as_chunks::<LANES>());
+        let chunks = l.map(|(chunks, _)| &chunks[..x.len()]);
+        let mut lanes = [[T::zero(); LANES]; N];
+        for (i, x) in x.iter().enumerate() {
+            for (lanes, chunks) in lanes.iter_mut().zip(chunks) {
+                for (lane, (&l, &x)) in lanes.iter_mut().zip(chunks[i].iter().zip(x)) {
+                    *lane += l * x;
+                }
+            }
         }
+        std::array::from_fn(|k| {
+            let rest: T = l[k].1.iter().zip(rest).map(|(&l, &x)| l * x).sum();
+            lanes[k].iter().copied().sum::<T>() + rest
+        })
     }
-    lanes.iter().copied().sum::<T>() + rest
 }
