@@ -1,6 +1,6 @@
 //! Sweeps over a supernodal factor for one right-hand side, at the speed of reading the factor once.
 //!
-//! Four columns of a supernode go together: every entry of L is read once, every entry of the vector a quarter as often. The
+//! Eight columns of a supernode go together: every entry of L is read once, every entry of the vector an eighth as often. The
 //! loops that do are plain ones in functions of their own, compiled for the vector units of the machine that they run on. (Inlined
 //! into more than that, they would not always be recognized as vector loops.)
 //!
@@ -13,9 +13,6 @@ use super::kernels::{Columns, Supernodal, supernodes};
 use crate::linear_solver::forest::{Forest, Plan};
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
-
-/// Columns that go together.
-const WIDTH: usize = 4;
 
 /// Sums that are kept side by side in a dot product.
 const LANES: usize = 8;
@@ -173,56 +170,54 @@ impl<'a, T> Panel<'a, T> {
 
 impl<T: Real> Panel<'_, T> {
     /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
-    #[inline]
     fn forward(&self, arch: Arch, w: &mut [T]) {
-        let size = self.size;
-        let mut column = 0;
-        while column + WIDTH <= size {
-            // The small triangle, column by column, then the rows below it.
-            for j in column..column + WIDTH {
-                let l = self.column(j, j);
-                let xj = w[j] / l[0];
-                w[j] = xj;
-                for (x, &l) in w[j + 1..column + WIDTH].iter_mut().zip(&l[1..]) {
-                    *x -= l * xj;
-                }
-            }
-            let (done, rest) = w.split_at_mut(column + WIDTH);
-            let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
-            arch.dispatch(Subtract { c: std::array::from_fn(|k| done[column + k]), l, y: rest });
-            column += WIDTH;
-        }
-        for j in column..size {
-            let l = self.column(j, j);
-            let xj = w[j] / l[0];
-            w[j] = xj;
-            arch.dispatch(Subtract { c: [xj], l: [&l[1..]], y: &mut w[j + 1..] });
-        }
+        let [eights, fours] = self.groups();
+        (0..eights).step_by(8).for_each(|column| self.eliminate::<8>(arch, column, w));
+        (eights..fours).step_by(4).for_each(|column| self.eliminate::<4>(arch, column, w));
+        (fours..self.size).for_each(|column| self.eliminate::<1>(arch, column, w));
     }
 
     /// Solves for the columns: `w` has their right-hand sides, then the solution on the rows below.
-    #[inline]
     fn backward(&self, arch: Arch, w: &mut [T]) {
-        // The columns that are no group of four are the last ones, as forward.
-        let groups = self.size - self.size % WIDTH;
-        for j in (groups..self.size).rev() {
+        let [eights, fours] = self.groups();
+        (fours..self.size).rev().for_each(|column| self.substitute::<1>(arch, column, w));
+        (eights..fours).rev().step_by(4).for_each(|last| self.substitute::<4>(arch, last - 3, w));
+        (0..eights).rev().step_by(8).for_each(|last| self.substitute::<8>(arch, last - 7, w));
+    }
+
+    /// The columns that go by eight end at the first of these, those that go by four at the second.
+    fn groups(&self) -> [usize; 2] {
+        [self.size - self.size % 8, self.size - self.size % 4]
+    }
+
+    /// Eliminates N columns: the small triangle, column by column, then the rows below it.
+    fn eliminate<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
+        let behind = column + N;
+        for j in column..behind {
             let l = self.column(j, j);
-            w[j] = (w[j] - arch.dispatch(Dots { l: [&l[1..]], x: &w[j + 1..] })[0]) / l[0];
-        }
-        let mut column = groups;
-        while column > 0 {
-            column -= WIDTH;
-            let l: [&[T]; WIDTH] = std::array::from_fn(|k| self.column(column + k, column + WIDTH));
-            let sums = arch.dispatch(Dots { l, x: &w[column + WIDTH..] });
-            for k in (0..WIDTH).rev() {
-                let j = column + k;
-                let l = self.column(j, j);
-                let mut sum = w[j] - sums[k];
-                for (&x, &l) in w[j + 1..column + WIDTH].iter().zip(&l[1..]) {
-                    sum -= l * x;
-                }
-                w[j] = sum / l[0];
+            let xj = w[j] / l[0];
+            w[j] = xj;
+            for (x, &l) in w[j + 1..behind].iter_mut().zip(&l[1..]) {
+                *x -= l * xj;
             }
+        }
+        let (done, y) = w.split_at_mut(behind);
+        let l = std::array::from_fn(|k| self.column(column + k, behind));
+        arch.dispatch(Subtract::<T, N> { c: std::array::from_fn(|k| done[column + k]), l, y });
+    }
+
+    /// Solves for N columns.
+    fn substitute<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
+        let behind = column + N;
+        let l = std::array::from_fn(|k| self.column(column + k, behind));
+        let sums = arch.dispatch(Dots::<T, N> { l, x: &w[behind..] });
+        for (j, dot) in (column..behind).zip(sums).rev() {
+            let l = self.column(j, j);
+            let mut sum = w[j] - dot;
+            for (&x, &l) in w[j + 1..behind].iter().zip(&l[1..]) {
+                sum -= l * x;
+            }
+            w[j] = sum / l[0];
         }
     }
 }
