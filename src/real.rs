@@ -43,6 +43,7 @@ pub trait Real:
 }
 
 /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
+#[allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
 pub(crate) mod kernels {
     use super::chain::Chains;
     use super::{Conj, LdltError, LltError, LltRef, MatMut, MemBuffer, MemStack, Par, Real, RealField, Side};

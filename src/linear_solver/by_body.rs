@@ -391,7 +391,9 @@ impl<T: Real> Factorization<T> for Factors<T> {
 
 fn solve_apart<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     threads::try_each(parts, &|part| part.solve(rhs))?;
-    parts.iter().for_each(|part| part.dofs.scatter(&part.column, rhs));
+    for part in parts {
+        part.dofs.scatter(&part.column, rhs);
+    }
     Ok(())
 }
 
@@ -419,7 +421,9 @@ impl<T: Real> Condensation<T> for Factors<T> {
             true => threads::try_each(&mut self.parts, &|part| part.condense(rhs))?,
             false => self.parts.iter_mut().try_for_each(|part| part.condense(rhs))?,
         }
-        self.parts.iter().for_each(|part| part.interface.scatter(&part.on_interface, interface));
+        for part in &self.parts {
+            part.interface.scatter(&part.on_interface, interface);
+        }
         Ok(())
     }
 
@@ -429,20 +433,20 @@ impl<T: Real> Condensation<T> for Factors<T> {
                 part.expand(interface);
                 Ok::<(), Infallible>(())
             });
-            self.parts.iter().for_each(|part| part.dofs.scatter(&part.column, solution));
+            for part in &self.parts {
+                part.dofs.scatter(&part.column, solution);
+            }
             return;
         }
         for part in &mut self.parts {
             let Part { dofs, factor, interface: places, on_interface, .. } = part;
-            match (dofs, factor.condensation().filter(|_| places.len() > 0)) {
+            let condensed = factor.condensation().filter(|_| places.len() > 0);
+            if let (Selection::Range(range), Some(condensed)) = (dofs, condensed) {
                 // In place.
-                (Selection::Range(range), Some(condensed)) => {
-                    condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
-                }
-                _ => {
-                    part.expand(interface);
-                    part.dofs.scatter(&part.column, solution);
-                }
+                condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
+            } else {
+                part.expand(interface);
+                part.dofs.scatter(&part.column, solution);
             }
         }
     }

@@ -246,10 +246,9 @@ fn factorization<T: Real>(Strings { order, mut begins }: Strings, last: &[usize]
 }
 
 /// The parts of a vector along two strings that follow one another.
-fn two<T>(x: &mut [T], ranges: [Range<usize>; 2]) -> [&mut [T]; 2] {
-    let (first, second) = x.split_at_mut(ranges[1].start);
-    let length = ranges[1].len();
-    [&mut first[ranges[0].clone()], &mut second[..length]]
+fn two<T>(x: &mut [T], [first, second]: [Range<usize>; 2]) -> [&mut [T]; 2] {
+    let (x, behind) = x.split_at_mut(second.start);
+    [&mut x[first], &mut behind[..second.len()]]
 }
 
 impl<T: Real> Factor<T> {
@@ -346,8 +345,9 @@ impl<T: Real> Factorization<T> for Factor<T> {
                     entry - lower[place] * coupling
                 }
             };
-            // Written so that NaN is refused too.
-            if !(pivot > negligible * entry) && failed.is_none() {
+            // (No pivot that is NaN is sound.)
+            let sound = pivot > negligible * entry;
+            if !sound && failed.is_none() {
                 failed = Some(dof);
             }
             inverse[place] = pivot.recip();
