@@ -2,10 +2,13 @@
 
 use faer::Par;
 
+/// Scalars of a factor from which on a thread of its own is worth waking: a tenth of a millisecond of reading.
+pub(crate) const GRAIN: usize = 1 << 18;
+
 /// How faer is to compute a factor of so many scalars: with all threads of the present pool with the feature `rayon` if it
 /// is large, else with one.
 #[cfg(feature = "rayon")]
-pub(crate) fn all(scalars: usize) -> Par {
+pub(crate) fn parallelism(scalars: usize) -> Par {
     /// Below, threads wait for each other longer than they work.
     const WORTHWHILE: usize = 1 << 20;
     match rayon::current_num_threads() {
@@ -16,7 +19,7 @@ pub(crate) fn all(scalars: usize) -> Par {
 
 /// How faer is to compute a factor: with one thread.
 #[cfg(not(feature = "rayon"))]
-pub(crate) fn all(_: usize) -> Par {
+pub(crate) fn parallelism(_: usize) -> Par {
     Par::Seq
 }
 
@@ -35,8 +38,6 @@ pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
 
 /// Whether parts with factors of these sizes, in scalars, are worth a thread each.
 pub(crate) fn worthwhile(scalars: impl Iterator<Item = usize>) -> bool {
-    /// A tenth of a millisecond of reading.
-    const GRAIN: usize = 1 << 18;
     cfg!(feature = "rayon") && scalars.filter(|scalars| *scalars >= GRAIN).count() > 1
 }
 

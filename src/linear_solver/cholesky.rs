@@ -22,6 +22,9 @@ use std::ops::Range;
 /// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
 /// see `docs/design.md`.
 ///
+/// With the feature `rayon` large factors are computed and swept by the threads of the pool in which that is called. Results are
+/// the same bit for bit by any number of them.
+///
 /// [`analyze`](LinearSolver::analyze) refuses, besides what the trait says, an order that does not fit the pattern:
 /// [`Error::Dimension`], [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
 #[derive(Clone, Debug, Default)]
@@ -121,7 +124,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
             SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
         };
-        let par = threads::all(values.len());
+        let par = threads::parallelism(values.len());
         let scratch = T::cholesky_scratch(kind, &symbolic, 1, par);
         let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
         let n = symbolic.nrows();

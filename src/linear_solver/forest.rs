@@ -5,11 +5,9 @@
 //! ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may be swept at the same time. What is added
 //! to what, and in which order, is a matter of the factor alone: results are the same bit for bit on any number of threads.
 
+use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
-
-/// Scalars of a branch from which on a thread of its own is worth waking: a tenth of a millisecond of reading.
-const GRAIN: usize = 1 << 18;
 
 /// The supernodes of the interior, and how they hang together.
 #[derive(Debug)]

@@ -17,7 +17,7 @@ use std::ops::Range;
 /// Sums that are kept side by side in a dot product.
 const LANES: usize = 8;
 
-/// A factor, its forest, and a right-hand side that is read in this order.
+/// A factor and its forest.
 #[derive(Debug)]
 pub(super) struct Interior<'a, T> {
     pub(super) factor: Supernodal<'a, T>,
