@@ -4,13 +4,14 @@
 //! `cargo bench --bench iterative -- --test` is quick.
 
 use contact_dynamics::contact::Plane;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::{
     Cholesky, Composite, ConjugateGradients, Factorization, LinearSolver, Newmark, NodesOnObstacle,
-    PersistencyCorrection, Simulation, TimeIntegrator,
+    PersistencyCorrection, Simulation,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::timing;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -87,14 +88,7 @@ fn books(cells: usize) {
 
 /// The composite scheme's effective matrix.
 fn effective(block: &Solid<3>, h: f64) -> SparseColMat<usize, f64> {
-    let inertia = Composite.tableau().stages[0].balance.a.z / (h * h);
-    let (k, mass) = (block.stiffness::<f64>(), block.lumped_mass::<f64>());
-    let mut triplets: Vec<_> = mass.iter().enumerate().map(|(i, m)| Triplet::new(i, i, inertia * m)).collect();
-    for j in 0..block.dofs() {
-        let k = k.as_ref();
-        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
-    }
-    SparseColMat::<usize, f64>::try_new_from_triplets(block.dofs(), block.dofs(), &triplets).expect("triplets")
+    timing::effective(&block.stiffness(), &block.lumped_mass(), &Composite, h)
 }
 
 /// Milliseconds, the best of some: on a shared machine what is least disturbed.

@@ -37,7 +37,7 @@ fn main() {
     }
 }
 
-/// Two element lengths per wave transit.
+/// Courant number 1.
 fn step_size(n: usize) -> f64 {
     1.0 / n as f64 / MATERIAL.wave_speed()
 }

@@ -27,6 +27,16 @@ pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatR
     }
 }
 
+/// Refuses patterns of effective matrices that are not square, and those that [`check_pattern`] does; gives the number of dofs.
+pub(crate) fn check_effective_pattern(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<usize> {
+    let (rows, columns) = (pattern.nrows(), pattern.ncols());
+    if rows != columns {
+        return Err(Error::Dimension { what: "effective matrix", expected: rows, found: columns });
+    }
+    check_pattern("effective", pattern)?;
+    Ok(columns)
+}
+
 /// Refuses NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
 pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
     check_symmetric_in(matrix, a, &mut Vec::new())

@@ -30,6 +30,18 @@ fn steps_do_not_allocate() {
     rotors();
 }
 
+/// Takes so many steps of a run in which contacts change at least so often, from its start to their end.
+fn assert_steps_allocate_nothing(run: &mut Simulation<'_, f64>, steps: usize, at_least: u64, what: &str) {
+    let counted = allocation_counter::measure(|| {
+        for _ in 0..steps {
+            run.step().unwrap();
+        }
+    });
+    let changes = run.statistics().contact_changes;
+    assert!(changes >= at_least, "{what}: {changes} changes of contact");
+    assert_eq!(counted.count_total, 0, "{what}");
+}
+
 /// A chain of gyroscopic pairs that hits a stop: solves by LU in contact and away, and factorizations of it.
 fn rotors() {
     let n = 40;
@@ -64,15 +76,7 @@ fn rotors() {
     .build()
     .unwrap();
     run.step().unwrap();
-    let mut changes = 0;
-    let counted = allocation_counter::measure(|| {
-        for _ in 0..200 {
-            run.step().unwrap();
-        }
-        changes = run.statistics().contact_changes;
-    });
-    assert!(changes > 20, "{changes} changes");
-    assert_eq!(counted.count_total, 0, "rotors by LU");
+    assert_steps_allocate_nothing(&mut run, 200, 21, "rotors by LU");
 }
 
 /// Blocks at large strains that bounce: Newton's method, factorizations, rows that follow a curved floor.
@@ -99,15 +103,7 @@ fn large_motion() {
             for _ in 0..3 {
                 run.step().unwrap();
             }
-            let mut changes = 0;
-            let counted = allocation_counter::measure(|| {
-                for _ in 0..200 {
-                    run.step().unwrap();
-                }
-                changes = run.statistics().contact_changes;
-            });
-            assert!(changes >= 4, "{}: {changes} changes", make().name());
-            assert_eq!(counted.count_total, 0, "{}, {newton:?}", make().name());
+            assert_steps_allocate_nothing(&mut run, 200, 4, &format!("{}, {newton:?}", make().name()));
         }
     }
 }
@@ -162,15 +158,7 @@ fn bars() {
                 .build()
                 .unwrap();
             run.step().unwrap();
-            let mut changes = 0;
-            let counted = allocation_counter::measure(|| {
-                for _ in 0..400 {
-                    run.step().unwrap();
-                }
-                changes = run.statistics().contact_changes;
-            });
-            assert!(changes >= 2, "the run must contain an impact and a release");
-            assert_eq!(counted.count_total, 0, "{}, {mass:?}", scheme.name());
+            assert_steps_allocate_nothing(&mut run, 400, 2, &format!("{}, {mass:?}", scheme.name()));
         }
     }
 }
@@ -213,13 +201,7 @@ fn correctors() {
                 .build()
                 .unwrap();
             run.step().unwrap();
-            let counted = allocation_counter::measure(|| {
-                for _ in 0..400 {
-                    run.step().unwrap();
-                }
-            });
-            assert!(run.statistics().contact_changes >= 2, "{name}");
-            assert_eq!(counted.count_total, 0, "{name}, {mass:?}");
+            assert_steps_allocate_nothing(&mut run, 400, 2, &format!("{name}, {mass:?}"));
         }
     }
 }
@@ -242,15 +224,7 @@ fn bodies_apart() {
         .build()
         .unwrap();
     run.step().unwrap();
-    let mut changes = 0;
-    let counted = allocation_counter::measure(|| {
-        for _ in 0..300 {
-            run.step().unwrap();
-        }
-        changes = run.statistics().contact_changes;
-    });
-    assert!(changes >= 10, "{changes} changes");
-    assert_eq!(counted.count_total, 0);
+    assert_steps_allocate_nothing(&mut run, 300, 10, "bodies apart");
 }
 
 /// A block dropped on its edge: conjugate gradients, full solves for contact.
@@ -268,15 +242,7 @@ fn iterations() {
             .build()
             .unwrap();
         run.step().unwrap();
-        let mut changes = 0;
-        let counted = allocation_counter::measure(|| {
-            for _ in 0..100 {
-                run.step().unwrap();
-            }
-            changes = run.statistics().contact_changes;
-        });
-        assert!(changes >= 4, "{changes} changes");
-        assert_eq!(counted.count_total, 0, "{preconditioner:?}");
+        assert_steps_allocate_nothing(&mut run, 100, 4, &format!("{preconditioner:?}"));
     }
 }
 

@@ -92,11 +92,7 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let n = pattern.ncols();
-        if pattern.nrows() != n {
-            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: n });
-        }
-        sparse::check_pattern("effective", pattern)?;
+        let n = sparse::check_effective_pattern(pattern)?;
         if let Some(&dof) = last.iter().find(|dof| **dof >= n) {
             return Err(Error::MissingDof { what: "the list of contact dofs", dof, dofs: n });
         }

@@ -194,11 +194,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         _last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let dofs = pattern.ncols();
-        if pattern.nrows() != dofs {
-            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: dofs });
-        }
-        sparse::check_pattern("effective", pattern)?;
+        let dofs = sparse::check_effective_pattern(pattern)?;
         // The size that needs the least memory: zeros are stored in blocks, an index is half a number.
         let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
         for size in [3, 2, 1].into_iter().filter(|size| dofs.is_multiple_of(*size)) {

@@ -97,11 +97,7 @@ impl<T: Real> LinearSolver<T> for Lu {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         _last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let n = pattern.ncols();
-        if pattern.nrows() != n {
-            return Err(Error::Dimension { what: "effective matrix", expected: pattern.nrows(), found: n });
-        }
-        sparse::check_pattern("effective", pattern)?;
+        let n = sparse::check_effective_pattern(pattern)?;
         let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU" };
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(no_memory)?;
         let bound = bound(pattern, &symbolic)?;
