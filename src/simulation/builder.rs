@@ -117,6 +117,14 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Leaves contact as the scheme solves it: correctors given before are dropped. For comparisons, and for schemes that are
+    /// studied raw.
+    #[must_use]
+    pub fn uncorrected(mut self) -> Self {
+        self.correctors.clear();
+        self
+    }
+
     /// Adds a corrector; several act in the order given.
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {

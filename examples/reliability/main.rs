@@ -1,0 +1,35 @@
+//! Where results were silently wrong, and what they are now: one file a subject, each case with the figure of the state before.
+//!
+//! `cargo run --release --example reliability` prints the table of `docs/reliability.md` and writes it; with `--quick` sweeps
+//! are shorter. Figures of "before" were printed by the same cases at commit 9fcb7b6; they are recorded here, for that state of
+//! the code is gone.
+
+use contact_dynamics_scenes::output::Output;
+
+type Anything = Box<dyn std::error::Error>;
+
+/// A line of the table.
+struct Case {
+    /// What is run, in which scene.
+    case: String,
+    /// What came out at commit 9fcb7b6, and what comes out now.
+    before: &'static str,
+    now: String,
+}
+
+/// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
+type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
+
+const SUBJECTS: [Subject; 0] = [];
+
+fn main() -> Result<(), Anything> {
+    let output = Output::from_command_line("reliability")?;
+    let mut page = String::from("| subject | case | before | now |\n| --- | --- | --- | --- |\n");
+    for (subject, cases) in SUBJECTS {
+        for Case { case, before, now } in cases(output.quick)? {
+            page += &format!("| {subject} | {case} | {before} | {now} |\n");
+        }
+    }
+    println!("{page}");
+    output.write("reliability.md", &page)
+}
