@@ -70,9 +70,8 @@ pub struct GapRates<T> {
 
 /// A constraint `g(t, u) ≥ 0` (or = 0) on the displacements, with as many rows as it has candidates.
 ///
-/// Between two calls of [`search`](Self::search) or [`follow`](Self::follow) gaps are affine in u, `g = G u + g0(t)`. With
-/// a linear system they are linearized once, by the search where a step begins; with a nonlinear one Newton's method
-/// follows them to where the step ends. Evaluations are pure. Signs: g > 0 is open; the contact force on the system is
+/// Between two calls of [`search`](Self::search) or [`follow`](Self::follow) gaps are affine in u, `g = G u + g0(t)`. They are
+/// linearized by the search where a step begins, and followed to where it imposes contact and where its balance holds. Evaluations are pure. Signs: g > 0 is open; the contact force on the system is
 /// Gᵀ λ, λ > 0 in compression.
 pub trait ContactConstraint<T: Real>: Send {
     /// The largest number of candidates there can ever be: memory is reserved for it.
@@ -110,7 +109,7 @@ pub trait ContactConstraint<T: Real>: Send {
     }
 
     /// Moves the linearization of the candidates there are to u: G, gaps and rates are then those of the gap functions at
-    /// u. Called within a step, between two searches, for nonlinear gaps; candidates and their order stay as they are.
+    /// u. Called within a step, between two searches, any number of times and for several u; candidates and their order stay as they are.
     /// Default: gaps are affine, nothing moves.
     ///
     /// Returns whether G changed.
@@ -258,6 +257,14 @@ impl<T: Real> ContactJacobian<T> {
             self.weights.push(weight);
         }
         self.pointers.push(self.dofs.len());
+    }
+
+    /// Becomes a copy of another one, in the memory there is.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.pointers.clone_from(&other.pointers);
+        self.dofs.clone_from(&other.dofs);
+        self.weights.clone_from(&other.weights);
+        self.places.clone_from(&other.places);
     }
 
     /// Appends the rows of another one.

@@ -4,6 +4,7 @@ mod builder;
 mod constraints;
 mod contact_step;
 mod control;
+mod curved_rows;
 mod energy;
 mod newton;
 mod newton_step;

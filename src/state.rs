@@ -19,6 +19,11 @@ impl<T: Real> Motion<T> {
         Self { t: 0.0, u: zero(), v: zero(), a: zero() }
     }
 
+    /// Time; u, v, a.
+    pub(crate) fn place(&self) -> (f64, [&[T]; 3]) {
+        (self.t, [&self.u, &self.v, &self.a])
+    }
+
     /// Copies without allocating.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.t = other.t;

@@ -193,8 +193,6 @@ fn a_tether_holds_two_particles_on_a_circle() {
         (force_error, stretch)
     };
     let (force, stretch) = run(2e-3);
-    // The tangent of the circle leaves (h w)²/(2 L) a step, w the relative speed.
-    assert!(force < 1e-4 && stretch < 1.05 * (2e-3 * 2.0 * speed).powi(2) / (2.0 * length), "{force} {stretch:e}");
-    let finer = run(5e-4);
-    assert!(finer.0 < 0.1 * force && finer.1 < 0.1 * stretch, "{finer:?}");
+    // At constant speed the trapezoidal rule is exact but for the way.
+    assert!(force < 1e-11 && stretch < 1e-12, "{force:e} {stretch:e}");
 }

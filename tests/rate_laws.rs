@@ -183,7 +183,7 @@ fn a_mass_rebounds_elastically_under_the_rate_condition() {
         run.run_until(10.0 * h, &mut ()).unwrap();
         assert!((run.gaps()[0] - inside - 6.0 * h).abs() < 1e-14 && !run.state().contacts().closed()[0]);
     }
-    // The books take the mean of the forces of two steps: that of the impact and none, over the way out of one step.
+    // The force lives in the middle of the step, over which the gap does not change: it does no work.
     let mut run = Simulation::builder(chain(&[mass], 0.0), midpoint(), h)
         .velocity(vec![-1.0])
         .constraint(LinearRows::new().row(ContactLaw::RateCondition, &[(0, 1.0)], 2.3 * h))
@@ -192,7 +192,7 @@ fn a_mass_rebounds_elastically_under_the_rate_condition() {
         .unwrap();
     run.run_until(10.0 * h, &mut ()).unwrap();
     let works = run.energy().works.unwrap();
-    assert!((works.contact - mass).abs() < 1e-12 && (works.remainder + mass).abs() < 1e-12, "{works:?}");
+    assert!(works.contact.abs() < 1e-12 && works.remainder.abs() < 1e-12, "{works:?}");
     // The known failure: the trapezoidal rule presses with 4 m v/h, and takes half of it again in the next step.
     let mut run = falling(ContactLaw::RateCondition, mass, 2.3 * h, Newmark::trapezoidal(), h);
     run.run_until(10.0 * h, &mut ()).unwrap();
@@ -501,16 +501,12 @@ fn followed_rows_meet_the_laws_where_the_step_ends() {
             ContactLaw::RateCondition => assert!(drift < 1e-12, "{drift:e}"),
             _ => assert!(rate < 1e-10, "{rate:e}"),
         }
-        // Rows that are linearized where the step begins miss by their curvature, (h v)²/(2 R) and h v²/R with
-        // v² ≤ 2 g R (1 − cos θ).
-        let (drift, rate, depth) = run(None, Box::new(midpoint()));
-        let speed = (2.0 * g * radius * (1.0 - angle.cos())).sqrt();
-        let bend = (h * speed).powi(2) / (2.0 * radius);
+        // Linear systems follow as well, without Newton's method.
+        let (drift, rate, _) = run(None, Box::new(midpoint()));
         match law {
-            ContactLaw::RateCondition => assert!(drift > 0.5 * bend && drift < 1.2 * bend, "{drift:e} {bend:e}"),
-            _ => assert!(rate > 0.5 * h * speed * speed / radius, "{rate:e}"),
+            ContactLaw::RateCondition => assert!(drift < 1e-12, "{drift:e}"),
+            _ => assert!(rate < 1e-10, "{rate:e}"),
         }
-        assert!(depth > 20.0 * bend, "{law:?}: {depth:e} {bend:e}");
     }
 }
 

@@ -29,8 +29,7 @@ struct Row<'a, T> {
 /// It is pure; where only the gap matters v is zero. The last two may be left zero at the price of the correctors:
 /// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
 ///
-/// With a linear system rows are linearized once, where a step begins; with a nonlinear one they follow Newton's method
-/// to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are
+/// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are
 /// identified by their order.
 ///
 /// ```

@@ -149,10 +149,8 @@ struct Pass {
 ///
 /// # Linearization
 ///
-/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step. With a linear system
-/// normals and shape functions stay until the next one and gaps are affine, `g = g* + G (u − u*)`. This is for small to
-/// moderate motion in a step: what a node slides along a facet in one step should be a small share of its curvature
-/// radius, or facet. With a nonlinear system rows follow Newton's method
+/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; in between gaps are affine,
+/// `g = g* + G (u − u*)`. Rows follow the contact of a step
 /// ([`follow`](ContactConstraint::follow)): closest points are found again at each trial state, in the lists of the
 /// search, and at the end of the step gaps are the distances there. G is the derivative of the distance, and
 /// [`rates`](ContactConstraint::rates) have its second derivative along the motion, from nodes that slide on facets
@@ -163,7 +161,7 @@ struct Pass {
 /// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
 /// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
 /// reach where it was last linearized, it is open, and the row stays as it was. A row whose normal has jumped more than
-/// four times since the search, between two facets or around an edge that its node touches, stays as it was too: there is
+/// sixteen times since the search, between two facets or around an edge that its node touches, stays as it was too: there is
 /// no normal that an iteration could converge to.
 ///
 /// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and

@@ -31,10 +31,9 @@ impl<T: Real, const D: usize> Node<T, D> {
 /// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
 /// identified by the number of the node.
 ///
-/// With a linear system the rows are linearized once, where a step begins: within the step a node sees the tangent plane
-/// (and the obstacle's own motion exactly), which on a surface of radius R leaves a gap of up to (h v)²/(2R) that the next
-/// step corrects. On planes nothing is left. With a nonlinear system they follow Newton's method to the end of the step,
-/// and nothing is left on any surface. With a `reach` only nodes nearer than that are candidates, and a body farther away
+/// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end; schemes that
+/// impose contact on velocities see the tangent plane of the start of the step instead (and the obstacle's own motion exactly),
+/// which on a surface of radius R leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes nearer than that are candidates, and a body farther away
 /// costs a bounding box.
 ///
 /// ```

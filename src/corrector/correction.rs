@@ -63,6 +63,10 @@ pub(crate) trait Gaps<T: Real> {
     fn law(&self, row: usize) -> ContactLaw;
     fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]);
+
+    /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized there;
+    /// afterwards rows are those of `here` (time, u) again.
+    fn elsewhere(&mut self, field: usize, there: (f64, [&[T]; 3]), here: (f64, &[T]), out: &mut [T]) -> Result<()>;
 }
 
 /// Borrowed gaps, debug-printable.
@@ -454,12 +458,16 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Work of the raw multipliers over the stage, each times the change of its gap.
-    pub(super) fn contact_work(&mut self) -> T {
-        let Self { buffers, contacts, constraints, past, .. } = self;
+    ///
+    /// # Errors
+    ///
+    /// What a constraint says of the start of the stage.
+    pub(super) fn contact_work(&mut self) -> Result<T> {
+        let Self { buffers, contacts, constraints, past, new, .. } = self;
         let Buffers { closed, gaps, .. } = &mut **buffers;
-        let Some(start) = past.first() else { return T::zero() };
-        constraints.0.gap(start.t, &start.u, gaps);
-        closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum()
+        let Some(start) = past.first() else { return Ok(T::zero()) };
+        constraints.0.elsewhere(0, start.place(), (new.t, &new.u), gaps)?;
+        Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
     }
 
     /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw multipliers of
@@ -512,15 +520,15 @@ impl<T: Real> Correction<'_, T> {
         }
         self.backup.check()?;
         let rows = std::mem::take(&mut self.buffers.engaged);
-        let closing = self.projection.close(self.g, &rows).map_err(|row| self.no_response(row));
+        let mut closing = self.projection.close(self.g, &rows).map_err(|row| self.no_response(row));
         // States not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
         if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
             self.backup.keep(self.past);
             for k in 1..=places {
                 for field in 0..3 {
-                    if self.scheme.read[k][field] {
-                        self.project_field(k, field, &rows);
+                    if closing.is_ok() && self.scheme.read[k][field] {
+                        closing = self.project_field(k, field, &rows);
                     }
                 }
             }
@@ -530,31 +538,20 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Projects one field of past state k onto the engaged rows.
-    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) {
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, .. } = self;
-        let Buffers { gaps, rates, jump, .. } = &mut **buffers;
+    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, .. } = self;
+        let Buffers { gaps, jump, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        // Of the past motion on its own part of a curved surface: u, v and a fit each other.
+        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
+        // Where a gap is held, under a law that reads it where a stage starts.
+        let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
+            true => contacts.gap[row],
+            false => T::zero(),
+        };
         jump.clear();
-        match field {
-            0 => {
-                constraints.0.gap(motion.t, &motion.u, gaps);
-                // Where it is held, under a law that reads the gap where a stage starts.
-                let held = |row: usize| match constraints.0.law(row).reads_start() {
-                    true => contacts.gap[row],
-                    false => T::zero(),
-                };
-                jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
-            }
-            1 => {
-                constraints.0.rates(motion.t, &motion.u, &motion.v, rates);
-                jump.extend(rows.iter().map(|&row| g.product(row, &motion.v) + rates[row].rate));
-            }
-            _ => {
-                constraints.0.rates(motion.t, &motion.u, &motion.v, rates);
-                jump.extend(rows.iter().map(|&row| g.product(row, &motion.a) + rates[row].acceleration));
-            }
-        }
+        jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
         projection.solve(jump);
         let (values, unit) = match field {
             0 => (&mut motion.u, psi / h),
@@ -565,6 +562,7 @@ impl<T: Real> Correction<'_, T> {
             projection.push(g, row, -multiplier, values);
             contacts.impulse[row] -= T::of(unit) * multiplier;
         }
+        Ok(())
     }
 
     /// Solves S x + jump for the multipliers x of `rows` under their bounds.

@@ -173,8 +173,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Settings of Newton's method; [`Newton::full`] by default for nonlinear systems. Given to a linear system, contact rows
-    /// of curved or deforming surfaces are followed within a step as for a nonlinear one.
+    /// Settings of Newton's method; [`Newton::full`] by default for nonlinear systems. A linear system needs none.
     #[must_use]
     pub fn newton(mut self, newton: Newton) -> Self {
         self.newton = Some(newton);
@@ -264,7 +263,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
         let interface = constraints.interface().len();
-        let mut work = workspace(&mut *system, &program, &self.correctors, projection, (rows, interface), slots);
+        let contact = ([rows, constraints.entries()], interface);
+        let mut work = workspace(&mut *system, &program, &self.correctors, projection, contact, slots);
         work.massless = massless;
         work.newton = match (self.newton, system.linearity()) {
             (None, Linearity::Linear) => None,
@@ -275,7 +275,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
                     check_path(&mut *system, &scheme, &state.motion)?;
                 }
                 let path = along_path.then(|| PathWork::new(dofs));
-                Some(NewtonWork::new(settings.unwrap_or_default(), dofs, (rows, interface), path))
+                Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path))
             }
         };
         work.shown = scheme.shown(&state.motion);
@@ -338,7 +338,7 @@ fn workspace<T: Real>(
     program: &Program<T>,
     correctors: &[Box<dyn Corrector<T> + '_>],
     projection: JumpProjection<T>,
-    (rows, interface): (usize, usize),
+    ([rows, entries], interface): ([usize; 2], usize),
     slots: usize,
 ) -> Workspace<T> {
     let dofs = system.dofs();
@@ -368,7 +368,7 @@ fn workspace<T: Real>(
         closed_at_start: Vec::with_capacity(rows),
         was_closed: Vec::with_capacity(rows),
         interface: InterfaceWork::new(interface),
-        rows: ContactRowsWork::new(rows, room(aimed), room(forecast), supports),
+        rows: ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports),
         buffers: Buffers::new(rows, damped),
         projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
         shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],

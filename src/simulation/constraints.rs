@@ -13,6 +13,9 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
     magnitudes: Vec<T>,
+    /// Rows and rates of a constraint that looks elsewhere.
+    scratch: ContactJacobian<T>,
+    rates: Vec<GapRates<T>>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
     /// For each dof of the system its place on the interface.
@@ -97,8 +100,9 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let (scratch, rates) = (ContactJacobian::with_capacity(rows, entries), vec![GapRates::default(); rows]);
         let mut constraints =
-            Self { parts, ids, laws, magnitudes, interface, places, admitted, stale: true, version: 0 };
+            Self { parts, ids, laws, magnitudes, scratch, rates, interface, places, admitted, stale: true, version: 0 };
         constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
@@ -106,6 +110,11 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// The largest number of rows there can be.
     pub(crate) fn capacity(&self) -> usize {
         self.parts.iter().map(ContactConstraint::max_candidates).sum()
+    }
+
+    /// The largest number of weights that all rows together can have.
+    pub(crate) fn entries(&self) -> usize {
+        self.parts.iter().map(ContactConstraint::max_entries).sum()
     }
 
     pub(crate) fn search(&mut self, t: f64, u: &[T], v: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
@@ -118,13 +127,8 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Moves the linearization of the rows to u.
     pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
-        for (constraint, part) in self.parts.iter_mut().enumerate() {
-            let moved = part.follow(t, u).map_err(|error| match error {
-                Error::ContactLost { t, contact } => {
-                    Error::ContactLost { t, contact: ContactId { constraint, ..contact } }
-                }
-                other => other,
-            });
+        for constraint in 0..self.parts.len() {
+            let moved = self.follow_part(constraint, t, u);
             // Remembered beyond an error, as by a search.
             self.stale |= match &moved {
                 Ok(candidates) => *candidates == Candidates::Changed,
@@ -133,6 +137,13 @@ impl<'a, T: Real> Constraints<'a, T> {
             moved?;
         }
         self.read_stale(jacobian)
+    }
+
+    fn follow_part(&mut self, constraint: usize, t: f64, u: &[T]) -> Result<Candidates> {
+        self.parts[constraint].follow(t, u).map_err(|error| match error {
+            Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
+            other => other,
+        })
     }
 
     /// The version of the rows: responses to those of another one are not theirs.
@@ -232,6 +243,11 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// Gaps of all rows, refusing NaN and infinity.
     pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
         self.gap(t, u, out);
+        self.refuse_infinite(t, out)
+    }
+
+    /// Refuses gaps that are NaN or infinite.
+    pub(crate) fn refuse_infinite(&self, t: f64, out: &[T]) -> Result<()> {
         match out[..self.len()].iter().position(|gap| !gap.is_finite()) {
             None => Ok(()),
             Some(row) => {
@@ -292,5 +308,42 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
             part.rates(t, u, v, own);
             rest = others;
         }
+    }
+
+    fn elsewhere(
+        &mut self,
+        field: usize,
+        (t, [u, v, a]): (f64, [&[T]; 3]),
+        here: (f64, &[T]),
+        out: &mut [T],
+    ) -> Result<()> {
+        let mut first = 0;
+        for constraint in 0..self.parts.len() {
+            let found = self.follow_part(constraint, t, u);
+            let Self { parts, scratch, rates, .. } = self;
+            let part = &mut parts[constraint];
+            let count = part.candidates();
+            let out = &mut out[first..first + count];
+            match field {
+                0 => part.gap(t, u, out),
+                _ => {
+                    scratch.clear();
+                    part.jacobian(scratch);
+                    part.rates(t, u, v, &mut rates[..count]);
+                    for (row, (out, own)) in out.iter_mut().zip(&*rates).enumerate() {
+                        *out = match field {
+                            1 => scratch.product(row, v) + own.rate,
+                            _ => scratch.product(row, a) + own.acceleration,
+                        };
+                    }
+                }
+            }
+            // Back in any case, and to the same rows: G need not be read again.
+            let back = self.follow_part(constraint, here.0, here.1);
+            self.stale |= back.is_err();
+            found.and(back)?;
+            first += count;
+        }
+        Ok(())
     }
 }

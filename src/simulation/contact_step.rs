@@ -1,10 +1,11 @@
 //! The contact problem of a stage: which rows take part, their multipliers, and which contacts are closed afterwards.
 
+use super::curved_rows::{CurvedRowsWork, FIT, FOLLOWED, NEAR};
 use super::operator::Operator;
 use super::program::{CompiledStage, ContactTarget};
 use super::step::finite_supports;
 use super::{Constraints, Statistics, Workspace};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{Candidates, ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
@@ -34,12 +35,13 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) y: Vec<T>,
     pub(super) tolerance: Vec<T>,
     /// y is linear in what contact adds to d: its weight.
-    weight: Vec<T>,
+    pub(super) weight: Vec<T>,
     /// The laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
     compliance: Vec<T>,
     shift: Vec<T>,
     /// Gaps where the balance holds, for compliant laws.
-    balance_gap: Vec<T>,
+    pub(super) balance_gap: Vec<T>,
+    pub(super) curved: CurvedRowsWork<T>,
     /// What each row constrains in this stage; for rows whose law reads it the gap where the stage starts, and what of it
     /// is none.
     measure: Vec<Measure>,
@@ -65,9 +67,9 @@ pub(super) struct ContactRowsWork<T> {
 }
 
 impl<T: Real> ContactRowsWork<T> {
-    /// Buffers for `rows` contacts, and for targets of `target_dofs` and forecasts of `forecast_dofs` dofs (0 if the
-    /// scheme has none) with `supports` prescribed ones.
-    pub(super) fn new(rows: usize, target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
+    /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of `forecast_dofs`
+    /// dofs (0 if the scheme has none) with `supports` prescribed ones.
+    pub(super) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
         let reserved = || Vec::with_capacity(rows);
         let zero = || vec![T::zero(); rows];
         Self {
@@ -78,6 +80,7 @@ impl<T: Real> ContactRowsWork<T> {
             compliance: zero(),
             shift: zero(),
             balance_gap: zero(),
+            curved: CurvedRowsWork::new(rows, entries),
             measure: vec![Measure::AsScheme; rows],
             start_gap: zero(),
             start_tolerance: zero(),
@@ -103,7 +106,8 @@ impl<T: Real> ContactRowsWork<T> {
         past: &[Motion<T>],
         h: f64,
     ) -> Result<()> {
-        let Self { measure, start_gap, start_tolerance, rates, .. } = self;
+        let Self { measure, start_gap, start_tolerance, rates, curved, .. } = self;
+        curved.forget();
         measure.fill(Measure::AsScheme);
         let (Some(start), true) = (past.first(), constraints.reads_start()) else { return Ok(()) };
         constraints.finite_gaps(start.t, &start.u, start_gap)?;
@@ -170,8 +174,13 @@ impl<T: Real> ContactRowsWork<T> {
         }
     }
 
+    /// Keeps the gaps of the balance, to which the inertia of compliant laws is added next.
+    pub(super) fn keep_balance_gaps(&mut self) {
+        self.curved.foreseen.copy_from_slice(&self.balance_gap);
+    }
+
     /// The weight of d in what a row constrains, if it is not that of the scheme.
-    pub(super) fn own_weight(&self, stage: &CompiledStage<T>, h: f64, row: usize) -> Option<T> {
+    fn own_weight(&self, stage: &CompiledStage<T>, h: f64, row: usize) -> Option<T> {
         (self.measure[row] == Measure::Rate).then(|| T::of(h) * stage.recovery.weights()[1])
     }
 
@@ -223,9 +232,14 @@ pub(super) struct InterfaceWork<T> {
     pub(super) increment: Vec<T>,
     /// Forces of contact.
     pub(super) forces: Vec<T>,
-    /// Values at d = 0 of the displacements and of what contact constrains.
+    /// Values at d = 0 of the displacements, of those of the balance where it holds elsewhere, and of what contact
+    /// constrains.
     pub(super) displacement: Vec<T>,
+    balance: Vec<T>,
     target: Vec<T>,
+    /// d without contact, and with that of the last linearization of curved rows.
+    pub(super) free: Vec<T>,
+    pub(super) tried: Vec<T>,
     /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
     pub(super) response: Vec<T>,
 }
@@ -233,7 +247,16 @@ pub(super) struct InterfaceWork<T> {
 impl<T: Real> InterfaceWork<T> {
     pub(super) fn new(size: usize) -> Self {
         let zero = || vec![T::zero(); size];
-        Self { increment: zero(), forces: zero(), displacement: zero(), target: zero(), response: zero() }
+        Self {
+            increment: zero(),
+            forces: zero(),
+            displacement: zero(),
+            balance: zero(),
+            target: zero(),
+            free: zero(),
+            tried: zero(),
+            response: zero(),
+        }
     }
 }
 
@@ -288,7 +311,8 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     pub(super) stage: &'s CompiledStage<T>,
     pub(super) clock: Clock,
     pub(super) constraints: &'s mut Constraints<'a, T>,
-    pub(super) g: &'s ContactJacobian<T>,
+    /// The rows of the gaps, linearized where contact is imposed.
+    pub(super) g: &'s mut ContactJacobian<T>,
     pub(super) solver: &'s mut dyn ContactSolver<T>,
     pub(super) statistics: &'s mut Statistics,
     /// The part of the unknown that motions contain already, in Newton's method: d is then measured from there, and
@@ -301,7 +325,7 @@ const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
     /// Finds the multipliers of the stage from d on the interface, adds their response to it, and leaves their forces there.
-    /// `new.u` is left as predicted.
+    /// Motions are left as predicted. Says whether curved rows fit where d ends.
     pub(super) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -309,25 +333,58 @@ impl<T: Real> ContactStep<'_, '_, T> {
         new: &mut Motion<T>,
         past: &[Motion<T>],
         work: &mut Workspace<T>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let dofs = self.constraints.interface();
         keep(dofs, &new.u, &mut work.interface.displacement);
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &work.balance) {
+            keep(dofs, &balance.u, &mut work.interface.balance);
+        }
+        work.interface.free.copy_from_slice(&work.interface.increment);
         self.aim(system, new, past, work)?;
-        let result = match self.condition(operator, new, past, work) {
-            Ok(true) => self.press(operator, new.t, work),
-            Ok(false) => {
-                self.release(work);
-                Ok(())
-            }
-            Err(error) => Err(error),
-        };
-        let interface = &work.interface;
-        restore(self.constraints.interface(), &interface.displacement, &mut new.u);
+        let result = self.settle(operator, new, past, work);
+        let (dofs, interface) = (self.constraints.interface(), &work.interface);
+        restore(dofs, &interface.displacement, &mut new.u);
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &mut work.balance) {
+            restore(dofs, &interface.balance, &mut balance.u);
+        }
         if let Some(target) = &self.stage.contact {
-            let dofs = self.constraints.interface();
             advance(dofs, &interface.target, target.row.weight, &interface.increment, &mut work.rows.target);
         }
         result
+    }
+
+    /// Solves with the rows there are, and with rows that follow what comes out, until they fit.
+    fn settle(
+        &mut self,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<bool> {
+        let mut miss = f64::INFINITY;
+        for pass in 0..FOLLOWED {
+            match pass {
+                0 => self.observe(operator, new, past, work)?,
+                _ => self.step_back(operator, new, work)?,
+            }
+            let needed = self.condition(new, work);
+            match needed {
+                true => self.press(operator, new.t, work)?,
+                false => self.release(work),
+            }
+            self.foresee(needed, work);
+            if self.follow(new, work)? == Candidates::Unchanged {
+                work.rows.curved.miss = 0.0;
+                return Ok(true);
+            }
+            operator.follow(work.rows.curved.version(self.constraints));
+            let before = std::mem::replace(&mut miss, self.miss(new, work)?);
+            work.rows.curved.miss = miss;
+            if miss <= FIT || miss <= NEAR && miss > 0.25 * before {
+                return Ok(true);
+            }
+        }
+        Ok(miss <= NEAR)
     }
 
     /// Opens every row that d could press.
@@ -339,55 +396,70 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 
     /// Weights of d in what rigid rows constrain, and in the displacements and accelerations of the balance.
-    fn weights(&self) -> [T; 3] {
+    pub(super) fn weights(&self) -> [T; 3] {
         let rigid = self.stage.contact.as_ref().map_or(self.stage.recovery.weights()[0], |target| target.row.weight);
         let [balance_u, _, balance_a] = self.stage.balanced().weights();
         [rigid, balance_u, balance_a]
     }
 
-    /// Evaluates the condition of every row at the present d, applies forces of compliant laws that do not depend on d,
-    /// and says whether any other row has to press.
-    fn condition(
+    /// Evaluates what every row constrains at d without contact, with the rows there are, and applies forces of compliant laws
+    /// that do not depend on d.
+    fn observe(
         &mut self,
         operator: &mut Operator<T>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
         work: &mut Workspace<T>,
-    ) -> Result<bool> {
-        let [rigid, balance_u, balance_a] = self.weights();
-        let count = self.constraints.len();
-        for row in 0..count {
-            let law = self.constraints.law(row);
-            let inertia = T::of(law.inertia());
-            work.rows.weight[row] = if law.is_compliant() { balance_u + inertia * balance_a } else { rigid };
-        }
+    ) -> Result<()> {
+        self.weigh(&mut work.rows);
         self.place(new, work);
         if self.constraints.has_compliant() {
-            self.compliant_gaps(new, work)?;
+            self.balance_gaps(new, work)?;
+            self.add_inertia(new, work);
             if self.press_without_coupling(operator, work)? {
                 self.place(new, work);
-                self.compliant_gaps(new, work)?;
+                self.balance_gaps(new, work)?;
+                self.add_inertia(new, work);
             }
         }
+        self.evaluate(new, work)?;
+        self.restitution(past, &mut work.rows);
+        Ok(())
+    }
+
+    /// Sets the weights of d in what the rows constrain by the scheme and by compliant laws.
+    fn weigh(&self, rows: &mut ContactRowsWork<T>) {
+        let [rigid, balance_u, balance_a] = self.weights();
+        for (weight, law) in rows.weight.iter_mut().zip(self.constraints.laws()) {
+            *weight = if law.is_compliant() { balance_u + T::of(law.inertia()) * balance_a } else { rigid };
+        }
+    }
+
+    /// Evaluates y of all rows, as the scheme and their laws measure it, where d is placed.
+    pub(super) fn evaluate(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
-        let Workspace { trial, rows, interface, .. } = work;
+        let Workspace { rows, interface, .. } = work;
         rows.evaluate(&Level { target: stage.contact.as_ref(), clock: *clock }, constraints, g, new, 0.0)?;
         rows.decide(constraints);
         rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
-        let (stage, h) = (*stage, clock.h);
-        self.restitution(past, rows);
-        let constraints = &self.constraints;
+        Ok(())
+    }
+
+    /// Decides which rows the problem begins with, and says whether any has to press.
+    fn condition(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> bool {
+        let Self { stage, clock, constraints, g, .. } = self;
+        let Workspace { trial, rows, .. } = work;
         let mut needed = false;
-        for row in 0..count {
+        for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_compliant() {
                 rows.y[row] = rows.balance_gap[row];
-                rows.tolerance[row] = constraints.gap_rounding(row, self.g.magnitude(row, &new.u), rows.y[row]);
+                rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), rows.y[row]);
                 let depth = (-rows.y[row]).max(rows.tolerance[row]);
                 (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {
                 (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
-                rows.weight[row] = rows.own_weight(stage, h, row).unwrap_or(rows.weight[row]);
+                rows.weight[row] = rows.own_weight(stage, clock.h, row).unwrap_or(rows.weight[row]);
                 rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
             }
             let coupled = rows.weight[row] > T::zero();
@@ -398,66 +470,80 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             needed |= coupled && violated;
         }
-        Ok(needed)
+        needed
     }
 
-    /// Brings d on the interface into the displacements, into what contact constrains, and into the balance.
-    fn place(&mut self, new: &mut Motion<T>, work: &mut Workspace<T>) {
+    /// Brings d on the interface into the displacements, into those of the balance, and into what contact constrains.
+    pub(super) fn place(&mut self, new: &mut Motion<T>, work: &mut Workspace<T>) {
         let dofs = self.constraints.interface();
-        let Workspace { interface, rows, .. } = work;
-        let InterfaceWork { increment, displacement, target, .. } = interface;
+        let Workspace { interface, rows, balance: elsewhere, .. } = work;
+        let InterfaceWork { increment, displacement, balance, target, .. } = interface;
         advance(dofs, displacement, self.stage.recovery.weights()[0], increment, &mut new.u);
+        if let (Some(balanced), Some(motion)) = (&self.stage.balance, elsewhere) {
+            advance(dofs, balance, balanced.weights()[0], increment, &mut motion.u);
+        }
         if let Some(aim) = &self.stage.contact {
             advance(dofs, target, aim.row.weight, increment, &mut rows.target);
         }
     }
 
-    /// Gaps where the balance holds, with the inertia of the law.
-    fn compliant_gaps(&mut self, new: &mut Motion<T>, work: &mut Workspace<T>) -> Result<()> {
-        let [_, balance_u, balance_a] = self.weights();
-        let Self { stage, clock, constraints, g, .. } = self;
-        let Workspace { interface, rows, balance, .. } = work;
-        let t = clock.at(stage.load);
-        let known = self.iterate.is_some() || stage.balanced().reads_past(2);
-        // The ū of a balance is not read again: it may be overwritten. (If this is called again ū does not depend on d.)
-        let motion = match (&stage.balance, balance.as_mut()) {
-            (Some(_), Some(balance)) => {
-                for (&dof, &d) in constraints.interface().iter().zip(&interface.increment) {
-                    balance.u[dof] += balance_u * d;
-                }
-                balance
-            }
+    /// Time and displacements of the balance.
+    pub(super) fn balanced<'m>(&self, new: &'m Motion<T>, balance: Option<&'m Motion<T>>) -> (f64, &'m Motion<T>) {
+        let motion = match (&self.stage.balance, balance) {
+            (Some(_), Some(balance)) => balance,
             _ => new,
         };
-        constraints.finite_gaps(t, &motion.u, &mut rows.balance_gap)?;
-        if constraints.laws().iter().all(|law| law.inertia() == 0.0) {
-            return Ok(());
+        (self.clock.at(self.stage.load), motion)
+    }
+
+    /// Gaps where the balance holds, by the rows there are.
+    fn balance_gaps(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<()> {
+        let (t, motion) = self.balanced(new, work.balance.as_ref());
+        self.constraints.finite_gaps(t, &motion.u, &mut work.rows.balance_gap)?;
+        work.rows.keep_balance_gaps();
+        Ok(())
+    }
+
+    /// Adds the inertia of compliant laws to the gaps of the balance.
+    pub(super) fn add_inertia(&mut self, new: &Motion<T>, work: &mut Workspace<T>) {
+        if self.constraints.laws().iter().all(|law| law.inertia() == 0.0) {
+            return;
         }
+        let [_, _, balance_a] = self.weights();
+        let (t, motion) = self.balanced(new, work.balance.as_ref());
+        let Self { stage, constraints, g, .. } = self;
+        let Workspace { interface, rows, .. } = work;
+        let known = self.iterate.is_some() || stage.balanced().reads_past(2);
         // g̈ at ā: the predicted part, and that of d.
         let InterfaceWork { response, increment, .. } = interface;
         for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
             *a = if known { motion.a[dof] } else { T::zero() } + balance_a * d;
         }
         constraints.rates(t, &motion.u, &motion.v, &mut rows.rates);
+        let forces = rows.curved.forces(g);
         for row in 0..constraints.len() {
             let inertia = T::of(constraints.law(row).inertia());
-            let acceleration = g.interface_product(row, response) + rows.rates[row].acceleration;
+            let acceleration = forces.interface_product(row, response) + rows.rates[row].acceleration;
             rows.balance_gap[row] += inertia * acceleration;
         }
-        Ok(())
     }
 
     /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are any.
-    fn press_without_coupling(&mut self, operator: &mut Operator<T>, work: &mut Workspace<T>) -> Result<bool> {
+    pub(super) fn press_without_coupling(
+        &mut self,
+        operator: &mut Operator<T>,
+        work: &mut Workspace<T>,
+    ) -> Result<bool> {
         let Self { constraints, g, .. } = self;
         let Workspace { interface, rows, trial, .. } = work;
+        let forces = rows.curved.forces(g);
         let mut pressed = false;
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_compliant() && rows.weight[row] == T::zero() {
                 let force = law.force(rows.balance_gap[row]);
                 trial.lambda_raw[row] = force;
-                g.interface_scatter(row, force, &mut interface.forces);
+                forces.interface_scatter(row, force, &mut interface.forces);
                 pressed |= force > T::zero();
             }
         }
@@ -493,14 +579,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for pass in 0..limit {
             self.press_linearized(operator, t, work)?;
             let Workspace { rows, trial, interface, .. } = &mut *work;
-            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, .. } = rows;
+            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, curved, .. } = rows;
+            let forces = curved.forces(self.g);
             // The laws at the solution.
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                 let law = self.constraints.law(row);
                 match law {
                     ContactLaw::PowerLaw { .. } => {
-                        let gap = y[row] + weight[row] * self.g.interface_product(row, &interface.response);
+                        let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                         let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
                         let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
                         let miss = (lambda - law.force(gap)).abs() * slope;
@@ -528,7 +615,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         let (contact, value) = (self.constraints.ids[row], lambda.value());
                         return Err(Error::ContactNotFinite { t, what: "the multiplier", contact, value });
                     }
-                    self.g.interface_scatter(row, lambda, &mut interface.forces);
+                    forces.interface_scatter(row, lambda, &mut interface.forces);
                 }
                 T::axpy(T::one(), &interface.response, &mut interface.increment);
                 return Ok(());
@@ -557,8 +644,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             problem,
             versions,
             offset,
+            curved,
             ..
         } = rows;
+        let forces = curved.forces(g);
         let (bounds, multipliers, problem_tolerance) =
             (&mut rows.bounds, &mut rows.multipliers, &mut rows.problem_tolerance);
         let count = constraints.len();
@@ -577,7 +666,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 bounds.push(constraints.law(j).into());
             }
             let compliance_of = |k: usize| compliance[problem[k]] / weight[problem[k]];
-            let (delassus, version) = operator.delassus(g, problem, compliance_of, versions)?;
+            let (delassus, version) = operator.delassus(forces, problem, compliance_of, versions)?;
             let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance, version };
             let solved = solver.solve(&data, multipliers);
             statistics.contact_solves += 1;
@@ -592,7 +681,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let mut grown = false;
             for row in 0..count {
                 if enabled[row] && !in_problem[row] && weight[row] > T::zero() {
-                    let pushed = y[row] + weight[row] * g.interface_product(row, &interface.response);
+                    let pushed = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);
                         let depth = (-pushed).max(tolerance[row]);
@@ -669,7 +758,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
         match level.target {
             None => trial.gap.copy_from_slice(&rows.y[..constraints.len()]),
-            Some(_) => constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?,
+            Some(_) => {
+                // The gaps of a state are those of its own surroundings.
+                rows.curved.hold(g, constraints);
+                constraints.follow(new.t, &new.u, g)?;
+                rows.curved.release(constraints);
+                constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
+            }
         }
         rows.measure(stage, clock.h, constraints, g, new, None);
         was_closed.clear();

@@ -25,7 +25,8 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Works done on the system since the start, by the trapezoidal rule over the steps; all but `remainder` are what
+/// Works done on the system since the start, by the trapezoidal rule over the steps (that of contact with its forces in the
+/// middle of the step, which is the same where they live at the end of it); all but `remainder` are what
 /// physics says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Works<T> {
@@ -54,7 +55,9 @@ pub(crate) struct Ledger<T> {
     residual: Vec<T>,
     power: T,
     reactions: Vec<T>,
-    lambda: Vec<T>,
+    /// Gᵀ λ of the last step and of the one before, one entry a dof.
+    contact: Vec<T>,
+    old_contact: Vec<T>,
 }
 
 /// The constraints and their rows of G.
@@ -66,7 +69,11 @@ pub(crate) struct StepBooks<'a, T> {
     /// u, v and a at the time of the state.
     pub(crate) motion: [&'a [T]; 3],
     pub(crate) contacts: &'a ContactState<T>,
+    /// The rows of the gaps, and those along which the reported forces act.
     pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) forces: &'a ContactJacobian<T>,
+    /// The fraction of the step at which those forces live.
+    pub(crate) load: f64,
     pub(crate) corrections: T,
     pub(crate) h: f64,
 }
@@ -83,7 +90,8 @@ impl<T: Real> Ledger<T> {
             residual: zero(),
             power: T::zero(),
             reactions: vec![T::zero(); system.prescribed().len()],
-            lambda: vec![T::zero(); rows.0.capacity()],
+            contact: zero(),
+            old_contact: zero(),
         };
         ledger.start = energy(system, state, None).total();
         ledger.restart(system, state, rows)?;
@@ -100,6 +108,11 @@ impl<T: Real> Ledger<T> {
         self.reactions = reactions(system, state, rows)?;
         self.power = self.damping_power(system, state.displacement(), state.velocity());
         system.external_load(state.time(), &mut self.load);
+        let (constraints, g) = rows;
+        self.contact.fill(T::zero());
+        for (contact, row) in constraints.rows_of(&state.contacts) {
+            g.scatter(row, state.contacts.lambda[contact], &mut self.contact);
+        }
         Ok(())
     }
 
@@ -110,12 +123,9 @@ impl<T: Real> Ledger<T> {
         }
     }
 
-    /// Remembers what the step starts from: displacements, and forces carried over to the candidates of the step.
-    pub(crate) fn begin(&mut self, state: &State<T>, carried: &ContactState<T>) {
+    /// Remembers the displacements that the step starts from.
+    pub(crate) fn begin(&mut self, state: &State<T>) {
         self.old_u.copy_from_slice(state.displacement());
-        let lambda = carried.forces();
-        self.lambda[..lambda.len()].copy_from_slice(lambda);
-        self.lambda[lambda.len()..].fill(T::zero());
     }
 
     /// What may fail, before the step is accepted: the forces of the supports.
@@ -141,10 +151,16 @@ impl<T: Real> Ledger<T> {
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&new, &old)| half * (new + old));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
+        std::mem::swap(&mut self.contact, &mut self.old_contact);
+        self.contact.fill(T::zero());
         for (row, &force) in books.contacts.lambda.iter().enumerate() {
-            let advance: T = books.g.row(row).map(|(dof, weight)| weight * (u[dof] - self.old_u[dof])).sum();
-            works.contact += half * (force + self.lambda[row]) * advance;
+            books.forces.scatter(row, force, &mut self.contact);
         }
+        // In the middle of the step, on the line through the forces of two steps.
+        let newest = T::of(1.5 - books.load);
+        let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
+        let forces = self.contact.iter().zip(&self.old_contact).map(|(&new, &old)| old + newest * (new - old));
+        works.contact += moves.zip(forces).map(|(du, f)| du * f).sum();
         works.corrections += books.corrections;
         let old_power = self.power;
         self.power = self.damping_power(system, u, v);

@@ -1,14 +1,12 @@
 //! A stage of a nonlinear system, solved by Newton's method.
 
 use super::Workspace;
-use super::contact_step::{Level, advance, keep, restore};
+use super::curved_rows::FOLLOWED;
 use super::newton::{Iteration, Newton, TangentUpdate};
 use super::operator::{At, TangentOf};
 use super::path::{PathForm, PathWork};
 use super::program::ScaledRows;
 use super::step::StageSolve;
-use crate::contact::Candidates;
-use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
@@ -22,12 +20,7 @@ pub(super) struct NewtonWork<T> {
     /// Residual without contact forces before an iteration, and the increment of it.
     residual: Vec<T>,
     increment: Vec<T>,
-    /// On the interface: an increment without contact, and the displacements of the balance before it.
-    free: Vec<T>,
-    balance: Vec<T>,
-    /// Gaps by the rows that were solved with, one a candidate.
-    gaps: Vec<T>,
-    /// Change of the contact forces by the last linearization of curved gaps, over the forces.
+    /// The miss of gaps and contact forces after the last linearization of curved gaps, relative.
     unsettled: f64,
     /// For schemes that take the force of the whole path.
     path: Option<PathWork<T>>,
@@ -35,31 +28,20 @@ pub(super) struct NewtonWork<T> {
 }
 
 impl<T: Real> NewtonWork<T> {
-    /// Memory for a system of `dofs` dofs, `rows` contacts and an interface of `interface` dofs.
-    pub(super) fn new(
-        settings: Newton,
-        dofs: usize,
-        (rows, interface): (usize, usize),
-        path: Option<PathWork<T>>,
-    ) -> Self {
+    /// Memory for a system of `dofs` dofs.
+    pub(super) fn new(settings: Newton, dofs: usize, path: Option<PathWork<T>>) -> Self {
         let zero = |size: usize| vec![T::zero(); size];
         Self {
             settings,
             d: zero(dofs),
             residual: zero(dofs),
             increment: zero(dofs),
-            free: zero(interface),
-            balance: zero(interface),
-            gaps: zero(rows),
             unsettled: 0.0,
             path,
             report: Vec::with_capacity(settings.iterations),
         }
     }
 }
-
-/// Linearizations of curved gaps within an iteration, at most.
-const LINEARIZATIONS: usize = 20;
 
 /// The smallest share of an increment that a line search tries.
 const SHORTEST: f64 = 0.125;
@@ -131,7 +113,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 }
                 // The stage is linear but for its gaps, which have been linearized that often.
                 newton.report.clear();
-                newton.report.resize(LINEARIZATIONS, Iteration { residual: newton.unsettled, increment: 0.0 });
+                newton.report.resize(FOLLOWED, Iteration { residual: newton.unsettled, increment: 0.0 });
                 break;
             };
             // Rows fit the whole increment.
@@ -304,79 +286,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if self.constraints.len() == 0 || !T::all_finite(&work.interface.increment) {
             return Ok(true);
         }
-        newton.free.copy_from_slice(&work.interface.increment);
-        if let (Some(_), Some(balance)) = (&self.stage.balance, &work.balance) {
-            keep(self.constraints.interface(), &balance.u, &mut newton.balance);
-        }
-        for pass in 0..LINEARIZATIONS {
-            if pass > 0 {
-                work.interface.increment.copy_from_slice(&newton.free);
-                work.interface.forces.fill(T::zero());
-            }
-            self.contact(Some(&newton.d), new, past, work)?;
-            if let (Some(_), Some(balance)) = (&self.stage.balance, &mut work.balance) {
-                restore(self.constraints.interface(), &newton.balance, &mut balance.u);
-            }
-            if self.follow(newton, new, work)? {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    /// Linearizes the rows where the increment on the interface ends. Says whether the contact just solved is right for
-    /// them: gaps of pressed rows and contact forces as solved, no other row violated.
-    fn follow(&mut self, newton: &mut NewtonWork<T>, new: &mut Motion<T>, work: &mut Workspace<T>) -> Result<bool> {
-        let Self { stage, clock, constraints, g, operator, .. } = self;
-        let Workspace { interface, rows, trial, .. } = work;
-        let level = Level { target: stage.contact.as_ref(), clock: *clock };
-        if level.is_velocity() {
-            return Ok(true);
-        }
-        advance(
-            constraints.interface(),
-            &interface.displacement,
-            stage.recovery.weights()[0],
-            &interface.increment,
-            &mut new.u,
-        );
-        let (t, values) = level.place(new, &rows.target);
-        constraints.gap(t, values, &mut rows.y);
-        rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
-        std::mem::swap(&mut rows.y, &mut newton.gaps);
-        let (_, values) = level.place(new, &rows.target);
-        let moved = constraints.follow(t, values, g);
-        let mut settled = true;
-        if let Ok(Candidates::Changed) = moved {
-            operator.follow(constraints.version());
-            constraints.finite_gaps(t, values, &mut rows.y)?;
-            rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
-            let (_, values) = level.place(new, &rows.target);
-            let [force, displacement] = newton.settings.bounds::<T>();
-            interface.response.fill(T::zero());
-            for row in 0..constraints.len() {
-                let lambda = trial.lambda_raw[row];
-                g.interface_scatter(row, lambda, &mut interface.response);
-                let advance = g.interface_magnitude(row, &interface.increment);
-                let weight = rows.own_weight(stage, clock.h, row).unwrap_or(stage.recovery.weights()[0]);
-                let tolerance = constraints.gap_rounding(row, g.magnitude(row, values), rows.y[row])
-                    + T::of(displacement) * weight.abs() * advance;
-                let miss = rows.y[row] - newton.gaps[row];
-                settled &= match lambda > T::zero() || constraints.law(row).is_equality() {
-                    true => miss.abs() <= tolerance,
-                    false => rows.y[row] >= -tolerance || !rows.enabled[row],
-                };
-            }
-            let moved_forces = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| new - old);
-            let miss = moved_forces.map(|x| x.value().powi(2)).sum::<f64>().sqrt();
-            let size = norm(&interface.forces);
-            // A gap that is missed is a force that is missed.
-            let change = if size > 0.0 { miss / size } else { 0.0 };
-            newton.unsettled = if settled { change } else { change.max(1.0) };
-            settled &= miss <= force * size;
-        }
-        restore(constraints.interface(), &interface.displacement, &mut new.u);
-        moved?;
+        let settled = self.contact(Some(&newton.d), new, past, work)?;
+        newton.unsettled = work.rows.curved.miss;
         Ok(settled)
     }
 

@@ -274,7 +274,9 @@ impl<T: Real> StartProblem<T> {
                 for (&dof, support) in prescribed.iter().zip(&supports) {
                     target[dof] = support[0];
                 }
-                constraints.finite_gaps(t, &target, &mut y)?;
+                let there = (t, [&target[..], &motion.v, &motion.a]);
+                constraints.elsewhere(0, there, (motion.t, &motion.u), &mut y)?;
+                constraints.refuse_infinite(t, &y)?;
                 (0.5 * lead * lead, vec![true; constraints.len()])
             }
             ContactLevel::Velocity { .. } => {

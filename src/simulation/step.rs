@@ -2,13 +2,14 @@
 
 use super::contact_step::ContactStep;
 use super::control::Verdict;
+use super::curved_rows::FOLLOWED;
 use super::energy::StepBooks;
 use super::operator::Operator;
 use super::program::CompiledStage;
 use super::{Constraints, Simulation, Statistics, Workspace};
 use crate::contact::ContactJacobian;
-use crate::contact_solver::ContactSolver;
-use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
+use crate::contact_solver::{ContactFailure, ContactSolver};
+use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme, contact_error};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::real::kernels::Accumulate;
@@ -37,7 +38,7 @@ impl<T: Real> Simulation<'_, T> {
         constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
         work.trial.carry_over(&state.contacts, &constraints.ids);
         if let Some(ledger) = ledger {
-            ledger.begin(state, &work.trial);
+            ledger.begin(state);
         }
         work.closed_at_start.clone_from(&work.trial.closed);
         work.backup.begin();
@@ -55,10 +56,8 @@ impl<T: Real> Simulation<'_, T> {
         let Self { constraints, g, state, history, work, .. } = self;
         work.backup.undo(&mut history.slots);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
-        if work.newton.is_some() {
-            // Rows may have followed the trial: back to the state. What fails here failed before, and is told then.
-            constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
-        }
+        // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its error.
+        constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
     }
 
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
@@ -78,7 +77,10 @@ impl<T: Real> Simulation<'_, T> {
             }
         }
         let corrections = work.correction_energy;
-        let books = StepBooks { t: new.t, motion, contacts: &work.trial, g, corrections, h: history.clock.h };
+        let stage = &scheme.tableau.stages[scheme.tableau.stages.len() - 1];
+        let (forces, load) = (work.rows.curved.forces(g), if self.startup.is_some() { 1.0 } else { stage.load });
+        let (contacts, h) = (&work.trial, history.clock.h);
+        let books = StepBooks { t: new.t, motion, contacts, g, forces, load, corrections, h };
         if let Some(ledger) = ledger {
             ledger.prepare(&mut **system, &books)?;
         }
@@ -259,7 +261,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
         work.interface.forces.fill(T::zero());
         self.statistics.linear_solves += 1;
         if self.constraints.len() > 0 && T::all_finite(&work.interface.increment) {
-            self.contact(None, new, past, work)?;
+            let settled = self.contact(None, new, past, work)?;
+            if !settled {
+                let (row, residual) = work.rows.curved.worst;
+                let failure = ContactFailure::NotConverged { iterations: FOLLOWED, row, residual };
+                return Err(contact_error(new.t, failure, |row| self.constraints.ids[row]));
+            }
         }
         self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
         let recovery = &self.stage.recovery;
@@ -271,14 +278,15 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already.
+    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already. Says whether
+    /// curved rows fit where it ends.
     pub(super) fn contact(
         &mut self,
         iterate: Option<&[T]>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
         work: &mut Workspace<T>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let Self { stage, clock, system, operator, constraints, g, solver, statistics } = self;
         let mut contact =
             ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate };

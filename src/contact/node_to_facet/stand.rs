@@ -103,9 +103,10 @@ impl Stand {
     /// Where the node stands now, as the stand that follows this one; nothing if its normal has jumped too often: between
     /// two facets, or around an edge that it touches, a node has no normal to converge to.
     pub(super) fn followed_by(&self, next: Self) -> Option<Self> {
-        /// Cosine of the angle that is a jump, and jumps that are followed.
+        /// Cosine of the angle that is a jump, and jumps that are followed: where forces act elsewhere than gaps are met a row
+        /// goes from one place to the other and back.
         const TURN: f64 = 1.0 - 1e-5;
-        const PATIENCE: u8 = 4;
+        const PATIENCE: u8 = 16;
         let jumps = self.jumps + u8::from(dot(self.normal, next.normal) < TURN);
         (jumps <= PATIENCE).then_some(Self { jumps, ..next })
     }

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod combinations;
+pub mod curved;
 pub mod disc;
 pub mod drops;
 pub mod hyperelastic;
