@@ -294,6 +294,19 @@ pub enum Error {
         /// The dof with the largest residual.
         dof: usize,
     },
+    /// A step is so small that it would not change the time.
+    #[error(
+        "step from t = {t:e}: h = {h:e} is below the resolution of times there, {resolution:e}, so that the step would not \
+         change t; count time from an origin nearer to the run, or take larger steps"
+    )]
+    TimeNotAdvancing {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// Distance from t to the next time that can be represented.
+        resolution: f64,
+    },
     /// A step was refused at its size and at halves of it, down to the smallest allowed.
     #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}")]
     StepRefused {

@@ -171,7 +171,8 @@ impl<'a, T: Real> Simulation<'a, T> {
         SimulationBuilder::new(Box::new(system), Box::new(integrator), h)
     }
 
-    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so.
+    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time that rounds
+    /// to the number before `t` is `t`.
     ///
     /// # Errors
     ///
@@ -180,18 +181,23 @@ impl<'a, T: Real> Simulation<'a, T> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
         }
-        while self.history.clock.at(0.0) < t - 1e-9 * self.history.clock.h {
-            self.step()?;
-            let energy = match observer.wants() {
-                Wants::State => None,
-                Wants::Energy => Some(self.energy()),
-            };
-            let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
-            if observer.observe(&view) == Control::Stop {
+        while !self.history.clock.has_reached(t) {
+            if self.observed_step(observer)? == Control::Stop {
                 return Ok(Outcome::Stopped);
             }
         }
         Ok(Outcome::Reached)
+    }
+
+    /// Takes a step and shows it to the observer.
+    fn observed_step(&mut self, observer: &mut dyn Observer<T>) -> Result<Control> {
+        self.step()?;
+        let energy = match observer.wants() {
+            Wants::State => None,
+            Wants::Energy => Some(self.energy()),
+        };
+        let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
+        Ok(observer.observe(&view))
     }
 
     /// The state at the end of the last step.

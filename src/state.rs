@@ -338,19 +338,61 @@ impl<T: Real> History<T> {
     }
 }
 
-/// Time as t_ref + k h, so that it does not drift.
+/// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin does
+/// not round: runs are the same whenever they start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clock {
-    pub(crate) reference: f64,
+    /// Time at the start of the run.
+    origin: f64,
+    /// From there to the last change of the step size.
+    elapsed: f64,
+    /// Steps since then, and their size.
     pub(crate) steps: u64,
     pub(crate) h: f64,
 }
 
 impl Clock {
+    pub(crate) fn new(origin: f64, h: f64) -> Self {
+        Self { origin, elapsed: 0.0, steps: 0, h }
+    }
+
     /// Time at `fraction` of the step that comes next.
     pub(crate) fn at(&self, fraction: f64) -> f64 {
-        self.reference + (self.steps as f64 + fraction) * self.h
+        self.origin + self.elapsed_at(fraction)
     }
+
+    fn elapsed_at(&self, fraction: f64) -> f64 {
+        self.elapsed + (self.steps as f64 + fraction) * self.h
+    }
+
+    /// The clock with another step size from here on.
+    pub(crate) fn with_step_size(&self, h: f64) -> Self {
+        Self { elapsed: self.elapsed_at(0.0), steps: 0, h, ..*self }
+    }
+
+    /// From now until t.
+    pub(crate) fn until(&self, t: f64) -> f64 {
+        (t - self.origin) - self.elapsed_at(0.0)
+    }
+
+    /// Whether t is reached, but for 1e-9 h and the rounding of t.
+    pub(crate) fn has_reached(&self, t: f64) -> bool {
+        t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
+    }
+
+    /// Refuses a step size that does not change the time: host functions of time would stand still while the motion goes on.
+    pub(crate) fn check(&self) -> Result<()> {
+        let (t, h) = (self.at(0.0), self.h);
+        match h >= resolution(t) {
+            true => Ok(()),
+            false => Err(Error::TimeNotAdvancing { t, h, resolution: resolution(t) }),
+        }
+    }
+}
+
+/// The distance between times near t that an `f64` can tell apart.
+pub(crate) fn resolution(t: f64) -> f64 {
+    t.abs().next_up() - t.abs()
 }
 
 /// Where the present step size stands in the nominal grid, for runs that control it.

@@ -20,7 +20,7 @@ use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass::{self, Mass};
 use crate::real::Real;
-use crate::state::{ContactState, History, Motion, State};
+use crate::state::{Clock, ContactState, History, Motion, State};
 use crate::system::{self, Damping, Linearity, Path, PathForce, System, check_vector};
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 
@@ -217,6 +217,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         }
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the start time", value: t, range: "finite" });
+        }
+        match &self.resumed {
+            None => Clock::new(t, h).check()?,
+            Some((_, history)) => history.clock.check()?,
         }
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();

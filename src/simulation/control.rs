@@ -4,10 +4,10 @@ use super::Simulation;
 use super::operator::{At, TangentOf};
 use crate::analysis::LocalError;
 use crate::error::{Error, Result, positive};
-use crate::observer::Observer;
+use crate::observer::{Control, Observer};
 use crate::real::Real;
 use crate::simulation::Outcome;
-use crate::state::{History, Motion, State};
+use crate::state::{History, Motion, State, resolution};
 
 /// How a run changes its step size by itself.
 ///
@@ -279,18 +279,17 @@ impl<T: Real> Simulation<'_, T> {
     /// Those of [`run_until`](Self::run_until) and [`set_step_size`](Self::set_step_size).
     pub fn land_on(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         let nominal = self.history.pace.nominal;
-        let sliver = 1e-9 * nominal;
-        // One nominal step before, on the grid.
-        if self.run_until(t - nominal * (1.0 - 1e-9), observer)? == Outcome::Stopped {
-            return Ok(Outcome::Stopped);
+        if !t.is_finite() {
+            return self.run_until(t, observer);
         }
-        while t.is_finite() && self.time() + self.history.clock.h <= t + sliver {
-            let before = self.time();
-            if self.run_until(before + self.history.clock.h, observer)? == Outcome::Stopped {
+        // Times closer than that are one.
+        let sliver = (1e-9 * nominal).max(resolution(t));
+        while self.history.clock.h <= self.history.clock.until(t) + sliver.min(0.5 * self.history.clock.h) {
+            if self.observed_step(observer)? == Control::Stop {
                 return Ok(Outcome::Stopped);
             }
         }
-        let rest = t - self.time();
+        let rest = self.history.clock.until(t);
         if rest <= sliver {
             return Ok(Outcome::Reached);
         }

@@ -167,6 +167,8 @@ pub(crate) struct CompiledStage<T> {
     /// Only where contact is not imposed on the displacements of the stage's own state.
     pub(crate) contact: Option<ContactTarget<T>>,
     pub(crate) load: f64,
+    /// Where in the step the stage starts and ends.
+    pub(crate) start: f64,
     pub(crate) end: f64,
     /// Whether the force is that of the path over the stage.
     pub(crate) along_path: bool,
@@ -284,6 +286,7 @@ impl<T: Real> Compiler<'_, T> {
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
                 contact: ContactTarget::new(stage, self.h),
                 load: stage.load,
+                start: s.checked_sub(1).map_or(0.0, |before| stages[before].end),
                 end: stage.end,
                 along_path: stage.force == StageForce::AlongPath,
                 operator: shared.unwrap_or(program.operators.len() - 1),

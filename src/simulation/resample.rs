@@ -9,7 +9,7 @@ use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::{Clock, History, Motion, Pace, State, Trail};
+use crate::state::{History, Motion, Pace, State, Trail};
 
 impl<T: Real> Simulation<'_, T> {
     /// Size of the next step.
@@ -44,7 +44,8 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless h is positive and finite, [`Error::MatrixNotFinite`] or [`Error::Singular`] if the
+    /// [`Error::Parameter`] unless h is positive and finite, [`Error::TimeNotAdvancing`] if a step of that size would not
+    /// change the time, [`Error::MatrixNotFinite`] or [`Error::Singular`] if the
     /// effective matrix cannot be factorized with it. The simulation is then as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         if !(h > 0.0 && h.is_finite()) {
@@ -61,6 +62,8 @@ impl<T: Real> Simulation<'_, T> {
         if h.to_bits() == old.to_bits() {
             return Ok(());
         }
+        let clock = self.history.clock.with_step_size(h);
+        clock.check()?;
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
@@ -79,7 +82,7 @@ impl<T: Real> Simulation<'_, T> {
         for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
             *slot = resampled;
         }
-        history.clock = Clock { reference: history.clock.at(0.0), steps: 0, h };
+        history.clock = clock;
         Ok(())
     }
 
@@ -91,13 +94,14 @@ impl<T: Real> Simulation<'_, T> {
         let nodes = computed(state, history);
         let mut past = vec![Motion::zero(newest.u.len()); known - 1];
         for (k, out) in (1..known).zip(&mut past) {
-            let t = newest.t - k as f64 * h;
+            let age = k as f64 * h;
             // The interval that contains the time, or the oldest one.
-            let interval = nodes.windows(2).find(|pair| pair[1].t <= t).or(nodes.windows(2).last());
+            let interval = nodes.windows(2).find(|pair| pair[1].age >= age).or(nodes.windows(2).last());
             match interval {
-                Some(&[newer, older]) => interpolate(newer, older, t, out),
-                _ => taylor(newest, t - newest.t, out),
+                Some([newer, older]) => interpolate(newer, older, age, out),
+                _ => taylor(newest, -age, out),
             }
+            out.t = newest.t - age;
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
@@ -161,22 +165,39 @@ impl<T: Real> Simulation<'_, T> {
         if let Some(ledger) = &mut self.ledger {
             ledger.restart(&mut **system, &begun.0, (constraints, g))?;
         }
-        let pace = history.pace;
+        let (pace, clock) = (history.pace, history.clock);
         (*state, *history) = begun;
-        history.pace = pace;
+        (history.pace, history.clock) = (pace, clock);
         Ok(())
     }
 }
 
+/// A computed motion, and how long before the newest one it was: a sum of step sizes, since differences of absolute times
+/// have the rounding of these.
+struct Node<'h, T> {
+    motion: &'h Motion<T>,
+    age: f64,
+}
+
 /// The motions as they were computed since a contact last closed or opened, newest first.
-fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<&'h Motion<T>> {
-    let newest = std::iter::once(&state.motion);
+fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<Node<'h, T>> {
+    let newest = std::iter::once((&state.motion, history.made_with));
     let smooth = history.smooth;
-    match history.trail.is_empty() {
+    let known: Vec<(&Motion<T>, f64)> = match history.trail.is_empty() {
         // As long as the step has not changed, the past that the scheme reads is what was computed.
-        true => newest.chain(&history.slots[1..history.known]).take(smooth).collect(),
-        false => newest.chain(history.trail.known().map(|(motion, _)| motion)).take(smooth).collect(),
-    }
+        true => {
+            let past = history.slots[1..history.known].iter().map(|motion| (motion, history.made_with));
+            newest.chain(past).take(smooth).collect()
+        }
+        false => newest.chain(history.trail.known()).take(smooth).collect(),
+    };
+    let mut age = 0.0;
+    let node = |(motion, made_with): (&'h Motion<T>, f64)| {
+        let node = Node { motion, age };
+        age += made_with;
+        node
+    };
+    known.into_iter().map(node).collect()
 }
 
 /// Begins to keep the computed motions, enough of them for ratios of step sizes up to 3.
@@ -196,7 +217,6 @@ fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut Hist
 fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
-    let interval = state.motion.t - previous.t;
     for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
         if shift == 0.0 {
             continue;
@@ -205,18 +225,19 @@ fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mu
         if unmoved.is_empty() {
             unmoved.clone_from(stored);
         }
-        let distance = interval + shift * (*made_with - previous_h);
+        let distance = *made_with + shift * (*made_with - previous_h);
         let fraction = T::of(shift * (h - *made_with) / distance);
         stored.copy_from_slice(unmoved);
         T::axpy_difference(fraction, unmoved, previous.field(field), stored);
     }
 }
 
-/// The motion at t on the polynomials through two others, beyond the older one too: u by Hermite's cubic through (u, v),
-/// v by the one through (v, a), a linearly.
-fn interpolate<T: Real>(newer: &Motion<T>, older: &Motion<T>, t: f64, out: &mut Motion<T>) {
-    let length = newer.t - older.t;
-    let s = (newer.t - t) / length;
+/// The motion of an age on the polynomials through two others, beyond the older one too: u by Hermite's cubic through
+/// (u, v), v by the one through (v, a), a linearly.
+fn interpolate<T: Real>(newer: &Node<'_, T>, older: &Node<'_, T>, age: f64, out: &mut Motion<T>) {
+    let length = older.age - newer.age;
+    let s = (age - newer.age) / length;
+    let (newer, older) = (newer.motion, older.motion);
     let difference = T::of(s * s * (3.0 - 2.0 * s));
     let slopes = [-length * s * (1.0 - s) * (1.0 - s), length * s * s * (1.0 - s)].map(T::of);
     let cubic = |x: &[T], x0: &[T], rate: &[T], rate0: &[T], out: &mut [T]| {
@@ -225,7 +246,6 @@ fn interpolate<T: Real>(newer: &Motion<T>, older: &Motion<T>, t: f64, out: &mut 
         T::axpy(slopes[0], rate, out);
         T::axpy(slopes[1], rate0, out);
     };
-    out.t = t;
     cubic(&newer.u, &older.u, &newer.v, &older.v, &mut out.u);
     cubic(&newer.v, &older.v, &newer.a, &older.a, &mut out.v);
     out.a.copy_from_slice(&newer.a);

@@ -67,7 +67,7 @@ impl<T: Real> Start<'_, T> {
         // be that of the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
         T::axpy(T::of(scheme.shifts[0] * h), a, v);
-        let clock = Clock { reference: t, steps: 0, h };
+        let clock = Clock::new(t, h);
         let history = History {
             slots,
             known,

@@ -22,8 +22,8 @@ impl<T: Real> Simulation<'_, T> {
     /// # Errors
     ///
     /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
-    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::LinearNotConverged`], or
-    /// what the host's own parts return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
+    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::LinearNotConverged`],
+    /// [`Error::TimeNotAdvancing`], or what the host's own parts return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
     /// were.
     pub fn step(&mut self) -> Result<()> {
         match self.judge {
@@ -35,6 +35,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
     pub(super) fn attempt(&mut self) -> Result<Verdict> {
         let Self { constraints, g, state, history, work, ledger, .. } = self;
+        history.clock.check()?;
         constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
         work.trial.carry_over(&state.contacts, &constraints.ids);
         if let Some(ledger) = ledger {
@@ -138,7 +139,7 @@ impl<T: Real> Simulation<'_, T> {
             new.t = clock.at(stage.end);
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());
-            predict(stage, clock.at(stage.load), &mut **system, new, past, work)?;
+            predict(stage, clock, &mut **system, new, past, work)?;
             if let Some(projection) = &mut work.projection {
                 refresh(projection, &mut work.projected_rows, constraints.version());
                 work.buffers.reported.clone_from(&work.trial.lambda);
@@ -317,7 +318,7 @@ pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &
 /// the supports in place, and what accelerations have of the past.
 fn predict<T: Real>(
     stage: &CompiledStage<T>,
-    t_balance: f64,
+    clock: Clock,
     system: &mut dyn System<T>,
     new: &mut Motion<T>,
     past: &[Motion<T>],
@@ -328,10 +329,10 @@ fn predict<T: Real>(
     put_supports(system, new.t, prescribed, supports, new)?;
     if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
-        put_supports(system, t_balance, prescribed, balance_supports, balance)?;
+        put_supports(system, clock.at(stage.load), prescribed, balance_supports, balance)?;
         if let (true, Some(start)) = (stage.along_path, past.first()) {
             // The mean of the ends is that of the supports too: work is force times the way between them.
-            let per_step = T::of((new.t - start.t).recip());
+            let per_step = T::of((clock.h * (stage.end - stage.start)).recip());
             for &dof in prescribed.iter() {
                 let (from, to) = (start.u[dof], new.u[dof]);
                 (balance.u[dof], balance.v[dof]) = (T::of(0.5) * (from + to), per_step * (to - from));

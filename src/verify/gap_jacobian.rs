@@ -3,6 +3,7 @@
 use crate::contact::{ContactConstraint, ContactJacobian, GapRates};
 use crate::error::Result;
 use crate::real::Real;
+use crate::state::resolution;
 
 /// How far the rows of a constraint are from the derivatives of its gaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +75,8 @@ pub fn gap_jacobian<T: Real>(
     // Rates first, while the rows are those of the search at u.
     let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
     let delay = if speed > 0.0 { step / speed } else { step };
+    // As far as times near t can tell: t ± delay and t ± 100 delay are then what they say.
+    let delay = (t + delay.max(resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
     constraint.rates(t, u, v, &mut rates);
