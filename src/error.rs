@@ -139,6 +139,44 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A time-integration tableau does not converge to the motion, however small the step: its order is 0.
+    #[error(
+        "{integrator} is of order 0 in displacement or velocity: its results are no motion of the system, however small the \
+         step; check the rows of its tableau with `analysis::order`"
+    )]
+    InconsistentScheme {
+        /// Name of the integrator.
+        integrator: String,
+    },
+    /// A time-integration tableau is zero-unstable: errors of single steps grow without bound, however small the step.
+    #[error(
+        "{integrator} (order {order}) is zero-unstable: without stiffness and damping a step has the spectral radius {radius:e}, \
+         or more than the double root 1 of rigid motion; check the rows of its tableau with `analysis::zero_stability`"
+    )]
+    UnstableScheme {
+        /// Name of the integrator.
+        integrator: String,
+        /// Its order.
+        order: u32,
+        /// Spectral radius of a step at frequency zero.
+        radius: f64,
+    },
+    /// A step beyond the stability limit of the scheme.
+    #[error(
+        "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system is {frequency:e} (1/time) \
+         or more, for which h may be {largest:e}; take smaller steps or an implicit scheme \
+         (`SimulationBuilder::unchecked_stability` takes the step as it is)"
+    )]
+    BeyondStability {
+        /// Name of the integrator.
+        integrator: String,
+        /// The step size.
+        h: f64,
+        /// The largest step size that is stable.
+        largest: f64,
+        /// The highest circular frequency of M⁻¹ K that was found.
+        frequency: f64,
+    },
     /// A matrix that must be positive definite is not.
     #[error(
         "the {matrix} is not positive definite: pivot of dof {dof} is not positive; look for a body without mass or \

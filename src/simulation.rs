@@ -13,6 +13,7 @@ mod path;
 mod program;
 mod resample;
 mod scheme;
+mod stability;
 mod start;
 mod step;
 
@@ -39,6 +40,7 @@ use newton_step::NewtonWork;
 use operator::Operator;
 use program::Program;
 use scheme::Scheme;
+use stability::StepLimit;
 
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -102,6 +104,7 @@ pub struct Simulation<'a, T: Real> {
     linear_solver: Box<dyn LinearSolver<T> + 'a>,
     scheme: Scheme<'a>,
     program: Program<T>,
+    limit: StepLimit,
     /// The one-step scheme of the first steps, dropped once the past is known.
     startup: Option<Program<T>>,
     state: State<T>,

@@ -137,6 +137,14 @@ pub(crate) fn check_symmetric_in<T: Real>(
     }
 }
 
+/// A number that has nothing to do with its index (the finalizer of splitmix64).
+pub(crate) fn scattered(index: usize) -> u64 {
+    let x = (index as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
 /// Entry (row, column), zero if it is not stored.
 pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, column: usize) -> T {
     let rows = a.row_idx_of_col_raw(column);

@@ -206,6 +206,14 @@ pub trait System<T: Real>: Send {
         out.fill(T::zero());
     }
 
+    /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or a bound above it, if the host knows one; none by
+    /// default. Explicit schemes are refused beyond the step that it allows. Without it the frequency is estimated when a
+    /// simulation is built: from the tangent, or for an empty [`pattern`](Self::pattern) by differences of the force, some
+    /// evaluations of which this saves.
+    fn highest_frequency(&mut self) -> Option<f64> {
+        None
+    }
+
     /// Degrees of freedom whose motion is given, ascending.
     fn prescribed(&self) -> &[usize] {
         &[]
@@ -307,6 +315,9 @@ macro_rules! forward {
             }
             fn external_load(&mut self, t: f64, out: &mut [T]) {
                 (**self).external_load(t, out);
+            }
+            fn highest_frequency(&mut self) -> Option<f64> {
+                (**self).highest_frequency()
             }
             fn prescribed(&self) -> &[usize] {
                 (**self).prescribed()

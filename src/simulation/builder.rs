@@ -9,6 +9,7 @@ use super::operator::{At, TangentOf};
 use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
+use super::stability::{self, StepLimit};
 use super::start::{self, Start, Violation};
 use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
 use crate::analysis::{self, LocalError};
@@ -41,6 +42,14 @@ pub struct SimulationBuilder<'a, T: Real> {
     control: Option<StepControl>,
     resumed: Option<(State<T>, History<T>)>,
     balance: EnergyBalance,
+    stability: Stability,
+}
+
+/// Whether the step size is compared with the stability limit of the scheme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stability {
+    Checked,
+    Unchecked,
 }
 
 /// Whether the works of the energy balance are accumulated.
@@ -79,6 +88,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             control: None,
             resumed: None,
             balance: EnergyBalance::Off,
+            stability: Stability::Checked,
         }
     }
 
@@ -196,6 +206,23 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused, and a
+    /// step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
+    ///
+    /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K: that of
+    /// [`System::highest_frequency`], or a bound by Gershgorin's circles where that clears the step, or Lanczos' estimate from
+    /// below. So what is refused is unstable; what passes may exceed the limit by a fraction of a percent. At the limit
+    /// itself a step is taken: waves along a uniform bar are exact there, though the shortest grows linearly in time once it is
+    /// excited. For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`), and it may
+    /// stiffen later. Damping counts where the scheme takes its forces from before the step: the strongest damping in the
+    /// highest mode, which is exact for Rayleigh's and may refuse what is stable otherwise. Stiffness of compliant contact
+    /// laws does not count, nor does a K that is not symmetric beyond its circles.
+    #[must_use]
+    pub fn unchecked_stability(mut self) -> Self {
+        self.stability = Stability::Unchecked;
+        self
+    }
+
     /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit.
     /// Initial values and start time given elsewhere are ignored.
     #[must_use]
@@ -225,6 +252,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
+        if self.stability == Stability::Checked {
+            stability::check_scheme(&integrator.name(), &tableau)?;
+        }
         let admitted = admitted(&*integrator, &tableau);
         let (mut constraints, mut g) = Constraints::new(constraints, dofs, system.prescribed(), admitted)?;
         let rows = constraints.capacity();
@@ -254,6 +284,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Refused)?
         };
         contact_solver.reserve(rows);
+        let limit = match self.stability {
+            Stability::Checked => stability::check_step(&mut *system, &scheme, &state.motion, history.clock.h)?,
+            Stability::Unchecked => StepLimit::Unchecked,
+        };
 
         let contact = (rows, constraints.interface());
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
@@ -303,6 +337,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             linear_solver: self.linear_solver,
             scheme,
             program,
+            limit,
             startup,
             state,
             history,

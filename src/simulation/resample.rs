@@ -3,6 +3,7 @@
 use super::operator::{At, TangentOf};
 use super::program::Compiler;
 use super::scheme::Scheme;
+use super::stability::{self, StepLimit};
 use super::start::{self, Start, Violation, taylor};
 use super::{Constraints, Simulation};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
@@ -45,8 +46,8 @@ impl<T: Real> Simulation<'_, T> {
     /// # Errors
     ///
     /// [`Error::Parameter`] unless h is positive and finite, [`Error::TimeNotAdvancing`] if a step of that size would not
-    /// change the time, [`Error::MatrixNotFinite`] or [`Error::Singular`] if the
-    /// effective matrix cannot be factorized with it. The simulation is then as it was.
+    /// change the time, [`Error::BeyondStability`] if the scheme is not stable with it, [`Error::MatrixNotFinite`] or
+    /// [`Error::Singular`] if the effective matrix cannot be factorized. The simulation is then as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
@@ -64,6 +65,11 @@ impl<T: Real> Simulation<'_, T> {
         }
         let clock = self.history.clock.with_step_size(h);
         clock.check()?;
+        if let StepLimit::Cleared(cleared) = self.limit
+            && h > cleared
+        {
+            self.limit = stability::check_step(&mut *self.system, &self.scheme, &self.state.motion, h)?;
+        }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };

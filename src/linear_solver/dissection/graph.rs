@@ -1,5 +1,6 @@
 //! Undirected graphs with weights: the quotient of a matrix by its indistinguishable dofs, and parts of it.
 
+use crate::sparse::scattered;
 use faer::sparse::SymbolicSparseColMatRef;
 
 /// An undirected graph without loops, in compressed columns; every edge is stored at both ends.
@@ -160,8 +161,8 @@ impl Quotient {
         for j in (0..n).filter(|&j| vertex[j] != OUT) {
             for &i in pattern.row_idx_of_col_raw(j) {
                 if i != j && vertex[i] != OUT {
-                    columns[j] = columns[j].wrapping_add(scatter(i));
-                    rows[i] = rows[i].wrapping_add(scatter(j));
+                    columns[j] = columns[j].wrapping_add(scattered(i));
+                    rows[i] = rows[i].wrapping_add(scattered(j));
                 }
             }
         }
@@ -169,7 +170,7 @@ impl Quotient {
             return None;
         }
         for (dof, sum) in columns.iter_mut().enumerate() {
-            *sum = sum.wrapping_add(scatter(dof));
+            *sum = sum.wrapping_add(scattered(dof));
         }
         let (mut dofs, mut starts) = (Vec::with_capacity(n), vec![0]);
         for j in 0..n {
@@ -211,12 +212,4 @@ impl Quotient {
     pub(super) fn expanded(&self, vertices: &[usize]) -> Vec<usize> {
         vertices.iter().flat_map(|&vertex| self.dofs(vertex)).copied().collect()
     }
-}
-
-/// A number that has nothing to do with its index (the finalizer of splitmix64).
-fn scatter(index: usize) -> u64 {
-    let x = (index as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }

@@ -1,0 +1,323 @@
+//! The step up to which a run is stable: the critical Ω of its scheme over the highest frequency of its system.
+
+use super::scheme::Scheme;
+use crate::analysis::{self, ZeroStability};
+use crate::error::{Error, Result};
+use crate::mass::InverseMass;
+use crate::real::Real;
+use crate::sparse::{self, Symmetry};
+use crate::state::Motion;
+use crate::system::{Damping, Linearity, System, TangentWeights};
+use crate::tableau::Tableau;
+use faer::sparse::SparseColMatRef;
+use faer::{Mat, Side};
+
+/// What is known of the stability of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum StepLimit {
+    /// The caller answers for it.
+    Unchecked,
+    /// Steps up to this one have been found stable.
+    Cleared(f64),
+}
+
+/// Steps of Lanczos' iteration, at most: one product with K each. They are taken only where Gershgorin's circles do not clear
+/// the step.
+const ITERATIONS: usize = 40;
+
+/// After so many of them the estimate is looked at.
+const LOOKS: [usize; 8] = [3, 6, 9, 13, 18, 24, 31, ITERATIONS];
+
+/// How well the highest frequency (its square) is known when an error names the step that works.
+const ACCURACY: f64 = 2e-3;
+
+/// Residuals between the estimate and a limit that it clears.
+const RESERVE: f64 = 4.0;
+
+/// The critical Ω is that of double roots, which are found to the square root of rounding.
+const SLIVER: f64 = 1e-7;
+
+/// Refuses tableaux whose results have nothing to do with the equation of motion, however small the step.
+pub(super) fn check_scheme(integrator: &str, tableau: &Tableau) -> Result<()> {
+    let order = analysis::order(tableau);
+    let order = order.displacement.min(order.velocity);
+    if order == 0 {
+        return Err(Error::InconsistentScheme { integrator: integrator.to_owned() });
+    }
+    match analysis::zero_stability(tableau) {
+        ZeroStability::Unstable => {
+            let radius = analysis::spectral_radius(tableau, 0.0, 0.0);
+            Err(Error::UnstableScheme { integrator: integrator.to_owned(), order, radius })
+        }
+        ZeroStability::Strong | ZeroStability::Weak => Ok(()),
+    }
+}
+
+/// Refuses a step beyond the limit of the scheme, as far as that is known; says up to which step it is.
+///
+/// Gershgorin's circles bound the highest frequency from above: a step that they clear is stable. Where they do not, Lanczos'
+/// iteration on M⁻¹ K tells: Ritz values are never above the highest frequency, so what is refused by them is unstable. What they
+/// let pass may exceed the limit by what the iteration has missed (within its steps a fraction of a percent on meshes).
+/// Nonlinear systems are judged by the tangent at `motion`.
+pub(super) fn check_step<T: Real>(
+    system: &mut dyn System<T>,
+    scheme: &Scheme<'_>,
+    motion: &Motion<T>,
+    h: f64,
+) -> Result<StepLimit> {
+    let tableau = &scheme.tableau;
+    let stable_at_infinity = || analysis::radius_at_infinity(tableau).is_some_and(|radius| radius <= 1.0 + 1e-6);
+    if tableau.stages.iter().all(|stage| stage.balance.u.z != 0.0) && stable_at_infinity() {
+        return Ok(StepLimit::Cleared(f64::INFINITY));
+    }
+    let Some(mut critical) = analysis::critical_omega(tableau, 0.0) else {
+        return Ok(StepLimit::Cleared(f64::INFINITY));
+    };
+    let allowance = 1.0 + SLIVER.max(64.0 * T::epsilon().value());
+    let lags = lags(tableau, system);
+    let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed())?, system.dofs());
+    let highest = match system.highest_frequency() {
+        Some(omega) => Highest { at_least: omega * omega, at_most: omega * omega },
+        None => {
+            let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(StepLimit::Cleared(h)) };
+            if let Some(circles) = stiffness.circles(system, &lanczos.inverse) {
+                let largest = critical / circles.largest.value().sqrt();
+                if h <= largest * allowance && !lags {
+                    return Ok(StepLimit::Cleared(h.max(largest)));
+                }
+                lanczos.start = circles.rows;
+            }
+            if !stiffness.is_symmetric() {
+                // Ritz values say nothing.
+                return Ok(StepLimit::Cleared(h));
+            }
+            let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
+            lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
+        }
+    };
+    if lags && highest.at_least > 0.0 {
+        // The mode of the highest frequency with the strongest damping of any: exact for Rayleigh's, on the safe side otherwise.
+        let still = vec![T::zero(); system.dofs()];
+        let damping = lanczos.highest(system, 0.0, |system, x, y| {
+            system.damping_force(&still, x, y);
+            Ok(())
+        })?;
+        let xi = 0.5 * damping.at_least / highest.at_least.sqrt();
+        critical = analysis::critical_omega(tableau, xi).map_or(critical, |damped| damped.min(critical));
+    }
+    let step = |square: f64| if square > 0.0 { critical / square.sqrt() } else { f64::INFINITY };
+    if h > step(highest.at_least) * allowance {
+        return Err(Error::BeyondStability {
+            integrator: scheme.integrator.name(),
+            h,
+            largest: step(highest.at_most),
+            frequency: highest.at_least.sqrt(),
+        });
+    }
+    Ok(StepLimit::Cleared(h.max(step(highest.at_most))))
+}
+
+/// Whether the system is damped, and the scheme takes damping forces from before the stage.
+fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
+    let still = vec![T::zero(); system.dofs()];
+    tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0)
+        && system.damping_force(&still, &still, &mut still.clone()) == Damping::Present
+}
+
+/// Bounds of the highest eigenvalue ω².
+#[derive(Clone, Copy, Debug)]
+struct Highest {
+    at_least: f64,
+    /// The estimate with its residual: not a proof, as another eigenvalue may hide.
+    at_most: f64,
+}
+
+/// What K does to a vector.
+enum Stiffness<'s, T: Real> {
+    /// The values of the system's pattern.
+    Matrix { values: Vec<T>, symmetry: Symmetry },
+    /// Differences of the force over a displacement of the given size.
+    Force { at: &'s Motion<T>, force: Vec<T>, size: T, moved: Vec<T> },
+}
+
+/// Gershgorin's bound of ω².
+struct Circles<T> {
+    /// √(Σ_j |K_ij|/m_i) over √m_i for each dof, where an eigenvector of the highest frequency may be large.
+    rows: Vec<T>,
+    largest: T,
+}
+
+impl<'s, T: Real> Stiffness<'s, T> {
+    /// The tangent, where the system has one; its force otherwise. None for nonlinear forces without a length to vary them by.
+    fn of(system: &mut dyn System<T>, at: &'s Motion<T>) -> Result<Option<Self>> {
+        let dofs = system.dofs();
+        let entries = system.pattern().row_idx().len();
+        if entries > 0 {
+            let mut values = vec![T::zero(); entries];
+            let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
+            system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
+            let symmetry = sparse::symmetry("stiffness", SparseColMatRef::new(system.pattern(), &values))
+                .unwrap_or(Symmetry::General);
+            return Ok(Some(Self::Matrix { values, symmetry }));
+        }
+        let size = match system.linearity() {
+            Linearity::Linear => T::one(),
+            Linearity::Nonlinear => {
+                at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs())) * T::epsilon().sqrt()
+            }
+        };
+        let mut force = vec![T::zero(); dofs];
+        match size > T::zero() {
+            true => {
+                system.force(at.t, &at.u, &at.v, &mut force)?;
+                Ok(Some(Self::Force { at, force, size, moved: vec![T::zero(); dofs] }))
+            }
+            false => Ok(None),
+        }
+    }
+
+    fn is_symmetric(&self) -> bool {
+        !matches!(self, Self::Matrix { symmetry: Symmetry::General, .. })
+    }
+
+    /// The circles of M⁻¹ K on the dofs with a response, for a lumped mass and a matrix.
+    fn circles(&self, system: &dyn System<T>, inverse: &InverseMass<T>) -> Option<Circles<T>> {
+        let (Self::Matrix { values, .. }, InverseMass::Lumped(inverse)) = (self, inverse) else { return None };
+        let pattern = system.pattern();
+        let mut rows = vec![T::zero(); inverse.len()];
+        for column in (0..inverse.len()).filter(|&column| inverse[column] > T::zero()) {
+            for (&row, value) in pattern.row_idx_of_col_raw(column).iter().zip(&values[pattern.col_range(column)]) {
+                rows[row] += value.abs();
+            }
+        }
+        let mut largest = T::zero();
+        for (row, &inverse) in rows.iter_mut().zip(inverse) {
+            let square = *row * inverse;
+            largest = largest.max(square);
+            *row = (square * inverse).sqrt();
+        }
+        largest.is_finite().then_some(Circles { rows, largest })
+    }
+
+    /// `y = K x`.
+    fn product(&mut self, system: &mut dyn System<T>, x: &[T], y: &mut [T]) -> Result<()> {
+        match self {
+            Self::Matrix { values, symmetry } => {
+                y.fill(T::zero());
+                symmetry.product(T::one(), SparseColMatRef::new(system.pattern(), values), x, y);
+            }
+            Self::Force { at, force, size, moved } => {
+                let longest = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+                let step = if longest > T::zero() { *size / longest } else { T::one() };
+                moved.copy_from_slice(&at.u);
+                T::axpy(step, x, moved);
+                system.force(at.t, moved, &at.v, y)?;
+                for (y, &f) in y.iter_mut().zip(force.iter()) {
+                    *y = (f - *y) / step;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980, chapter 13), without
+/// orthogonalization against older vectors: copies of eigenvalues that this brings do no harm at the end of the spectrum.
+struct Lanczos<T> {
+    inverse: InverseMass<T>,
+    /// Sizes of the entries of the first vector; their signs have no pattern.
+    start: Vec<T>,
+    vectors: [Vec<T>; 4],
+}
+
+impl<T: Real> Lanczos<T> {
+    fn new(inverse: InverseMass<T>, dofs: usize) -> Self {
+        let start = match &inverse {
+            InverseMass::Lumped(inverse) => inverse.iter().map(|inverse| inverse.sqrt()).collect(),
+            InverseMass::Consistent { .. } => vec![T::one(); dofs],
+        };
+        Self { inverse, start, vectors: std::array::from_fn(|_| vec![T::zero(); dofs]) }
+    }
+
+    /// The highest eigenvalue, known well enough to compare it with `limit`, and to [`ACCURACY`] if it is above.
+    fn highest(
+        &mut self,
+        system: &mut dyn System<T>,
+        limit: f64,
+        mut product: impl FnMut(&mut dyn System<T>, &[T], &mut [T]) -> Result<()>,
+    ) -> Result<Highest> {
+        let Self { inverse, start, vectors: [q, old, image, next] } = self;
+        let dot = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| x * y).sum::<T>();
+        // q: the vector; old: M times the one before; image: K q, then M times the next; next: M⁻¹ of that.
+        next.copy_from_slice(start);
+        for (dof, x) in next.iter_mut().enumerate() {
+            let number = sparse::scattered(dof);
+            let size = 0.5 + (number >> 12) as f64 / (1_u64 << 53) as f64;
+            *x *= T::of(if number & 1 == 0 { size } else { -size });
+        }
+        if let InverseMass::Consistent { fixed, .. } = inverse {
+            for &dof in fixed.iter() {
+                next[dof] = T::zero();
+            }
+        }
+        image.fill(T::zero());
+        system.mass().product(T::one(), next, image);
+        old.fill(T::zero());
+        let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+        let mut found = Highest { at_least: 0.0, at_most: 0.0 };
+        for iteration in 1..=ITERATIONS {
+            let beta = dot(image, next).sqrt();
+            if !(beta > T::zero() && beta.is_finite()) {
+                break;
+            }
+            if iteration > 1 {
+                beside.push(beta.value());
+            }
+            for i in 0..q.len() {
+                q[i] = next[i] / beta;
+                // M q, to be subtracted next time; the one before waits in `next`.
+                next[i] = old[i];
+                old[i] = image[i] / beta;
+            }
+            product(system, q, image)?;
+            let alpha = dot(image, q);
+            diagonal.push(alpha.value());
+            let back = if iteration > 1 { beta } else { T::zero() };
+            for i in 0..q.len() {
+                image[i] -= alpha * old[i] + back * next[i];
+            }
+            next.copy_from_slice(image);
+            inverse.apply(next);
+            if LOOKS.contains(&iteration) {
+                let beta = dot(image, next).max(T::zero()).sqrt().value();
+                found = ritz(&diagonal, &beside, beta);
+                let miss = found.at_most - found.at_least;
+                let known = found.at_least > limit && miss <= ACCURACY * found.at_least;
+                // (Higher eigenvalues may hide behind one that is nearly found: some reserve.)
+                if known || found.at_least + RESERVE * miss <= limit {
+                    return Ok(found);
+                }
+            }
+        }
+        // An invariant subspace was found, or the iterations are spent.
+        if !LOOKS.contains(&diagonal.len()) && !diagonal.is_empty() {
+            found = ritz(&diagonal, &beside[..diagonal.len() - 1], 0.0);
+        }
+        Ok(found)
+    }
+}
+
+/// The highest eigenvalue of a tridiagonal matrix, and that with the residual of its vector, if `beta` follows beside it.
+fn ritz(diagonal: &[f64], beside: &[f64], beta: f64) -> Highest {
+    let n = diagonal.len();
+    let matrix = Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => diagonal[i],
+        1 => beside[i.min(j)],
+        _ => 0.0,
+    });
+    let Ok(eigen) = matrix.self_adjoint_eigen(Side::Lower) else {
+        return Highest { at_least: 0.0, at_most: f64::INFINITY };
+    };
+    let (last, value) = (eigen.U()[(n - 1, n - 1)], eigen.S()[n - 1].max(0.0));
+    Highest { at_least: value, at_most: value + beta * last.abs() }
+}
