@@ -116,8 +116,9 @@ pub trait ContactConstraint<T: Real>: Send {
     ///
     /// # Errors
     ///
-    /// [`Error::ContactLost`] if a candidate has left what the last search knows of its surroundings (the constraint's index
-    /// in the contact's name is filled in by the caller), or the host's own.
+    /// [`Error::ContactLost`] if a candidate has left what the last search knows of its surroundings,
+    /// [`Error::ContactNotFinite`] if it has no normal there (the constraint's index in the contact's name is filled in by the
+    /// caller), or the host's own.
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         let _ = (t, u);
         Ok(Candidates::Unchanged)

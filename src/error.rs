@@ -385,6 +385,16 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
+    /// An energy or a work is NaN or infinite.
+    #[error("t = {t:e}: {what} is {value}; look at the potential energy, load and damping force of the system")]
+    EnergyNotFinite {
+        /// Time of the state.
+        t: f64,
+        /// Which energy.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// A prescribed motion is NaN or infinite.
     #[error("t = {t:e}: the prescribed motion of dof {dof} is {value}")]
     SupportNotFinite {
@@ -455,6 +465,7 @@ impl Error {
                 | Self::Inadmissible { .. }
                 | Self::StepNotFinite { .. }
                 | Self::ContactNotFinite { .. }
+                | Self::EnergyNotFinite { .. }
                 | Self::SupportNotFinite { .. }
         )
     }

@@ -170,7 +170,8 @@ pub(crate) mod kernels {
         fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]);
         /// `out = Σ c x + Σ c (x − y)` in one pass, summed in this order; without a term nothing is written.
         fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]);
-        /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether every d is finite.
+        /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether what was written is
+        /// finite.
         fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
         /// Whether every entry is finite.
         fn all_finite(x: &[Self]) -> bool;
@@ -303,6 +304,24 @@ pub(crate) mod kernels {
         sums.into_iter().sum::<T>() + rest == T::zero()
     }
 
+    /// The same for vectors of one length, looked at together.
+    #[inline(always)]
+    fn all_finite_together<T: Real, const N: usize>(x: [&[T]; N]) -> bool {
+        let n = x.first().map_or(0, |x| x.len());
+        let x = x.map(|x| &x[..n]);
+        let whole = n - n % LANES;
+        let mut sums = [T::zero(); LANES];
+        for start in (0..whole).step_by(LANES) {
+            let lanes: [&[T]; N] = x.map(|x| &x[start..start + LANES]);
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                for x in lanes {
+                    *sum += x[lane] * T::zero();
+                }
+            }
+        }
+        x.iter().all(|x| x[whole..].iter().all(|x| x.is_finite())) && sums.into_iter().sum::<T>() == T::zero()
+    }
+
     #[inline(always)]
     fn combine<T: Real>(terms: &[(T, &[T])], differences: &[(T, &[T])], y: &[T], out: &mut [T]) {
         /// P terms and D differences; all slices are cut to one length, so that no access is checked.
@@ -375,7 +394,11 @@ pub(crate) mod kernels {
                 v[i] += w[1] * d[i];
                 a[i] = if ADDS { a[i] + w[2] * d[i] } else { w[2] * d[i] };
             }
-            all_finite(d)
+            // No d that is not finite leaves a finite.
+            match MOVES {
+                true => all_finite_together([u, v, a]),
+                false => all_finite_together([v, a]),
+            }
         }
         let [u, v, a] = motion;
         let mut finite = true;

@@ -6,6 +6,7 @@ mod contact_step;
 mod control;
 mod curved_rows;
 mod energy;
+mod finite;
 mod newton;
 mod newton_step;
 mod operator;
@@ -179,7 +180,8 @@ impl<'a, T: Real> Simulation<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if `t` is not finite, and those of [`step`](Self::step).
+    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step), and [`Error::EnergyNotFinite`] if an observer
+    /// that asks for the energy would be shown one that is no number; the step before it is taken.
     pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
@@ -197,7 +199,11 @@ impl<'a, T: Real> Simulation<'a, T> {
         self.step()?;
         let energy = match observer.wants() {
             Wants::State => None,
-            Wants::Energy => Some(self.energy()),
+            Wants::Energy => {
+                let energy = self.energy();
+                energy.check(self.time())?;
+                Some(energy)
+            }
         };
         let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
         Ok(observer.observe(&view))

@@ -266,7 +266,7 @@ fn malformed_and_unsuitable_schemes_are_refused() {
     refused!(refuse(vec![Stage::new(Rows { a: V[0], ..rows })]), Error::Tableau { .. }, "unknown");
     refused!(refuse(vec![Stage::new(rows).ending_at(0.5)]), Error::Tableau { .. }, "end of the step");
     // Displacement without the unknown: a multiplier cannot close a gap.
-    let explicit = Stage::new(Rows { u: U[0] + V[0], v: V[0] + Row { z: 0.5, ..Row::default() }, a: Z });
+    let explicit = Stage::new(Rows { u: U[0] + V[0], v: V[0] + Z, a: Z });
     let position = Simulation::builder(system(), Broken(Tableau::single(explicit)), 0.01)
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.0));
     refused!(position.build(), Error::Incompatible { .. }, "broken", "gap");

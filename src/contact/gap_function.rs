@@ -1,6 +1,6 @@
 //! Gaps that are any function of some displacements.
 
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, positive};
+use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, positive};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -197,7 +197,14 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        self.linearize(t, u)
+        let found = self.linearize(t, u)?;
+        match self.rows.iter().position(|row| row.broken) {
+            None => Ok(found),
+            Some(feature) => {
+                let contact = ContactId { constraint: 0, feature, candidate: 0 };
+                Err(Error::ContactNotFinite { t, what: "the gradient of the gap", contact, value: f64::NAN })
+            }
+        }
     }
 
     fn candidates(&self) -> usize {

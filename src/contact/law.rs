@@ -169,6 +169,41 @@ impl ContactLaw {
         }
     }
 
+    /// Refuses parameters that the scalar of a run turns into zero or infinity, or their reciprocals.
+    pub(crate) fn check_scalar<T: Real>(&self) -> Result<()> {
+        let fits = |name, value: f64| {
+            let own = T::of(value);
+            match own.is_finite() && own.recip().is_finite() {
+                true => Ok(()),
+                false => Err(Error::Parameter {
+                    name,
+                    value,
+                    range: "a number of the scalar of the run, and its reciprocal too: choose other units, or f64",
+                }),
+            }
+        };
+        match *self {
+            Self::Rigid | Self::Equality | Self::RateCondition | Self::PersistencySwitch | Self::Restitution { .. } => {
+                Ok(())
+            }
+            Self::Penalty { stiffness } | Self::AugmentedLagrangian { stiffness, .. } => {
+                fits("the contact stiffness", stiffness)
+            }
+            Self::PowerLaw { stiffness, exponent } => {
+                fits("the contact stiffness", stiffness)?;
+                fits("the exponent of the contact law", exponent)?;
+                fits("the contact stiffness times the exponent", stiffness * exponent)
+            }
+            Self::Bipenalty { stiffness, mass } => {
+                fits("the contact stiffness", stiffness)?;
+                match mass > 0.0 {
+                    true => fits("the contact mass over the contact stiffness", self.inertia()),
+                    false => Ok(()),
+                }
+            }
+        }
+    }
+
     /// Weight of g̈ beside g in the condition of a row (time²): m/k of a bipenalty.
     pub(crate) fn inertia(&self) -> f64 {
         match self {

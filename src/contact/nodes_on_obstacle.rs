@@ -1,7 +1,9 @@
 //! Nodes of a deformable body against a rigid obstacle, which may move.
 
 use super::obstacle::{dot, minus};
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, Obstacle, check_mesh, positive};
+use super::{
+    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Obstacle, check_mesh, positive,
+};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -208,8 +210,11 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         for row in &mut self.rows {
             row.place = self.nodes[row.node].at(u);
             let (_, normal) = self.obstacle.distance(minus(row.place, shift));
-            // Where there is no normal the gap is reported, which is no number either.
-            if normal != row.normal && normal.iter().all(|x| x.is_finite()) {
+            if let Some(x) = normal.iter().find(|x| !x.is_finite()) {
+                let contact = ContactId { constraint: 0, feature: self.nodes[row.node].number, candidate: 0 };
+                return Err(Error::ContactNotFinite { t, what: "the normal", contact, value: x.value() });
+            }
+            if normal != row.normal {
                 row.normal = normal;
                 moved = Candidates::Changed;
             }

@@ -38,8 +38,7 @@ impl<T: Real> Corrector<T> for ContactImplicit {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.act_implicitly();
-        Ok(())
+        step.act_implicitly()
     }
 }
 
@@ -97,8 +96,7 @@ impl<T: Real> Corrector<T> for ContactStabilized {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.act_implicitly();
-        Ok(())
+        step.act_implicitly()
     }
 }
 

@@ -58,11 +58,10 @@ enum Jump {
     Acceleration,
 }
 
-/// The gaps of all rows, as a correction evaluates them.
+/// The gaps of all rows, as a correction evaluates them: those that are NaN or infinite are refused.
 pub(crate) trait Gaps<T: Real> {
     fn law(&self, row: usize) -> ContactLaw;
-    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]);
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
 
     /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized there;
     /// afterwards rows are those of `here` (time, u) again.
@@ -116,6 +115,14 @@ impl<T: Real> Backup<T> {
                 part: "a corrector that projects the past".into(),
                 reason: "its `edits` does not say so, and no room was kept to undo a failed step",
             }),
+        }
+    }
+
+    /// The past states that the step may have edited.
+    pub(crate) fn edited<'p>(&self, past: &'p [Motion<T>]) -> &'p [Motion<T>] {
+        match self.kept {
+            Some(_) => past,
+            None => &[],
         }
     }
 
@@ -190,6 +197,16 @@ impl<T: Real> Buffers<T> {
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
         }
+    }
+
+    /// Whether the last stage had contacts to correct.
+    pub(crate) fn has_touched(&self) -> bool {
+        !self.closed.is_empty() || !self.opened.is_empty()
+    }
+
+    /// Whether damping carries corrections of v to the accelerations of all dofs.
+    pub(crate) fn spreads(&self) -> bool {
+        !self.change.is_empty()
     }
 }
 
@@ -280,7 +297,7 @@ impl<T: Real> Correction<'_, T> {
             false => Bound::NonNegative,
         }));
         let Buffers { jump: jumps, tolerance, rates, .. } = &mut *self.buffers;
-        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
+        let read = self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
         jumps.clear();
         tolerance.clear();
         for &row in rows {
@@ -293,7 +310,7 @@ impl<T: Real> Correction<'_, T> {
         }
         x.clear();
         x.resize(rows.len(), T::zero());
-        let result = self.solve(rows, &bounds, x);
+        let result = read.and_then(|()| self.solve(rows, &bounds, x));
         self.buffers.bounds = bounds;
         result
     }
@@ -313,9 +330,19 @@ impl<T: Real> Correction<'_, T> {
 
     /// Applies impulses to v along rows, v ← v + M⁻¹ Gᵀ impulses, and the change of damping forces to a. They are booked as
     /// impulses of their contacts, and the energy they take, seen from the obstacle, as dissipated by these.
-    pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) {
-        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
+        self.read_rates()?;
         self.apply(rows, impulses);
+        Ok(())
+    }
+
+    /// Reads what the rates of the gaps have of their own.
+    fn read_rates(&mut self) -> Result<()> {
+        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates)
     }
 
     /// The same if the rates of the rows are known.
@@ -404,26 +431,35 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// The rate of the gap of a row.
-    pub fn rate(&mut self, row: usize) -> T {
-        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
-        self.g.product(row, &self.new.v) + self.buffers.rates[row].rate
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    pub fn rate(&mut self, row: usize) -> Result<T> {
+        self.read_rates()?;
+        Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
     }
 
     /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as there
     /// is one: the bodies leave each other faster, or with a negative energy slower.
-    pub fn exchange_energy(&mut self, row: usize, energy: T) {
-        let (s, rate) = (self.compliance(row), self.rate(row));
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    pub fn exchange_energy(&mut self, row: usize, energy: T) -> Result<()> {
+        let (s, rate) = (self.compliance(row), self.rate(row)?);
         if s > T::zero() && energy != T::zero() && energy.is_finite() {
             // ½ S j² + rate j = energy; beyond what the rate holds, all of it.
             let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
-            self.apply_impulses(&[row], &[(root - rate) / s]);
+            self.apply(&[row], &[(root - rate) / s]);
         }
+        Ok(())
     }
 
     /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
     /// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
     /// (u, h v, h² a) to a multiplier.
-    pub(super) fn act_implicitly(&mut self) {
+    pub(super) fn act_implicitly(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
         self.projection.prepare(self.g, &rows);
@@ -436,9 +472,10 @@ impl<T: Real> Correction<'_, T> {
             self.contacts.lambda[row] = T::of(2.0 * u) * lambda;
             impulses.push(T::of(self.h * (2.0 * u - v)) * lambda);
         }
-        self.apply_impulses(&rows, &impulses);
+        let result = self.apply_impulses(&rows, &impulses);
         self.buffers.closed = rows;
         self.buffers.impulses = impulses;
+        result
     }
 
     /// Zeroes the accelerations of all dofs that engaged rows act on, and takes their inertia out of the reported forces;
@@ -472,8 +509,8 @@ impl<T: Real> Correction<'_, T> {
 
     /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw multipliers of
     /// the closed rows, as far as there is any.
-    pub(super) fn exchange_by_forces(&mut self, energy: T) {
-        self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates);
+    pub(super) fn exchange_by_forces(&mut self, energy: T) -> Result<()> {
+        self.read_rates()?;
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
         impulses.clear();
@@ -496,14 +533,16 @@ impl<T: Real> Correction<'_, T> {
         }
         self.buffers.closed = rows;
         self.buffers.impulses = impulses;
+        Ok(())
     }
 
-    /// Calls a function with every row that has opened.
-    pub fn each_opened(&mut self, mut each: impl FnMut(&mut Self, usize)) {
-        for i in 0..self.buffers.opened.len() {
-            let row = self.buffers.opened[i];
-            each(self, row);
-        }
+    /// Calls a function with every row that has opened, up to its first error.
+    ///
+    /// # Errors
+    ///
+    /// That of the function.
+    pub fn each_opened(&mut self, mut each: impl FnMut(&mut Self, usize) -> Result<()>) -> Result<()> {
+        (0..self.buffers.opened.len()).try_for_each(|i| each(self, self.buffers.opened[i]))
     }
 
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in

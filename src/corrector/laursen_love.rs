@@ -43,7 +43,6 @@ impl<T: Real> Corrector<T> for LaursenLove {
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         let work = step.contact_work()?;
-        step.exchange_by_forces(-work);
-        Ok(())
+        step.exchange_by_forces(-work)
     }
 }

@@ -56,7 +56,8 @@ impl<T: Real> Prediction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Contact`](crate::Error::Contact), [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
+    /// [`Error::ContactNotFinite`](crate::Error::ContactNotFinite), [`Error::Contact`](crate::Error::Contact),
+    /// [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
     pub fn project(&mut self, extent: Extent) -> Result<()> {
         let count = self.ids.len();
         let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| {
@@ -66,10 +67,13 @@ impl<T: Real> Prediction<'_, T> {
         let mut mu = std::mem::take(&mut self.buffers.impulses);
         rows.clear();
         mu.clear();
-        let mut result = Ok(());
+        let mut result;
         loop {
             self.advance(&rows, &mu);
-            self.constraints.0.gap(self.t, self.shifted, &mut self.buffers.gaps);
+            result = self.read_gaps();
+            if result.is_err() {
+                break;
+            }
             let before = rows.len();
             for row in 0..count {
                 let takes_part = rigid(&self.constraints, row)
@@ -116,10 +120,17 @@ impl<T: Real> Prediction<'_, T> {
         }
     }
 
+    /// Gaps at the displacements moved, on their own part of a curved surface.
+    fn read_gaps(&mut self) -> Result<()> {
+        let Self { t, start, shifted, buffers, constraints, .. } = self;
+        let there = (*t, [&**shifted, &start.v, &start.a]);
+        constraints.0.elsewhere(0, there, (start.t, &start.u), &mut buffers.gaps)
+    }
+
     /// μ of the rows, for the gaps at u + h v.
     fn solve(&mut self, rows: &[usize], mu: &mut Vec<T>) -> Result<()> {
         self.advance(&[], &[]);
-        self.constraints.0.gap(self.t, self.shifted, &mut self.buffers.gaps);
+        self.read_gaps()?;
         let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
         let Buffers { s, jump, tolerance, bounds, gaps, .. } = &mut **buffers;
         projection.assemble(g, rows, s);

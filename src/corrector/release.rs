@@ -39,9 +39,8 @@ impl<T: Real> Corrector<T> for Release {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.each_opened(|step, row| {
             let energy = step.contacts().dissipated()[row].max(T::zero());
-            step.exchange_energy(row, energy);
-        });
-        Ok(())
+            step.exchange_energy(row, energy)
+        })
     }
 }
 
@@ -98,8 +97,7 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
         super::PersistencyCorrection::new().correct(step)?;
         step.each_opened(|step, row| {
             let impulse = T::of(0.5 * self.transit) * step.previous_force(row).max(T::zero());
-            step.apply_impulses(&[row], &[impulse]);
-        });
-        Ok(())
+            step.apply_impulses(&[row], &[impulse])
+        })
     }
 }

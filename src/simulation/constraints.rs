@@ -142,6 +142,9 @@ impl<'a, T: Real> Constraints<'a, T> {
     fn follow_part(&mut self, constraint: usize, t: f64, u: &[T]) -> Result<Candidates> {
         self.parts[constraint].follow(t, u).map_err(|error| match error {
             Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
+            Error::ContactNotFinite { t, what, contact, value } => {
+                Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }
+            }
             other => other,
         })
     }
@@ -186,9 +189,15 @@ impl<'a, T: Real> Constraints<'a, T> {
                 ids.push(ContactId { constraint, feature, candidate });
                 let law = part.law(row);
                 law.check()?;
+                law.check_scalar::<T>()?;
                 admitted.check(law)?;
                 laws.push(law);
-                magnitudes.push(part.magnitude(row));
+                let magnitude = part.magnitude(row);
+                if !magnitude.is_finite() {
+                    let (what, value) = ("the magnitude of the coordinates of a contact row", magnitude.value());
+                    return Err(Error::NotFinite { what, index: before + row, value });
+                }
+                magnitudes.push(magnitude);
                 for (dof, weight) in jacobian.row(before + row) {
                     if dof >= dofs {
                         return Err(Error::MissingDof { what: "a contact row", dof, dofs });
@@ -242,18 +251,39 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Gaps of all rows, refusing NaN and infinity.
     pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
-        self.gap(t, u, out);
-        self.refuse_infinite(t, out)
+        let mut rest = &mut *out;
+        for part in &mut self.parts {
+            let (own, others) = rest.split_at_mut(part.candidates());
+            part.gap(t, u, own);
+            rest = others;
+        }
+        self.refuse_infinite(t, "the gap", out)
     }
 
-    /// Refuses gaps that are NaN or infinite.
-    pub(crate) fn refuse_infinite(&self, t: f64, out: &[T]) -> Result<()> {
-        match out[..self.len()].iter().position(|gap| !gap.is_finite()) {
+    /// Refuses values of the rows that are NaN or infinite.
+    fn refuse_infinite(&self, t: f64, what: &'static str, out: &[T]) -> Result<()> {
+        match out[..self.len()].iter().position(|value| !value.is_finite()) {
             None => Ok(()),
-            Some(row) => {
-                Err(Error::ContactNotFinite { t, what: "the gap", contact: self.ids[row], value: out[row].value() })
+            Some(row) => Err(Error::ContactNotFinite { t, what, contact: self.ids[row], value: out[row].value() }),
+        }
+    }
+
+    /// What the gap rates of all rows have of their own, refusing NaN and infinity.
+    pub(crate) fn finite_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        let mut rest = &mut *out;
+        for part in &mut self.parts {
+            let (own, others) = rest.split_at_mut(part.candidates());
+            part.rates(t, u, v, own);
+            rest = others;
+        }
+        for (&contact, rates) in self.ids.iter().zip(&*out) {
+            for (what, value) in [("the gap rate", rates.rate), ("the gap acceleration", rates.acceleration)] {
+                if !value.is_finite() {
+                    return Err(Error::ContactNotFinite { t, what, contact, value: value.value() });
+                }
             }
         }
+        Ok(())
     }
 
     /// (contact, row) of the contacts of a state that are candidates still: a search may have found others since.
@@ -292,22 +322,8 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
         self.laws[row]
     }
 
-    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
-        let mut rest = out;
-        for part in &mut self.parts {
-            let (own, others) = rest.split_at_mut(part.candidates());
-            part.gap(t, u, own);
-            rest = others;
-        }
-    }
-
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
-        let mut rest = out;
-        for part in &mut self.parts {
-            let (own, others) = rest.split_at_mut(part.candidates());
-            part.rates(t, u, v, own);
-            rest = others;
-        }
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        self.finite_rates(t, u, v, out)
     }
 
     fn elsewhere(
@@ -344,6 +360,6 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
             found.and(back)?;
             first += count;
         }
-        Ok(())
+        self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
     }
 }

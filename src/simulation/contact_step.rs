@@ -111,7 +111,7 @@ impl<T: Real> ContactRowsWork<T> {
         measure.fill(Measure::AsScheme);
         let (Some(start), true) = (past.first(), constraints.reads_start()) else { return Ok(()) };
         constraints.finite_gaps(start.t, &start.u, start_gap)?;
-        constraints.rates(start.t, &start.u, &start.v, rates);
+        constraints.finite_rates(start.t, &start.u, &start.v, rates)?;
         for row in (0..constraints.len()).filter(|&row| constraints.law(row).reads_start()) {
             let approach = T::of(h) * (g.product(row, &start.v) + rates[row].rate).abs();
             let rounded = constraints.gap_rounding(row, g.magnitude(row, &start.u), start_gap[row]);
@@ -149,12 +149,12 @@ impl<T: Real> ContactRowsWork<T> {
         g: &ContactJacobian<T>,
         new: &Motion<T>,
         lacking: Option<&[T]>,
-    ) {
+    ) -> Result<()> {
         if !constraints.reads_start() {
-            return;
+            return Ok(());
         }
         let Self { rates, y, tolerance, measure, start_gap, .. } = self;
-        constraints.rates(new.t, &new.u, &new.v, rates);
+        constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
         let (h, weight) = (T::of(h), stage.recovery.weights()[1]);
         for row in 0..constraints.len() {
             match measure[row] {
@@ -172,6 +172,7 @@ impl<T: Real> ContactRowsWork<T> {
                 }
             }
         }
+        Ok(())
     }
 
     /// Keeps the gaps of the balance, to which the inertia of compliant laws is added next.
@@ -198,7 +199,7 @@ impl<T: Real> ContactRowsWork<T> {
         let h = level.clock.h;
         let (t, values) = level.place(new, target);
         if level.is_velocity() {
-            constraints.rates(t, &new.u, &new.v, rates);
+            constraints.finite_rates(t, &new.u, &new.v, rates)?;
             for row in 0..constraints.len() {
                 y[row] = g.product(row, values) + T::of(h) * rates[row].rate;
                 if !y[row].is_finite() {
@@ -216,7 +217,7 @@ impl<T: Real> ContactRowsWork<T> {
             };
         }
         if approach > 0.0 {
-            constraints.rates(new.t, &new.u, &new.v, rates);
+            constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
             for row in 0..constraints.len() {
                 let rate = g.product(row, &new.v) + rates[row].rate;
                 tolerance[row] += T::of(approach * h) * rate.abs();
@@ -415,16 +416,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
         self.place(new, work);
         if self.constraints.has_compliant() {
             self.balance_gaps(new, work)?;
-            self.add_inertia(new, work);
+            self.add_inertia(new, work)?;
             if self.press_without_coupling(operator, work)? {
                 self.place(new, work);
                 self.balance_gaps(new, work)?;
-                self.add_inertia(new, work);
+                self.add_inertia(new, work)?;
             }
         }
         self.evaluate(new, work)?;
-        self.restitution(past, &mut work.rows);
-        Ok(())
+        self.restitution(past, &mut work.rows)
     }
 
     /// Sets the weights of d in what the rows constrain by the scheme and by compliant laws.
@@ -441,8 +441,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Workspace { rows, interface, .. } = work;
         rows.evaluate(&Level { target: stage.contact.as_ref(), clock: *clock }, constraints, g, new, 0.0)?;
         rows.decide(constraints);
-        rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment));
-        Ok(())
+        rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment))
     }
 
     /// Decides which rows the problem begins with, and says whether any has to press.
@@ -505,9 +504,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 
     /// Adds the inertia of compliant laws to the gaps of the balance.
-    pub(super) fn add_inertia(&mut self, new: &Motion<T>, work: &mut Workspace<T>) {
+    pub(super) fn add_inertia(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<()> {
         if self.constraints.laws().iter().all(|law| law.inertia() == 0.0) {
-            return;
+            return Ok(());
         }
         let [_, _, balance_a] = self.weights();
         let (t, motion) = self.balanced(new, work.balance.as_ref());
@@ -519,13 +518,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
             *a = if known { motion.a[dof] } else { T::zero() } + balance_a * d;
         }
-        constraints.rates(t, &motion.u, &motion.v, &mut rows.rates);
+        constraints.finite_rates(t, &motion.u, &motion.v, &mut rows.rates)?;
         let forces = rows.curved.forces(g);
         for row in 0..constraints.len() {
             let inertia = T::of(constraints.law(row).inertia());
             let acceleration = forces.interface_product(row, response) + rows.rates[row].acceleration;
             rows.balance_gap[row] += inertia * acceleration;
         }
+        Ok(())
     }
 
     /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are any.
@@ -556,13 +556,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 
     /// Adds e times the rate at the start of the stage to the rows under Newton's impact law.
-    fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) {
+    fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
         let restores = |law: ContactLaw| matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
-        let (Some(start), true) = (past.first(), constraints.laws().iter().any(|&law| restores(law))) else { return };
+        let (Some(start), true) = (past.first(), constraints.laws().iter().any(|&law| restores(law))) else {
+            return Ok(());
+        };
         let h = T::of(clock.h);
-        constraints.rates(start.t, &start.u, &start.v, &mut rows.rates);
+        constraints.finite_rates(start.t, &start.u, &start.v, &mut rows.rates)?;
         for row in 0..constraints.len() {
             if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
                 let rate = g.product(row, &start.v) + T::of(lead) * h * g.product(row, &start.a) + rows.rates[row].rate;
@@ -570,6 +572,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 rows.tolerance[row] += rounding(h * g.magnitude(row, &start.v));
             }
         }
+        Ok(())
     }
 
     /// Solves for the multipliers, laws linearized again until they are met.
@@ -738,7 +741,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         row.predict_at(past, constraints.interface(), forecast);
         support(t_forecast, forecast, |support, _| support[0])?;
         constraints.finite_gaps(t_forecast, forecast, y)?;
-        constraints.rates(t, &new.u, &new.v, rates);
+        constraints.finite_rates(t, &new.u, &new.v, rates)?;
         for row in 0..constraints.len() {
             // A sliver of one step's approach counts as touching, as at position level.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
@@ -766,7 +769,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
             }
         }
-        rows.measure(stage, clock.h, constraints, g, new, None);
+        rows.measure(stage, clock.h, constraints, g, new, None)?;
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();

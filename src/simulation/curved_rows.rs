@@ -95,10 +95,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
         interface.forces.fill(T::zero());
         if self.constraints.has_compliant() {
             self.balance_gaps_from_tried(work);
-            self.add_inertia(new, work);
+            self.add_inertia(new, work)?;
             if self.press_without_coupling(operator, work)? {
                 self.balance_gaps_from_tried(work);
-                self.add_inertia(new, work);
+                self.add_inertia(new, work)?;
             }
         }
         let Workspace { rows, interface, .. } = work;

@@ -2,7 +2,7 @@
 
 use super::Constraints;
 use crate::contact::ContactJacobian;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{ContactState, State};
 use crate::system::{Damping, System};
@@ -22,6 +22,13 @@ impl<T: Real> Energy<T> {
     /// Kinetic plus potential energy.
     pub fn total(&self) -> T {
         self.kinetic + self.potential.unwrap_or(T::zero())
+    }
+
+    /// Refuses energies and works that are NaN or infinite.
+    pub(super) fn check(&self, t: f64) -> Result<()> {
+        finite(t, "the kinetic energy", self.kinetic)?;
+        finite(t, "the potential energy", self.potential.unwrap_or(T::zero()))?;
+        self.works.map_or(Ok(()), |works| works.check(t))
     }
 }
 
@@ -44,6 +51,26 @@ pub struct Works<T> {
     pub remainder: T,
 }
 
+impl<T: Real> Works<T> {
+    /// Refuses works that are NaN or infinite.
+    fn check(&self, t: f64) -> Result<()> {
+        let Self { load, supports, damping, contact, corrections, remainder } = *self;
+        finite(t, "the work of the load", load)?;
+        finite(t, "the work of the supports", supports)?;
+        finite(t, "the work of damping", damping)?;
+        finite(t, "the work of contact", contact)?;
+        finite(t, "the work of corrections", corrections)?;
+        finite(t, "the remainder of the works", remainder)
+    }
+}
+
+fn finite<T: Real>(t: f64, what: &'static str, value: T) -> Result<()> {
+    match value.is_finite() {
+        true => Ok(()),
+        false => Err(Error::EnergyNotFinite { t, what, value: value.value() }),
+    }
+}
+
 /// Accumulates [`Works`]; costs one load, one product with C and, with supports, one evaluation of f a step.
 #[derive(Debug)]
 pub(crate) struct Ledger<T> {
@@ -55,9 +82,12 @@ pub(crate) struct Ledger<T> {
     residual: Vec<T>,
     power: T,
     reactions: Vec<T>,
-    /// Gᵀ λ of the last step and of the one before, one entry a dof.
+    next_reactions: Vec<T>,
+    /// Gᵀ λ at the start and at the end of a step, one entry a dof.
     contact: Vec<T>,
-    old_contact: Vec<T>,
+    next_contact: Vec<T>,
+    /// Works and damping power at the end of a step that is not accepted yet.
+    next: (Works<T>, T),
 }
 
 /// The constraints and their rows of G.
@@ -90,10 +120,14 @@ impl<T: Real> Ledger<T> {
             residual: zero(),
             power: T::zero(),
             reactions: vec![T::zero(); system.prescribed().len()],
+            next_reactions: vec![T::zero(); system.prescribed().len()],
             contact: zero(),
-            old_contact: zero(),
+            next_contact: zero(),
+            next: (Works::default(), T::zero()),
         };
-        ledger.start = energy(system, state, None).total();
+        let energy = energy(system, state, None);
+        energy.check(state.time())?;
+        ledger.start = energy.total();
         ledger.restart(system, state, rows)?;
         Ok(ledger)
     }
@@ -105,9 +139,15 @@ impl<T: Real> Ledger<T> {
         state: &State<T>,
         rows: Rows<'_, '_, T>,
     ) -> Result<()> {
-        self.reactions = reactions(system, state, rows)?;
-        self.power = self.damping_power(system, state.displacement(), state.velocity());
-        system.external_load(state.time(), &mut self.load);
+        let reactions = reactions(system, state, rows)?;
+        let power = self.damping_power(system, state.displacement(), state.velocity());
+        system.external_load(state.time(), &mut self.old_load);
+        let sums = [reactions.iter().copied().sum(), power, self.old_load.iter().copied().sum()];
+        for (what, value) in ["the force of the supports", "the power of damping", "the load"].into_iter().zip(sums) {
+            finite(state.time(), what, value)?;
+        }
+        (self.reactions, self.power) = (reactions, power);
+        std::mem::swap(&mut self.load, &mut self.old_load);
         let (constraints, g) = rows;
         self.contact.fill(T::zero());
         for (contact, row) in constraints.rows_of(&state.contacts) {
@@ -128,43 +168,46 @@ impl<T: Real> Ledger<T> {
         self.old_u.copy_from_slice(state.displacement());
     }
 
-    /// What may fail, before the step is accepted: the forces of the supports.
+    /// Prepares the books of a step before it is accepted, which may fail.
     pub(crate) fn prepare(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) -> Result<()> {
         if !system.prescribed().is_empty() {
             balance_residual(system, books.t, books.motion, &books.contacts.lambda, books.g, &mut self.residual)?;
         }
-        Ok(())
-    }
-
-    /// Books an accepted step.
-    pub(crate) fn end(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) {
         let half = T::of(0.5);
         let [u, v, _] = books.motion;
-        let works = &mut self.works;
-        for (reaction, &dof) in self.reactions.iter_mut().zip(system.prescribed()) {
-            let mean = half * (*reaction + self.residual[dof]);
+        let mut works = self.works;
+        for ((&reaction, next), &dof) in self.reactions.iter().zip(&mut self.next_reactions).zip(system.prescribed()) {
+            *next = self.residual[dof];
+            let mean = half * (reaction + *next);
             works.supports += mean * (u[dof] - self.old_u[dof]);
-            *reaction = self.residual[dof];
         }
-        std::mem::swap(&mut self.load, &mut self.old_load);
-        system.external_load(books.t, &mut self.load);
+        // The spare vector takes the load at the end, until the step is accepted.
+        system.external_load(books.t, &mut self.old_load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
-        let loads = self.load.iter().zip(&self.old_load).map(|(&new, &old)| half * (new + old));
+        let loads = self.load.iter().zip(&self.old_load).map(|(&old, &new)| half * (old + new));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
-        std::mem::swap(&mut self.contact, &mut self.old_contact);
-        self.contact.fill(T::zero());
+        self.next_contact.fill(T::zero());
         for (row, &force) in books.contacts.lambda.iter().enumerate() {
-            books.forces.scatter(row, force, &mut self.contact);
+            books.forces.scatter(row, force, &mut self.next_contact);
         }
         // In the middle of the step, on the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
-        let forces = self.contact.iter().zip(&self.old_contact).map(|(&new, &old)| old + newest * (new - old));
+        let forces = self.contact.iter().zip(&self.next_contact).map(|(&old, &new)| old + newest * (new - old));
         works.contact += moves.zip(forces).map(|(du, f)| du * f).sum();
         works.corrections += books.corrections;
-        let old_power = self.power;
-        self.power = self.damping_power(system, u, v);
-        self.works.damping += half * (old_power + self.power) * T::of(books.h);
+        let power = self.damping_power(system, u, v);
+        works.damping += half * (self.power + power) * T::of(books.h);
+        self.next = (works, power);
+        works.check(books.t)
+    }
+
+    /// Books an accepted step.
+    pub(crate) fn end(&mut self) {
+        (self.works, self.power) = self.next;
+        std::mem::swap(&mut self.load, &mut self.old_load);
+        std::mem::swap(&mut self.reactions, &mut self.next_reactions);
+        std::mem::swap(&mut self.contact, &mut self.next_contact);
     }
 
     fn works(&self, total: T) -> Works<T> {

@@ -119,7 +119,7 @@ impl<T: Real> Simulation<'_, T> {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
             projection.close(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
-                project(motion, constraints, g, &mut projection, &closed);
+                project(motion, constraints, g, &mut projection, &closed)?;
             }
         }
         Ok(past)
@@ -298,16 +298,17 @@ fn project<T: Real>(
     g: &ContactJacobian<T>,
     projection: &mut JumpProjection<T>,
     closed: &[usize],
-) {
+) -> Result<()> {
     let mut gaps = vec![T::zero(); constraints.len()];
     let mut rates = vec![GapRates::default(); constraints.len()];
     let mut multipliers = vec![T::zero(); closed.len()];
-    constraints.gap(motion.t, &motion.u, &mut gaps);
+    constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
     let targets: Vec<T> = closed.iter().map(|&row| g.product(row, &motion.u) - gaps[row]).collect();
     projection.remove_jump(g, &targets, &mut motion.u, &mut multipliers);
-    constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+    constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
     let targets: Vec<T> = closed.iter().map(|&row| -rates[row].rate).collect();
     projection.remove_jump(g, &targets, &mut motion.v, &mut multipliers);
     let targets: Vec<T> = closed.iter().map(|&row| -rates[row].acceleration).collect();
     projection.remove_jump(g, &targets, &mut motion.a, &mut multipliers);
+    Ok(())
 }

@@ -6,6 +6,9 @@ use crate::real::Real;
 use crate::state::Motion;
 use crate::tableau::{StartUp, Tableau};
 
+/// Dofs a block: what it touches stays in the first-level cache until it has been looked at.
+const BLOCK: usize = 1024;
+
 /// An integrator, its tableau, and the numbers derived from it once.
 #[derive(Debug)]
 pub(super) struct Scheme<'a> {
@@ -54,25 +57,33 @@ impl<'a> Scheme<'a> {
     }
 
     /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown as
-    /// they are. Prescribed motions are given at the time of the state.
+    /// they are. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is finite.
     pub(super) fn show<T: Real>(
         &self,
         new: &Motion<T>,
         past: Option<&Motion<T>>,
         prescribed: &[usize],
         shown: &mut [Vec<T>; 2],
-    ) {
+    ) -> bool {
+        let mut finite = true;
         for (field, (shift, shown)) in (1..).zip(self.shifts.into_iter().zip(shown)) {
             if shift != 0.0 {
                 let now = new.field(field);
                 match past {
                     None => shown.copy_from_slice(now),
-                    Some(past) => T::combine(&[(T::one(), now)], &[(T::of(shift), past.field(field))], now, shown),
+                    Some(past) => {
+                        let blocks = now.chunks(BLOCK).zip(past.field(field).chunks(BLOCK));
+                        for ((now, past), shown) in blocks.zip(shown.chunks_mut(BLOCK)) {
+                            T::combine(&[(T::one(), now)], &[(T::of(shift), past)], now, shown);
+                            finite &= T::all_finite(shown);
+                        }
+                    }
                 }
                 for &dof in prescribed {
                     shown[dof] = new.field(field)[dof];
                 }
             }
         }
+        finite
     }
 }

@@ -1,6 +1,7 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
 
 use super::Constraints;
+use super::finite::check_state;
 use super::scheme::Scheme;
 use super::step::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
@@ -80,7 +81,9 @@ impl<T: Real> Start<'_, T> {
             slopes: self.massless.iter().map(|&dof| motion.v[dof]).collect(),
             scheme: scheme.integrator.name(),
         };
-        Ok((State { motion, shown, contacts }, history))
+        let state = State { motion, shown, contacts };
+        check_state(h, &state)?;
+        Ok((state, history))
     }
 
     /// Motion and contacts at the start: supports in place, M a = f + Gᵀ λ with 0 ≤ λ ⊥ g̈ ≥ 0 on contacts at rest.
@@ -150,7 +153,7 @@ impl<T: Real> Start<'_, T> {
                 (forces[dof], unit[dof]) = (force, T::one());
             }
             let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
-            let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching);
+            let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching)?;
             problem.rows.retain(|&row| g.acts_on(row, massless));
             problem.offset = (0..constraints.len()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..constraints.len()).map(|row| rounding(g.magnitude(row, &forces))).collect();
@@ -160,9 +163,9 @@ impl<T: Real> Start<'_, T> {
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let mut problem = match contact.lead() > 0.0 {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
-            false => StartProblem::at_rest(constraints, g, &motion, h, &touching),
+            false => StartProblem::at_rest(constraints, g, &motion, h, &touching)?,
         };
-        problem.add_inertial(constraints, g, &motion, &contacts.gap);
+        problem.add_inertial(constraints, g, &motion, &contacts.gap)?;
         problem.rows.retain(|row| !solved.contains(row));
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts);
@@ -194,9 +197,9 @@ impl<T: Real> StartProblem<T> {
         motion: &Motion<T>,
         h: f64,
         touching: &[bool],
-    ) -> Self {
+    ) -> Result<Self> {
         let mut rates = vec![GapRates::default(); constraints.len()];
-        constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+        constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
         let rows = (0..constraints.len()).filter(|&row| {
             let rate = g.product(row, &motion.v) + rates[row].rate;
             // The sliver of approach that counts as touching does not count as rest.
@@ -205,7 +208,7 @@ impl<T: Real> StartProblem<T> {
             constraints.law(row).is_equality() || touching[row] && still
         });
         let own = |row: usize| rates[row].acceleration;
-        Self {
+        Ok(Self {
             rows: rows.collect(),
             waiting: Vec::new(),
             offset: (0..constraints.len()).map(|row| g.product(row, &motion.a) + own(row)).collect(),
@@ -214,7 +217,7 @@ impl<T: Real> StartProblem<T> {
                 .collect(),
             compliance: vec![T::zero(); constraints.len()],
             lambda: Vec::new(),
-        }
+        })
     }
 
     /// Adds the laws whose force depends on the acceleration: 0 ≤ g̈ + (k g + λ)/m ⊥ λ ≥ 0.
@@ -224,13 +227,13 @@ impl<T: Real> StartProblem<T> {
         g: &ContactJacobian<T>,
         motion: &Motion<T>,
         gaps: &[T],
-    ) {
+    ) -> Result<()> {
         let inertia = |law: ContactLaw| T::of(law.inertia());
         if constraints.laws().iter().all(|&law| inertia(law) == T::zero()) {
-            return;
+            return Ok(());
         }
         let mut rates = vec![GapRates::default(); constraints.len()];
-        constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+        constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if inertia(law) > T::zero() {
@@ -246,6 +249,7 @@ impl<T: Real> StartProblem<T> {
             }
         }
         self.rows.sort_unstable();
+        Ok(())
     }
 
     /// Contacts that would violate the condition which the scheme imposes ahead of the state.
@@ -276,7 +280,6 @@ impl<T: Real> StartProblem<T> {
                 }
                 let there = (t, [&target[..], &motion.v, &motion.a]);
                 constraints.elsewhere(0, there, (motion.t, &motion.u), &mut y)?;
-                constraints.refuse_infinite(t, &y)?;
                 (0.5 * lead * lead, vec![true; constraints.len()])
             }
             ContactLevel::Velocity { .. } => {
@@ -286,11 +289,11 @@ impl<T: Real> StartProblem<T> {
                     target[dof] = support[1];
                 }
                 let mut rates = vec![GapRates::default(); constraints.len()];
-                constraints.rates(t, &motion.u, &motion.v, &mut rates);
+                constraints.finite_rates(t, &motion.u, &motion.v, &mut rates)?;
                 for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
                     *y = g.product(row, &target) + rate.rate;
                 }
-                constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+                constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
                 for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
                     if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
                         *y += T::of(coefficient) * (g.product(row, &motion.v) + rate.rate);
@@ -398,7 +401,7 @@ fn touching_contacts<T: Real>(
     let mut touching = Vec::with_capacity(constraints.len());
     let mut rates = vec![GapRates::default(); constraints.len()];
     constraints.finite_gaps(motion.t, &motion.u, &mut contacts.gap)?;
-    constraints.rates(motion.t, &motion.u, &motion.v, &mut rates);
+    constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
     for (row, rates) in rates.iter().enumerate() {
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];

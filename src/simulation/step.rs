@@ -4,6 +4,7 @@ use super::contact_step::ContactStep;
 use super::control::Verdict;
 use super::curved_rows::FOLLOWED;
 use super::energy::StepBooks;
+use super::finite::{Extent, check_contacts, check_motion};
 use super::operator::Operator;
 use super::program::CompiledStage;
 use super::{Constraints, Simulation, Statistics, Workspace};
@@ -11,6 +12,7 @@ use crate::contact::ContactJacobian;
 use crate::contact_solver::{ContactFailure, ContactSolver};
 use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme, contact_error};
 use crate::error::{Error, Result};
+use crate::mass::Mass;
 use crate::real::Real;
 use crate::real::kernels::Accumulate;
 use crate::state::{Clock, Motion};
@@ -64,12 +66,30 @@ impl<T: Real> Simulation<'_, T> {
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
     /// undone.
     fn accept(&mut self) -> Result<Verdict> {
-        let Self { system, g, state, history, work, statistics, ledger, scheme, judge, .. } = self;
+        let Self { system, constraints, g, state, history, work, statistics, ledger, scheme, judge, .. } = self;
         let stages = work.backup.rotations;
         let flags = work.trial.closed.iter().zip(&work.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
-        scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.prescribed, &mut work.shown);
+        let finite = scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.prescribed, &mut work.shown);
+        let step = (history.clock.at(0.0), history.clock.h);
+        // Recovery has looked at what it wrote. Left are dofs whose velocity is differenced, and what corrections have edited.
+        let touched = work.buffers.has_touched() && work.projection.is_some();
+        let spreads = work.buffers.spreads() || matches!(system.mass(), Mass::Consistent(_));
+        let extent = match work.newton.is_some() || touched && spreads {
+            true => Extent::All,
+            false => Extent::At([&work.massless, if constraints.len() > 0 { constraints.interface() } else { &[] }]),
+        };
+        check_motion(step.0, step.1, [&new.u, &new.v, &new.a], extent)?;
+        if touched {
+            for motion in work.backup.edited(past) {
+                check_motion(step.0, step.1, [&motion.u, &motion.v, &motion.a], extent)?;
+            }
+        }
+        if !finite {
+            check_motion(step.0, step.1, [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)], Extent::All)?;
+        }
+        check_contacts(new.t, &work.trial)?;
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         if let Some(judge) = judge {
             let verdict = judge.judge([motion[0], motion[1]], &work.prescribed, history.clock.h, changes);
@@ -87,7 +107,7 @@ impl<T: Real> Simulation<'_, T> {
         }
         system.commit(new.t, motion[0], motion[1])?;
         if let Some(ledger) = ledger {
-            ledger.end(&mut **system, &books);
+            ledger.end();
         }
         // The stages between drop out of the past.
         history.slots[1..].rotate_left(stages - 1);
@@ -275,7 +295,10 @@ impl<T: Real> StageSolve<'_, '_, T> {
         match T::recover(recovery.weights(), &work.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
             true => Ok(()),
             // (What has been written is undone with the step.)
-            false => self.refuse_nan(&work.increment, "the increment"),
+            false => {
+                self.refuse_nan(&work.increment, "the increment")?;
+                check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
+            }
         }
     }
 
