@@ -49,6 +49,16 @@ pub(crate) struct Scheme<'a> {
     pub(crate) covector: &'a [[f64; 3]],
     /// Which entries of the past later rows read.
     pub(crate) read: &'a [[bool; 3]],
+    /// This stage, from 0, and the number of stages of a step.
+    pub(crate) stage: usize,
+    pub(crate) stages: usize,
+}
+
+impl Scheme<'_> {
+    /// Whether the state of the stage is that of the step.
+    fn is_last(&self) -> bool {
+        self.stage + 1 == self.stages
+    }
 }
 
 /// Which jump is removed.
@@ -157,6 +167,8 @@ pub(crate) struct Buffers<T> {
     pub(super) engaged: Vec<usize>,
     /// Rows that have opened in this stage.
     pub(crate) opened: Vec<usize>,
+    /// Rows that were closed in this step or at its start, and are open now.
+    pub(crate) released: Vec<usize>,
     /// Reported forces before this stage, one a candidate.
     pub(crate) reported: Vec<T>,
     pub(super) bounds: Vec<Bound>,
@@ -184,6 +196,7 @@ impl<T: Real> Buffers<T> {
             closed: Vec::with_capacity(rows),
             engaged: Vec::with_capacity(rows),
             opened: Vec::with_capacity(rows),
+            released: Vec::with_capacity(rows),
             reported: reals(rows),
             bounds: Vec::with_capacity(rows),
             jump: reals(rows),
@@ -199,9 +212,21 @@ impl<T: Real> Buffers<T> {
         }
     }
 
+    /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
+    pub(crate) fn report(&mut self, contacts: &ContactState<T>, first: bool) {
+        if first {
+            self.reported.clone_from(&contacts.lambda);
+        }
+        for ((reported, &lambda), &closed) in self.reported.iter_mut().zip(&contacts.lambda).zip(&contacts.closed) {
+            if closed {
+                *reported = lambda;
+            }
+        }
+    }
+
     /// Whether the last stage had contacts to correct.
     pub(crate) fn has_touched(&self) -> bool {
-        !self.closed.is_empty() || !self.opened.is_empty()
+        !self.closed.is_empty() || !self.opened.is_empty() || !self.released.is_empty()
     }
 
     /// Whether damping carries corrections of v to the accelerations of all dofs.
@@ -236,7 +261,7 @@ impl<T: Real> Correction<'_, T> {
         &self.buffers.opened
     }
 
-    /// Reported force of a row before this stage.
+    /// Reported force of a row before this stage, or when it was last closed in this step.
     pub fn previous_force(&self, row: usize) -> T {
         self.buffers.reported[row]
     }
@@ -362,6 +387,10 @@ impl<T: Real> Correction<'_, T> {
         // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
         // obstacle's.
         for ((&row, &impulse), &before) in rows.iter().zip(impulses.iter()).zip(jump.iter()) {
+            // (States between stages are not shown: what they lose of v is not lost by the step.)
+            if !scheme.is_last() {
+                continue;
+            }
             let gain = impulse * T::of(0.5) * (before + g.product(row, &new.v));
             **energy += gain;
             // An obstacle that moves does work; what is lost is lost in its frame.
@@ -456,6 +485,52 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
+    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can tell:
+    /// the bodies leave each other with that energy more, and the past that later rows read has had the same velocity.
+    pub(super) fn give_back(&mut self, row: usize) -> Result<()> {
+        let (s, rate) = (self.compliance(row), self.rate(row)?);
+        let taken = self.contacts.dissipated[row];
+        // Of the relative velocity u = G v + ġ0, which is left of larger numbers, j u is noise of this size.
+        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        if !(s > T::zero() && T::of(2.0) * s * taken > noise * noise) {
+            return Ok(());
+        }
+        // Without cancellation: ½ S j² + j rate = taken.
+        let root = (rate * rate + T::of(2.0) * s * taken).sqrt();
+        let impulse = match rate > T::zero() {
+            true => T::of(2.0) * taken / (root + rate),
+            false => (root - rate) / s,
+        };
+        self.apply(&[row], &[impulse]);
+        self.move_past(row, impulse)
+    }
+
+    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later rows read
+    /// them. Schemes that difference displacements would see a part of it else, or more than all.
+    fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
+        let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
+        // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
+        let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));
+        let first = scheme.stages;
+        if (first..=places).any(|k| scheme.read[k][0] || scheme.read[k][1]) {
+            backup.check()?;
+            backup.keep(past);
+        }
+        for k in first..=places {
+            let (motion, steps) = (&mut past[k - 1], (k + 1 - scheme.stages) as f64);
+            let [by_u, by_v, _] = scheme.covector[k];
+            if scheme.read[k][0] {
+                projection.push(g, row, T::of(-steps * *h) * impulse, &mut motion.u);
+                contacts.impulse[row] -= T::of(steps * by_u) * impulse;
+            }
+            if scheme.read[k][1] {
+                projection.push(g, row, impulse, &mut motion.v);
+                contacts.impulse[row] += T::of(by_v) * impulse;
+            }
+        }
+        Ok(())
+    }
+
     /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
     /// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
     /// (u, h v, h² a) to a multiplier.
@@ -545,6 +620,17 @@ impl<T: Real> Correction<'_, T> {
         (0..self.buffers.opened.len()).try_for_each(|i| each(self, self.buffers.opened[i]))
     }
 
+    /// In the last stage of a step calls a function with every row that was closed in this step, or at its start, and is open at
+    /// its end, up to its first error. Velocities between stages are not read again by every scheme: what is to last is given
+    /// to the state at the end.
+    ///
+    /// # Errors
+    ///
+    /// That of the function.
+    pub fn each_released(&mut self, mut each: impl FnMut(&mut Self, usize) -> Result<()>) -> Result<()> {
+        (0..self.buffers.released.len()).try_for_each(|i| each(self, self.buffers.released[i]))
+    }
+
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
     /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the law
     /// reads the gap at the start of a stage.
@@ -578,8 +664,8 @@ impl<T: Real> Correction<'_, T> {
 
     /// Projects one field of past state k onto the engaged rows.
     fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, .. } = self;
-        let Buffers { gaps, jump, .. } = &mut **buffers;
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, energy, .. } = self;
+        let Buffers { gaps, rates, jump, tolerance: before, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
         // Of the past motion on its own part of a curved surface: u, v and a fit each other.
@@ -591,7 +677,18 @@ impl<T: Real> Correction<'_, T> {
         };
         jump.clear();
         jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
+        before.clear();
+        before.extend_from_slice(jump);
         projection.solve(jump);
+        // In a stage before the last the state that the step starts from loses what the later stages do not see any more.
+        if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
+            constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
+            for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
+                let taken = T::of(0.5) * multiplier * before;
+                contacts.dissipated[row] += taken;
+                **energy += multiplier * rates[row].rate - taken;
+            }
+        }
         let (values, unit) = match field {
             0 => (&mut motion.u, psi / h),
             1 => (&mut motion.v, psi),

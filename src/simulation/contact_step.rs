@@ -753,10 +753,16 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 
     /// Decides which contacts are closed, and starts the books of the stage: reported force, impulse, corrections.
-    pub(super) fn close(&mut self, new: &Motion<T>, impulse_weight: f64, work: &mut Workspace<T>) -> Result<()> {
+    pub(super) fn close(
+        &mut self,
+        new: &Motion<T>,
+        impulse_weight: f64,
+        is_last: bool,
+        work: &mut Workspace<T>,
+    ) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let first = work.backup.rotations == 1;
-        let Workspace { trial, rows, buffers, was_closed, massless, .. } = work;
+        let Workspace { trial, rows, buffers, was_closed, closed_at_start, massless, .. } = work;
         let level = Level { target: stage.contact.as_ref(), clock: *clock };
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
         match level.target {
@@ -774,6 +780,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();
         buffers.opened.clear();
+        buffers.released.clear();
         let impulse_weight = T::of(clock.h * impulse_weight);
         for (row, &was_closed) in was_closed.iter().enumerate() {
             let raw = trial.lambda_raw[row];
@@ -788,8 +795,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     (false, true) => buffers.opened.push(row),
                     (false, false) => {}
                 }
+                if is_last && !closed && (was_closed || closed_at_start[row]) {
+                    buffers.released.push(row);
+                }
             }
-            if closed && !was_closed {
+            if closed && !was_closed && !closed_at_start[row] {
                 trial.dissipated[row] = T::zero();
             }
             trial.lambda[row] = raw;

@@ -162,7 +162,7 @@ impl<T: Real> Simulation<'_, T> {
             predict(stage, clock, &mut **system, new, past, work)?;
             if let Some(projection) = &mut work.projection {
                 refresh(projection, &mut work.projected_rows, constraints.version());
-                work.buffers.reported.clone_from(&work.trial.lambda);
+                work.buffers.report(&work.trial, stages_before == 0);
                 if !work.shifted.is_empty() {
                     let mut prediction = Prediction {
                         h: clock.h * stage.end,
@@ -204,9 +204,9 @@ impl<T: Real> Simulation<'_, T> {
             if constraints.len() > 0 {
                 let solver = &mut **contact_solver;
                 let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
-                contact.close(new, stage.impulse_weight(covector), work)?;
-                let touched = !work.buffers.closed.is_empty() || !work.buffers.opened.is_empty();
-                if let Some(projection) = work.projection.as_mut().filter(|_| touched) {
+                let is_last = stages_before + 1 == program.stages.len();
+                contact.close(new, stage.impulse_weight(covector), is_last, work)?;
+                if let Some(projection) = work.projection.as_mut().filter(|_| work.buffers.has_touched()) {
                     refresh(projection, &mut work.projected_rows, constraints.version());
                     let mut correction = Correction {
                         h: clock.h,
@@ -217,6 +217,8 @@ impl<T: Real> Simulation<'_, T> {
                             balance: stage.balance_acceleration,
                             covector,
                             read: &stage.read,
+                            stage: stages_before,
+                            stages: program.stages.len(),
                         },
                         g,
                         projection,
