@@ -252,12 +252,12 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        if self.stability == Stability::Checked {
-            stability::check_scheme(&integrator.name(), &tableau)?;
-        }
         let admitted = admitted(&*integrator, &tableau);
         let (mut constraints, mut g) = Constraints::new(constraints, dofs, system.prescribed(), admitted)?;
         let rows = constraints.capacity();
+        if self.stability == Stability::Checked {
+            stability::check_scheme(&integrator.name(), &tableau)?;
+        }
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         if rows > 0 {
             check_corrections(&*integrator, &tableau, &self.correctors)?;
