@@ -57,10 +57,11 @@ impl<T: Real> DenseCholesky<T> {
 
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
-    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row. `Err(row)` if the
+    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row, and so does one that is no
+    /// more than the rounding of the combination of rows that it measures. `Err(row)` if the
     /// matrix is not finite or not semidefinite there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
-        let Self { l, first, diagonal, independent, kind, scratch, .. } = self;
+        let Self { l, first, diagonal, independent, kind, reduced, scratch, .. } = self;
         self.size = size;
         l.clear();
         l.resize(size * size, T::zero());
@@ -80,6 +81,7 @@ impl<T: Real> DenseCholesky<T> {
             }
         }
         let dependent = T::of(16.0 * size as f64) * T::epsilon();
+        let suspect = T::epsilon().powf(T::of(2.0 / 3.0)).max(dependent);
         independent.clear();
         if size >= BLOCKED && profile > size * size / 4 {
             *kind = Kind::Blocked;
@@ -89,7 +91,7 @@ impl<T: Real> DenseCholesky<T> {
                 }
             }
             let memory = scratch.get(<T as Kernels>::dense_cholesky_scratch(size));
-            let sound = |l: &[T], i: usize| l[i + i * size] * l[i + i * size] > dependent * diagonal[i];
+            let sound = |l: &[T], i: usize| l[i + i * size] * l[i + i * size] > suspect * diagonal[i];
             if T::dense_cholesky(size, l, memory) && (0..size).all(|i| sound(l, i)) {
                 independent.extend(0..size);
                 return Ok(());
@@ -114,7 +116,15 @@ impl<T: Real> DenseCholesky<T> {
                 };
             }
             let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
-            if pivot > dependent * diagonal[i] {
+            // What is left may be more than the rounding of the row's own diagonal entry, and rounding all the same: that of the
+            // rows before it, divided by the roots of their pivots.
+            let sound = pivot > dependent * diagonal[i]
+                && (pivot > suspect * diagonal[i] || {
+                    let length =
+                        combination(done, &row[..i], size, independent, diagonal, reduced) + diagonal[i].sqrt();
+                    pivot > T::of(32.0) * T::epsilon() * length * length
+                });
+            if sound {
                 row[i] = pivot.sqrt();
                 independent.push(i);
             } else {
@@ -272,6 +282,22 @@ impl<T: Real> DenseCholesky<T> {
             *x = columns.map(|(&i, &value)| l[k * n + i] * value).sum();
         }
     }
+}
+
+/// Length of the combination r of independent rows that is nearest to a row, from its entries of L: r = L⁻ᵀ l, measured as
+/// Σ |r_j| √A_jj. The pivot is what A leaves of the difference, and the rounding of A enters it times the square of its length.
+fn combination<T: Real>(l: &[T], row: &[T], size: usize, independent: &[usize], diagonal: &[T], r: &mut Vec<T>) -> T {
+    r.clear();
+    r.extend(independent.iter().map(|&j| row[j]));
+    for k in (0..r.len()).rev() {
+        let other = &l[independent[k] * size..];
+        r[k] /= other[independent[k]];
+        let value = r[k];
+        for (r, &j) in r[..k].iter_mut().zip(independent) {
+            *r -= value * other[j];
+        }
+    }
+    r.iter().zip(independent).map(|(r, &j)| r.abs() * diagonal[j].sqrt()).sum()
 }
 
 /// Σ x y in four partial sums, which the processor can work on at once.

@@ -341,7 +341,7 @@ fn guess_does_not_change_the_result() {
             // Pivoting starts anew, the active set makes sure.
             let fine = match name {
                 "pivoting" => warm == cold,
-                "active set" => warm == 1 || rank < size && warm <= cold + 1,
+                "active set" => warm == 1 || rank < size && warm <= cold + 2,
                 _ => warm == 0,
             };
             assert!(fine, "{name}: {warm} after {cold}");
@@ -449,6 +449,70 @@ fn problems_without_a_solution_are_refused() {
             // The exact solvers say that there is no solution, the iterative ones that they have found none.
             let told = matches!(failure, Err(ContactFailure::Contradictory { row, other, .. }) if row != other);
             assert!(failure.is_err() && told == exact, "{name}: {failure:?}");
+        }
+    }
+}
+
+/// The last row is a negative combination of the others, and cannot be met by a share of the offsets: however small this is beside
+/// the condition of W, in whatever unit each row is, nobody accepts it. Without the share all is well.
+#[test]
+fn small_contradictions_among_nearly_dependent_rows_are_no_rounding() {
+    let (mut numbers, mut active, mut pivoting) = (Random(13), ActiveSet::default(), Pivoting::default());
+    let (mut refused, mut solved) = (0, 0);
+    for case in 0..3000_usize {
+        let size = 2 + case % 12;
+        let spread = [0.0, 1.0, 2.0, 4.0][case % 4];
+        // Masses of a lumped system, over decades.
+        let inverse: Vec<f64> = (0..=size).map(|_| 10_f64.powf(numbers.within(-spread, spread) / 2.0)).collect();
+        let mut rows: Vec<Vec<f64>> =
+            (1..size).map(|_| inverse.iter().map(|m| m * numbers.within(-1.0, 1.0)).collect()).collect();
+        let mut offset: Vec<f64> = (1..size).map(|_| numbers.within(-1.0, 1.0)).collect();
+        let weights: Vec<f64> = (1..size).map(|_| numbers.within(0.1, 1.0)).collect();
+        let sum = |column: usize| weights.iter().zip(&rows).map(|(w, row)| w * row[column]).sum::<f64>();
+        rows.push((0..=size).map(|column| -sum(column)).collect());
+        let share = 10_f64.powf(numbers.within(-3.5, 0.0));
+        let room = weights.iter().zip(&offset).map(|(w, q)| w * q).sum::<f64>();
+        let contradicted = case % 2 == 0;
+        offset.push(if contradicted { -share - room } else { -room });
+        let problem = Problem::unilateral(&gram(&rows), &offset);
+        for guess in [vec![0.0; size], vec![1.0; size]] {
+            let (found, reference) = (solve(&mut active, &problem, &guess), solve(&mut pivoting, &problem, &guess));
+            match contradicted {
+                true => {
+                    assert!(found.is_err() && reference.is_err(), "case {case}: {found:?} {reference:?}");
+                    refused += 1;
+                }
+                false => {
+                    let residual = problem.residual(&found.unwrap_or_else(|e| panic!("case {case}: {e:?}")).0);
+                    assert!(residual < 1e-6, "case {case}: {residual:e}");
+                    solved += 1;
+                }
+            }
+        }
+    }
+    assert!(refused == 3000 && solved == 3000);
+}
+
+/// Many rows that all push one another, in single precision: what the sums of hundreds of terms lose is no violation.
+#[test]
+fn single_precision_judges_many_coupled_rows() {
+    for size in [100, 400, 900] {
+        for coupling in [0.01, 0.5] {
+            let entry = |k: usize| coupling + if k % (size + 1) == 0 { 1.0 - coupling } else { 0.0 };
+            let delassus: Vec<f64> = (0..size * size).map(entry).collect();
+            // λ* = 1 + sin² i where pressed, y* = 0.1 at each third row.
+            let open = |i: usize| i % 3 == 2;
+            let exact: Vec<f64> =
+                (0..size).map(|i| if open(i) { 0.0 } else { 1.0 + (i as f64).sin().powi(2) }).collect();
+            let total: f64 = exact.iter().sum();
+            let offset: Vec<f64> = (0..size)
+                .map(|i| if open(i) { 0.1 } else { 0.0 } - coupling * total - (1.0 - coupling) * exact[i])
+                .collect();
+            let problem = Problem::<f32>::unilateral(&delassus, &offset);
+            let (found, iterations) =
+                solve(&mut ActiveSet::default(), &problem, &vec![0.0; size]).unwrap_or_else(|e| panic!("{e:?}"));
+            assert!(iterations < 12, "{size} rows, {coupling}: {iterations} iterations");
+            assert!(problem.residual(&found) < 1e-5, "{size} rows, {coupling}: {:e}", problem.residual(&found));
         }
     }
 }

@@ -93,6 +93,9 @@ impl<T: Real> Settings<T> {
             return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
         }
         let scale = problem.offset.iter().fold(T::zero(), |scale, q| scale.max(q.abs()));
+        let alone = |i: usize| problem.offset[i].abs() / problem.delassus(i, i).sqrt();
+        let coupled = (0..problem.size()).filter(|&i| problem.delassus(i, i) > T::zero());
+        let reach = coupled.map(alone).fold(T::zero(), T::max);
         let accepted = self.tolerance * scale;
         let at_rest = |(&q, &bound): (&T, &Bound)| if bound == Bound::Free { q == T::zero() } else { q >= T::zero() };
         let open = problem.offset.iter().zip(problem.bounds).all(at_rest);
@@ -105,28 +108,45 @@ impl<T: Real> Settings<T> {
                 return Err(ContactFailure::NotConverged { iterations: 0, row: i, residual: miss });
             }
         }
-        Ok(Acceptance { problem, accepted, suspect: 0 })
+        let share = T::epsilon().powf(T::of(0.4));
+        Ok(Acceptance { problem, accepted, reach: share * reach, largest: share * T::of(32.0) * scale, suspect: 0 })
     }
 }
 
 /// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given
 /// fraction of the largest |q_i|.
 ///
-/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen.
+/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen. What counts
+/// as rounding is [bounded](Self::bears) by the problem: rows that contradict each other can be met but for the rounding of
+/// multipliers that grow beyond all bounds.
 #[derive(Debug)]
 pub(super) struct Acceptance<'a, T> {
     problem: &'a ContactProblem<'a, T>,
     accepted: T,
+    /// A small share of the largest |q_j|/√W_jj: row j closed alone takes the energy ½ (|q_j|/√W_jj)², and by Cauchy and Schwarz
+    /// this moves row i by at most √W_ii times the root. Light bodies would move far with the energy of heavy ones: the same
+    /// share of many times the largest |q_j| bounds what they do.
+    reach: T,
+    largest: T,
     /// The row that failed last, asked first: far from the solution one row costs the check.
     suspect: usize,
 }
 
 impl<T: Real> Acceptance<'_, T> {
+    /// Whether row i may miss complementarity by so much, whatever the multipliers are.
+    pub(super) fn bears(&self, i: usize, miss: T) -> bool {
+        let tolerance = self.problem.tolerance[i];
+        miss <= self.accepted.max(tolerance) || {
+            let moved = self.reach * self.problem.delassus(i, i).max(T::zero()).sqrt();
+            miss <= tolerance + moved.min(self.largest)
+        }
+    }
+
     pub(super) fn accepts(&mut self, multipliers: &[T]) -> bool {
         let fails = |i: &usize| {
             let miss = self.problem.miss(*i, multipliers);
             // NaN fails both.
-            let fine = miss <= self.accepted || miss <= self.problem.rounding(*i, multipliers);
+            let fine = miss <= self.accepted || miss <= self.problem.rounding(*i, multipliers) && self.bears(*i, miss);
             !fine
         };
         let size = self.problem.size();
@@ -137,7 +157,10 @@ impl<T: Real> Acceptance<'_, T> {
 
     /// Whether what every row misses is rounding.
     pub(super) fn is_exact(&self, multipliers: &[T]) -> bool {
-        (0..self.problem.size()).all(|i| self.problem.miss(i, multipliers) <= self.problem.rounding(i, multipliers))
+        (0..self.problem.size()).all(|i| {
+            let miss = self.problem.miss(i, multipliers);
+            miss <= self.problem.rounding(i, multipliers) && self.bears(i, miss)
+        })
     }
 
     /// The failure that names the worst row.

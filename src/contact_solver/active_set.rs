@@ -1,7 +1,7 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
 use super::acceptance::{Acceptance, Settings};
-use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use super::{Bound, ContactFailure, ContactProblem, ContactSolver, Pivoting};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
@@ -17,7 +17,10 @@ use crate::real::Real;
 /// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are then
 /// those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a W, the
 /// problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control Optim.
-/// 14, 1976). Rows that contradict each other are an error that names them.
+/// 14, 1976), and if these do not end, by [`Pivoting`]. Rows that contradict each other are an error that names them. What W leaves
+/// of nearly dependent rows may be rounding, on which multipliers grow beyond all bounds and pretend to meet what cannot be met: a
+/// pivot must exceed the rounding of the combination of rows that it measures, and a solution is accepted only if every row
+/// misses complementarity by less than a small share of what moves it without contact, whatever the multipliers.
 ///
 /// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant rows always
 /// go the way of proximal steps.
@@ -39,6 +42,8 @@ pub struct ActiveSet<T = f64> {
     shift: Vec<T>,
     offset: Vec<T>,
     center: Vec<T>,
+    /// The last resort on rows that are nearly dependent.
+    pivoting: Pivoting<T>,
 }
 
 /// Whether W is symmetric to rounding.
@@ -103,18 +108,23 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
         *own = tolerance + T::of(32.0) * T::epsilon() * *own;
     }
     // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a body
-    // at rest beside a body under load must not be judged by its own small numbers.
+    // at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up like the
+    // steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single precision.)
     noise.clear();
-    noise.extend_from_slice(own);
+    noise.resize(own.len(), T::zero());
     for (j, &own) in own.iter().enumerate() {
         let carried = own / problem.delassus(j, j);
         if carried > T::zero() && carried.is_finite() {
             for (i, (&w, noise)) in column(j).zip(noise.iter_mut()).enumerate() {
                 if i != j {
-                    *noise += w.abs() * carried;
+                    *noise = noise.max(w.abs() * carried);
                 }
             }
         }
+    }
+    let walk = T::of(own.len() as f64).sqrt();
+    for (noise, &own) in noise.iter_mut().zip(own.iter()) {
+        *noise = own + walk * *noise;
     }
 }
 
@@ -125,6 +135,7 @@ impl<T: Real> ActiveSet<T> {
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
         form: Form,
+        acceptance: &mut Acceptance<'_, T>,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
         let Self { factor, symmetry, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
@@ -189,13 +200,26 @@ impl<T: Real> ActiveSet<T> {
             let violations = (0..size).filter(|&i| violates(i, active[i]));
             let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
             if count == 0 {
-                if factor.is_singular() && !rows.iter().all(|&i| y[i].abs() <= noise[i]) {
+                // What multipliers make of y as they grow beyond all bounds is no rounding.
+                let held = |i: usize| match (problem.bounds[i], active[i]) {
+                    _ if active[i] && factor.is_singular() && y[i].abs() > noise[i] => false,
+                    (Bound::Free, _) => acceptance.bears(i, y[i].abs()),
+                    (_, true) => acceptance.bears(i, y[i].abs().max(-problem.delassus(i, i) * multipliers[i])),
+                    (_, false) => acceptance.bears(i, -y[i]),
+                };
+                if !(0..size).all(held) {
                     return Ok(Exchanges::Stuck(iteration));
                 }
-                for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {
-                    if *bound == Bound::NonNegative {
-                        *lambda = lambda.max(T::zero());
+                let mut dropped = false;
+                for (i, lambda) in multipliers.iter_mut().enumerate() {
+                    if problem.bounds[i] == Bound::NonNegative && *lambda < T::zero() {
+                        dropped |= problem.delassus(i, i) * -*lambda > own[i];
+                        *lambda = T::zero();
                     }
+                }
+                // What is dropped is rounding in each row, but together?
+                if dropped && !proximal && !acceptance.accepts(multipliers) {
+                    return Ok(Exchanges::Stuck(iteration));
                 }
                 return Ok(Exchanges::Solved(iteration));
             }
@@ -245,7 +269,7 @@ impl<T: Real> ActiveSet<T> {
             self.offset.clear();
             let pulled = problem.offset.iter().zip(&self.shift).zip(&self.center);
             self.offset.extend(pulled.map(|((&q, &d), &c)| q - d * c));
-            match self.exchange(problem, multipliers, Form::Proximal)? {
+            match self.exchange(problem, multipliers, Form::Proximal, &mut acceptance)? {
                 Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
             }
             if acceptance.is_exact(multipliers) {
@@ -275,6 +299,8 @@ impl<T: Real> ActiveSet<T> {
 impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     fn reserve(&mut self, size: usize) {
         let reals = || Vec::with_capacity(size);
+        let mut pivoting = Pivoting::default();
+        pivoting.reserve(size);
         *self = Self {
             factor: DenseCholesky::with_capacity(size),
             symmetry: (0, Symmetry::Symmetric),
@@ -288,6 +314,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             shift: reals(),
             offset: reals(),
             center: reals(),
+            pivoting,
         };
     }
 
@@ -295,7 +322,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         if problem.size() == 0 {
             return Ok(0);
         }
-        let acceptance = Settings::default().begin(problem, multipliers)?;
+        let mut acceptance = Settings::default().begin(problem, multipliers)?;
         if problem.version == 0 || self.symmetry.0 != problem.version {
             let symmetry = match problem.asymmetry(T::of(ROUNDED) * T::epsilon()) {
                 None => Symmetry::Symmetric,
@@ -303,9 +330,15 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             };
             self.symmetry = (problem.version, symmetry);
         }
-        match self.exchange(problem, multipliers, Form::Given)? {
+        match self.exchange(problem, multipliers, Form::Given, &mut acceptance)? {
             Exchanges::Solved(iterations) => Ok(iterations),
-            Exchanges::Stuck(iterations) => self.proximal(problem, multipliers, acceptance, iterations),
+            Exchanges::Stuck(iterations) => match self.proximal(problem, multipliers, acceptance, iterations) {
+                Err(failure) if self.symmetry.1 == Symmetry::Symmetric => {
+                    // (Of a contradiction the proximal steps know the least violation.)
+                    self.pivoting.solve(problem, multipliers).map_err(|_| failure)
+                }
+                result => result,
+            },
         }
     }
 }

@@ -16,6 +16,7 @@ pub mod random;
 pub mod schemes;
 pub mod solids;
 pub mod springs;
+pub mod squeeze;
 pub mod tables;
 pub mod timing;
 pub mod truss;
