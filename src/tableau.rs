@@ -274,6 +274,12 @@ impl Stage {
         self.balance == self.recovery
     }
 
+    /// Change of (U, V, A) of the stage by a unit multiplier on a unit mass, in units of h². The balance asks for w_ā of the
+    /// unknown, so a multiplier moves the rows by their weights over that of the balance's acceleration.
+    pub(crate) fn response(&self) -> [f64; 3] {
+        self.recovery.each().map(|row| row.z / self.balance.a.z)
+    }
+
     /// Rows over the increment d = z − ẑ instead of z, with ẑ the value for which the acceleration row vanishes.
     ///
     /// Recovering a by subtracting displacements costs eps u/h²; in this form the terms that cancel are gone.
@@ -495,10 +501,7 @@ impl Momentum {
             .stages
             .iter()
             .zip(&covectors)
-            .map(|(stage, covector)| {
-                let response = stage.recovery.each().map(|row| row.z / stage.balance.a.z);
-                response.iter().zip(covector[0]).map(|(r, p)| r * p).sum()
-            })
+            .map(|(stage, covector)| impulse_weight(stage.response(), covector))
             .collect();
         Self { covectors, weights }
     }
@@ -532,6 +535,12 @@ impl Momentum {
     pub fn impulse_weights(&self) -> &[f64] {
         &self.weights
     }
+}
+
+/// β of a stage with this [`response`](Stage::response), and with this covector when it is done: a raw multiplier λ changes the
+/// momentum by h β λ.
+pub(crate) fn impulse_weight(response: [f64; 3], covector: &[[f64; 3]]) -> f64 {
+    response.iter().zip(covector[0]).map(|(change, psi)| change * psi).sum()
 }
 
 /// The covector before a stage that has the covector `after` when it is done.

@@ -1,12 +1,15 @@
 //! Momentum in the form each scheme conserves, and the closure of impulses.
 
+use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
-    Bathe, Bdf2, Composite, Corrector, GeneralizedAlpha, Houbolt, Newmark, Park, PersistencyCorrection, Simulation,
-    TimeIntegrator,
+    ActiveSet, Bathe, Bdf2, Composite, ContactSolver, Corrector, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem,
+    Newmark, Park, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::{Bars, MassKind, Record, record};
+use std::sync::{Arc, Mutex};
 
 type Scheme = fn() -> Box<dyn TimeIntegrator>;
 
@@ -222,6 +225,63 @@ fn stages_between_drop_out_of_the_past() {
                 0.5,
             );
             assert!(found.total_impulse > 1e-3 && found.closure() < 1e-9, "{:e}, {correction:?}", found.closure());
+        }
+    }
+}
+
+/// The active set, and the raw multiplier of the one row that it solves for, solve by solve.
+#[derive(Debug, Default)]
+struct Heard(ActiveSet, Arc<Mutex<Vec<f64>>>);
+
+impl ContactSolver<f64> for Heard {
+    fn reserve(&mut self, size: usize) {
+        self.0.reserve(size);
+    }
+    fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, f64>,
+        multipliers: &mut [f64],
+    ) -> Result<usize, ContactFailure<f64>> {
+        let iterations = self.0.solve(problem, multipliers)?;
+        self.1.lock().unwrap().push(multipliers[0]);
+        Ok(iterations)
+    }
+}
+
+/// Two masses tied together, a load on the first: the second gets all its momentum from the tie, in every stage.
+#[test]
+fn impulse_weights_are_what_a_run_books() {
+    let alpha_m = |alpha_m| Box::new(GeneralizedAlpha::new(alpha_m, 0.2, 0.4, 0.7).unwrap());
+    let listed = all().into_iter().filter(Listed::takes_multipliers).map(|listed| (listed.make)());
+    let schemes: Vec<Box<dyn TimeIntegrator>> =
+        listed.chain([-0.7, 0.45].map(|a| alpha_m(a) as Box<dyn TimeIntegrator>)).collect();
+    for scheme in schemes {
+        let (name, tableau) = (scheme.name(), scheme.tableau());
+        let weights = tableau.momentum().impulse_weights().to_vec();
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {weights:?}");
+        let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 3.0)]).unwrap();
+        let system =
+            LinearSystem::lumped(vec![0.7, 1.9], k).unwrap().load(|t, force| force[0] += 2.0 + (9.0 * t).sin());
+        let heard = Heard::default();
+        let (said, h) = (Arc::clone(&heard.1), 0.05);
+        let mut run = Simulation::builder(system, scheme, h)
+            .constraint(LinearRows::new().equality(&[(0, -1.0), (1, 1.0)], 0.0))
+            .contact_solver(heard)
+            .uncorrected()
+            .build()
+            .unwrap();
+        // The steps that start a multistep scheme are another scheme's.
+        (0..tableau.depth()).for_each(|_| run.step().map(|_| ()).unwrap());
+        for _ in 0..20 {
+            let before = run.momentum(&[0.0, 1.0]).unwrap();
+            said.lock().unwrap().clear();
+            run.step().unwrap();
+            let change = run.momentum(&[0.0, 1.0]).unwrap() - before;
+            let multipliers = said.lock().unwrap();
+            assert_eq!(multipliers.len(), weights.len(), "{name}");
+            let impulse: f64 = weights.iter().zip(multipliers.iter()).map(|(beta, lambda)| h * beta * lambda).sum();
+            assert!((impulse - change).abs() < 1e-11, "{name}: {impulse:e}, not {change:e}");
+            assert!(impulse.abs() > 1e-3, "{name}");
         }
     }
 }

@@ -176,8 +176,7 @@ pub(crate) struct CompiledStage<T> {
     /// Pure z-weights of the acceleration rows, recovery and balance.
     pub(crate) acceleration: f64,
     pub(crate) balance_acceleration: f64,
-    /// Change of (U, V, A) by a unit multiplier on a unit mass, in units of h²: with the covector, the impulse weight
-    /// β.
+    /// What a multiplier changes, [`Stage::response`]: with the covector it gives the impulse weight.
     pub(crate) response: [f64; 3],
     /// Momentum covector after the stage.
     pub(crate) covector: Vec<[f64; 3]>,
@@ -188,11 +187,6 @@ impl<T: Real> CompiledStage<T> {
     /// The rows at which the balance holds.
     pub(crate) fn balanced(&self) -> &ScaledRows<T> {
         self.balance.as_ref().unwrap_or(&self.recovery)
-    }
-
-    /// β: a raw multiplier λ of the stage changes the momentum by h β λ.
-    pub(crate) fn impulse_weight(&self, covector: &[[f64; 3]]) -> f64 {
-        self.response.iter().zip(&covector[0]).map(|(response, psi)| response * psi).sum()
     }
 }
 
@@ -292,7 +286,7 @@ impl<T: Real> Compiler<'_, T> {
                 operator: shared.unwrap_or(program.operators.len() - 1),
                 acceleration: stage.recovery.a.z,
                 balance_acceleration: stage.balance.a.z,
-                response: stage.recovery.each().map(|row| row.z / stage.balance.a.z),
+                response: stage.response(),
                 covector,
                 read,
             });

@@ -17,6 +17,7 @@ use crate::real::Real;
 use crate::real::kernels::Accumulate;
 use crate::state::{Clock, Motion};
 use crate::system::System;
+use crate::tableau::impulse_weight;
 
 impl<T: Real> Simulation<'_, T> {
     /// Takes one step: with [`step_control`](super::SimulationBuilder::step_control) of whatever size succeeds.
@@ -205,7 +206,7 @@ impl<T: Real> Simulation<'_, T> {
                 let solver = &mut **contact_solver;
                 let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
                 let is_last = stages_before + 1 == program.stages.len();
-                contact.close(new, stage.impulse_weight(covector), is_last, work)?;
+                contact.close(new, impulse_weight(stage.response, covector), is_last, work)?;
                 if let Some(projection) = work.projection.as_mut().filter(|_| work.buffers.has_touched()) {
                     refresh(projection, &mut work.projected_rows, constraints.version());
                     let mut correction = Correction {
