@@ -14,7 +14,7 @@ pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]
 pub use node_to_facet::{Facet, NodeToFacet};
 pub use nodes_on_obstacle::NodesOnObstacle;
-pub use obstacle::{Cylinder, Obstacle, Plane, Side, Sphere};
+pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -98,14 +98,29 @@ pub trait ContactConstraint<T: Real>: Send {
 
     /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change.
     ///
-    /// Returns whether candidates or G changed since the last call.
+    /// `ahead` (time) is how far from t on contact is looked at before the next search: the step that begins, and what the
+    /// scheme looks ahead beyond it; zero where no step does. A constraint that takes only what is near takes at least
+    /// what v brings near in that time. Returns whether candidates or G changed since the last call.
     ///
     /// # Errors
     ///
     /// The host's own, as [`Error::Host`].
-    fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
-        let _ = (t, u, v);
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        let _ = (t, u, v, ahead);
         Ok(Candidates::Unchanged)
+    }
+
+    /// Looks at a step before it is accepted: bodies that have gone through each other are refused here, or contacts found
+    /// along a normal that is not that of the place where they happen. Candidates are those of the search at the start of
+    /// the step. Default: nothing is refused.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::PassedThrough`], which a smaller step mends (the constraint's index in the contact's name is filled in by the
+    /// caller), or the host's own.
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        let _ = step;
+        Ok(())
     }
 
     /// Moves the linearization of the candidates there are to u: G, gaps and rates are then those of the gap functions at
@@ -166,8 +181,11 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     fn dofs(&self, out: &mut Vec<usize>) {
         (**self).dofs(out);
     }
-    fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<Candidates> {
-        (**self).search(t, u, v)
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        (**self).search(t, u, v, ahead)
+    }
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        (**self).inspect(step)
     }
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         (**self).follow(t, u)
@@ -194,6 +212,49 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
         (**self).rates(t, u, v, out);
     }
 }
+
+/// A step as contact constraints see it before it is accepted: from where to where it has gone.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Stride<'a, T> {
+    /// Times of its start and its end.
+    pub t: [f64; 2],
+    /// Displacements there, one a dof.
+    pub u: [&'a [T]; 2],
+    /// Velocities at its start.
+    pub v: &'a [T],
+    /// Which candidates of the constraint were closed at its start, and are at its end.
+    pub closed: [&'a [bool]; 2],
+}
+
+impl<'a, T> Stride<'a, T> {
+    /// The step between two displacements, for hosts that call a constraint themselves.
+    pub fn new(t: [f64; 2], u: [&'a [T]; 2], v: &'a [T], closed: [&'a [bool]; 2]) -> Self {
+        Self { t, u, v, closed }
+    }
+
+    /// The error of a contact (feature, candidate) of the constraint: `way` is that of its node against the surface.
+    pub(crate) fn refuse(&self, (feature, candidate): (usize, usize), what: &'static str, way: f64, gap: f64) -> Error {
+        let contact = ContactId { constraint: 0, feature, candidate };
+        Error::PassedThrough { t: self.t[0], h: self.t[1] - self.t[0], contact, what, way, gap }
+    }
+}
+
+/// Whether the direction in which a body comes presses on two normals so differently that the impact along one is not that
+/// along the other: the shares of its kinetic energy that a plastic impact takes differ by more than a tenth.
+pub(crate) fn press_differently(directions: [f64; 2]) -> bool {
+    (directions[0] * directions[0] - directions[1] * directions[1]).abs() > 0.1
+}
+
+/// Share of the way that must lead into a body for a contact to be missed if it comes out again: the cosine of the angle
+/// to the inward normal where it enters. An impact below it would have taken a sixteenth of the energy.
+pub(crate) const STEEP: f64 = 0.25;
+
+/// Cosine of the largest turn of a normal in a step in which its contact presses: 30 degrees.
+pub(crate) const LARGEST_TURN: f64 = 0.866;
+
+/// Share of the way in a step by which a gap may miss its linearization, and a node be stopped away from the surface.
+pub(crate) const LARGEST_MISS: f64 = 0.1;
 
 /// What a search found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -416,6 +416,25 @@ pub enum Error {
         /// The contact.
         contact: ContactId,
     },
+    /// A body has passed through another one within a step, or was stopped where that one is not.
+    #[error(
+        "step from t = {t:e} with h = {h:e}: contact {contact} {what}; its node, at a gap of {gap:e}, went {way:e} against the \
+         surface; take smaller steps (`StepControl` does)"
+    )]
+    PassedThrough {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// The contact.
+        contact: ContactId,
+        /// What has happened, in words.
+        what: &'static str,
+        /// The way of the node against the surface (length).
+        way: f64,
+        /// Its gap where the step starts (length).
+        gap: f64,
+    },
     /// The host cannot evaluate a trial state; a smaller step may help.
     #[error("the host's {callback} does not admit the state of a step")]
     Inadmissible {
@@ -459,6 +478,7 @@ impl Error {
                 | Self::Frame { .. }
                 | Self::ContradictoryContacts { .. }
                 | Self::ContactLost { .. }
+                | Self::PassedThrough { .. }
                 | Self::NewtonNotConverged { .. }
                 | Self::LinearNotConverged { .. }
                 | Self::IndefiniteTangent { .. }

@@ -64,7 +64,7 @@ fn rows_are_derivatives_of_the_functions() {
     contact.rates(0.3, &u, &v, &mut rates);
     let mut at = |s: f64| {
         let (t, u) = (0.3 + s, std::array::from_fn::<_, 6, _>(|dof| u[dof] + s * v[dof]));
-        contact.search(t, &u, &v).unwrap();
+        contact.search(t, &u, &v, 0.0).unwrap();
         gaps(&mut contact, t, &u)
     };
     let [before, here, after] = [at(-1e-4), at(0.0), at(1e-4)];
@@ -83,15 +83,15 @@ proptest! {
     ) {
         let (mut contact, mut fresh) = (both(), both());
         prop_assert_eq!(contact.candidates(), 0);
-        prop_assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Changed);
-        prop_assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Unchanged);
+        prop_assert_eq!(contact.search(0.0, &u, &u, 0.0).unwrap(), Candidates::Changed);
+        prop_assert_eq!(contact.search(0.0, &u, &u, 0.0).unwrap(), Candidates::Unchanged);
         prop_assert_eq!(contact.follow(t, &to).unwrap(), Candidates::Changed);
         prop_assert_eq!(contact.follow(t, &to).unwrap(), Candidates::Unchanged);
-        fresh.search(t, &to, &to).unwrap();
+        fresh.search(t, &to, &to, 0.0).unwrap();
         prop_assert_eq!(rows(&contact), rows(&fresh));
         prop_assert_eq!(gaps(&mut contact, t, &to), gaps(&mut fresh, t, &to));
-        prop_assert_eq!(contact.search(t, &to, &to).unwrap(), Candidates::Unchanged);
-        prop_assert_eq!(contact.search(0.0, &u, &u).unwrap(), Candidates::Changed);
+        prop_assert_eq!(contact.search(t, &to, &to, 0.0).unwrap(), Candidates::Unchanged);
+        prop_assert_eq!(contact.search(0.0, &u, &u, 0.0).unwrap(), Candidates::Changed);
         prop_assert_eq!([contact.identity(0), contact.identity(1)], [(0, 0), (1, 0)]);
     }
 }
@@ -100,7 +100,7 @@ proptest! {
 fn following_does_not_allocate() {
     let mut contact = both();
     let (mut u, mut gaps, mut rates) = ([0.0; 6], [0.0; 2], [GapRates::default(); 2]);
-    contact.search(0.0, &u, &u).unwrap();
+    contact.search(0.0, &u, &u, 0.0).unwrap();
     let counted = allocation_counter::measure(|| {
         for k in 0..10 {
             u[k % 6] += 0.01;
@@ -119,7 +119,7 @@ fn wrong_sizes_are_refused() {
     let mut contact = both();
     assert!(matches!(contact.check(5), Err(Error::MissingDof { dof: 5, dofs: 5, .. })));
     contact.check(6).unwrap();
-    assert!(matches!(contact.search(0.0, &[0.0; 3], &[0.0; 3]), Err(Error::MissingDof { .. })));
+    assert!(matches!(contact.search(0.0, &[0.0; 3], &[0.0; 3], 0.0), Err(Error::MissingDof { .. })));
     assert!(matches!(contact.follow(0.0, &[0.0; 3]), Err(Error::MissingDof { .. })));
     let built = Simulation::builder(masses(4), Newmark::trapezoidal(), 0.1).constraint(both()).build();
     assert!(matches!(built, Err(Error::MissingDof { .. })));
@@ -143,7 +143,7 @@ fn gaps_that_are_no_numbers_fail_the_step() {
         [if x[0] < -0.5 { f64::NAN } else { 1.0 + x[0] }, 0.0, 0.0]
     };
     let mut contact = GapFunction::new(&[0], broken);
-    contact.search(0.0, &[0.0], &[0.0]).unwrap();
+    contact.search(0.0, &[0.0], &[0.0], 0.0).unwrap();
     assert_eq!(contact.follow(0.0, &[-0.6]).unwrap(), Candidates::Unchanged);
     assert!(gaps(&mut contact, 0.0, &[-0.6])[0].is_nan());
     assert_eq!(contact.follow(0.0, &[-0.4]).unwrap(), Candidates::Unchanged);

@@ -94,7 +94,7 @@ impl<T: Real> ContactConstraint<T> for Floor {
     fn dofs(&self, out: &mut Vec<usize>) {
         out.extend([0]);
     }
-    fn search(&mut self, _: f64, u: &[T], _: &[T]) -> Result<Candidates> {
+    fn search(&mut self, _: f64, u: &[T], _: &[T], _: f64) -> Result<Candidates> {
         let near = u[0].value() < -0.5 * self.depth;
         let changed = near != self.near;
         self.near = near;
@@ -353,7 +353,7 @@ impl ContactConstraint<f64> for Floors {
     fn dofs(&self, out: &mut Vec<usize>) {
         out.extend([0, 1]);
     }
-    fn search(&mut self, _: f64, u: &[f64], _: &[f64]) -> Result<Candidates> {
+    fn search(&mut self, _: f64, u: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         let near = [0, 1].map(|mass| u[mass] < 0.3 - self.depths[mass]);
         let found = if near == self.near { Candidates::Unchanged } else { Candidates::Changed };
         self.near = near;
@@ -391,7 +391,7 @@ impl ContactConstraint<f64> for Moody {
     fn check(&self, _: usize) -> Result<()> {
         Ok(())
     }
-    fn search(&mut self, _: f64, _: &[f64], _: &[f64]) -> Result<Candidates> {
+    fn search(&mut self, _: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         match self.0.load(Ordering::Relaxed) {
             0 => Ok(Candidates::Unchanged),
             _ => Err(Error::Host { callback: "search", source: "moody".into() }),
@@ -492,7 +492,7 @@ impl ContactConstraint<f64> for Relay {
     fn dofs(&self, out: &mut Vec<usize>) {
         out.extend([0, 1]);
     }
-    fn search(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<Candidates> {
+    fn search(&mut self, t: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         let mass = usize::from(t > 0.15);
         let found = if mass == self.mass { Candidates::Unchanged } else { Candidates::Changed };
         self.mass = mass;

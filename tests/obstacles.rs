@@ -219,8 +219,8 @@ fn bodies_far_away_are_no_candidates_and_cost_no_contact_problem() {
 fn planes_keep_their_rows() {
     let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
     let mut contact = on(floor, &[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]);
-    assert_eq!(contact.search(0.0, &[0.0; 6], &[0.0; 6]).unwrap(), Candidates::Changed);
-    assert_eq!(contact.search(0.1, &[0.5; 6], &[0.0; 6]).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search(0.1, &[0.5; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Unchanged);
     // Only the normal dofs are eliminated last.
     let mut dofs = Vec::new();
     contact.dofs(&mut dofs);
@@ -268,16 +268,16 @@ fn check_follow<const D: usize>(
     (t, to): (f64, &[f64]),
 ) {
     let (mut contact, mut fresh) = (make(), make());
-    contact.search(0.0, from, from).unwrap();
+    contact.search(0.0, from, from, 0.0).unwrap();
     let before = contact.candidates();
     assert_eq!(contact.follow(t, to).unwrap(), Candidates::Changed);
-    fresh.search(t, to, to).unwrap();
+    fresh.search(t, to, to, 0.0).unwrap();
     assert_eq!(read(&mut contact, t, to), read(&mut fresh, t, to));
     assert!((0..before).all(|row| contact.identity(row) == (row, 0) && contact.magnitude(row) == fresh.magnitude(row)));
     assert_eq!(contact.follow(t, to).unwrap(), Candidates::Unchanged);
-    assert_eq!(contact.search(t, to, to).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.search(t, to, to, 0.0).unwrap(), Candidates::Unchanged);
     assert_eq!(contact.follow(0.0, from).unwrap(), Candidates::Changed);
-    assert_eq!(contact.search(t, to, to).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search(t, to, to, 0.0).unwrap(), Candidates::Changed);
 }
 
 proptest! {
@@ -308,7 +308,7 @@ fn planes_have_nothing_to_follow() {
         [[0.0, t], [0.0, 1.0], [0.0; 2]]
     });
     let u = [0.3, 0.2, 0.1, -0.4];
-    contact.search(0.0, &[0.0; 4], &[0.0; 4]).unwrap();
+    contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
     let before = read(&mut contact, 0.5, &u);
     assert_eq!(contact.follow(1.5, &u).unwrap(), Candidates::Unchanged);
     assert_eq!(before, read(&mut contact, 0.5, &u));
@@ -318,12 +318,12 @@ fn planes_have_nothing_to_follow() {
 fn followed_nodes_stay_candidates_out_of_reach() {
     let ball = Sphere::new([0.0; 2], 1.0, Side::Outside).unwrap();
     let mut contact = on(ball, &[[0.0, 1.1], [3.0, 0.0], [1.2, 0.0]]).reach(0.5).unwrap();
-    contact.search(0.0, &[0.0; 6], &[0.0; 6]).unwrap();
+    contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap();
     let to = [0.0, 3.0, -1.8, 0.0, 0.1, 0.1];
     contact.follow(0.0, &to).unwrap();
     assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [0, 2]);
     assert!((read(&mut contact, 0.0, &to).1[0] - 3.1).abs() < 1e-14);
-    assert_eq!(contact.search(0.0, &to, &to).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search(0.0, &to, &to, 0.0).unwrap(), Candidates::Changed);
     assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [1, 2]);
 }
 
@@ -338,7 +338,7 @@ fn trial_states_without_a_distance_have_no_normal_and_are_said_to_have_none() {
         }
     }
     let mut contact = on(Half, &[[1.0, 1.0], [2.0, 1.0]]);
-    contact.search(0.0, &[0.0; 4], &[0.0; 4]).unwrap();
+    contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
     for (to, bad) in [([-2.0, 0.0, 0.0, 0.0], 0), ([0.0, 0.0, f64::NAN, 0.0], 1)] {
         let rows = read(&mut contact, 0.0, &[0.0; 4]).0;
         match contact.follow(0.0, &to) {

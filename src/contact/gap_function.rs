@@ -50,7 +50,7 @@ struct Row<'a, T> {
 ///
 /// let (mut u, mut gaps) = ([0.0; 8], [0.0; 2]);
 /// u[6] = 2.0;
-/// contact.search(0.0, &u, &[0.0; 8])?;
+/// contact.search(0.0, &u, &[0.0; 8], 0.0)?;
 /// contact.gap(0.0, &u, &mut gaps);
 /// assert_eq!(gaps, [0.0, 1.5]);
 /// # Ok::<(), contact_dynamics::Error>(())
@@ -190,7 +190,7 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
         out.extend(self.rows.iter().flat_map(|row| &row.entries).map(|entry| entry.0));
     }
 
-    fn search(&mut self, t: f64, u: &[T], _v: &[T]) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], _v: &[T], _ahead: f64) -> Result<Candidates> {
         let found = self.linearize(t, u)?;
         let before = std::mem::replace(&mut self.candidates, self.rows.len());
         Ok(if before == self.candidates { found } else { Candidates::Changed })

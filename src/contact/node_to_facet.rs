@@ -1,11 +1,14 @@
 //! Contact of the nodes of one deforming surface with the facets of another.
 
 mod geometry;
+mod passage;
 mod search;
 mod stand;
 mod surface;
 
-use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, check_mesh, positive};
+use super::{
+    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh, positive,
+};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use geometry::{Point, Shape};
@@ -136,6 +139,14 @@ impl<T: Real> Rows<T> {
 struct Pass {
     nodes: Vec<usize>,
     neighborhood: Neighborhood,
+    /// For each node a distance that it has from the surface at least, at the last search.
+    clearance: Vec<f64>,
+}
+
+impl Pass {
+    fn new(nodes: Vec<usize>) -> Self {
+        Self { clearance: vec![0.0; nodes.len()], nodes, neighborhood: Neighborhood::default() }
+    }
 }
 
 /// Contact of the nodes of one deforming surface with the facets of another: segments in two dimensions, triangles and
@@ -227,6 +238,10 @@ pub struct NodeToFacet<T: Real> {
     /// Positions now and when the lists were built, by node.
     positions: Vec<Point>,
     built_at: Vec<Point>,
+    /// How far from a node the lists hold all facets, where they were built.
+    listed: f64,
+    /// Positions at the start and at the end of a step, by node.
+    ends: [Vec<Point>; 2],
     /// Facets that the nodes meet.
     surface: Surface,
     /// Facets that the nodes belong to, if known.
@@ -236,7 +251,7 @@ pub struct NodeToFacet<T: Real> {
     passes: Vec<Pass>,
     law: ContactLaw,
     reach: f64,
-    skin: f64,
+    skin: Option<f64>,
     rebuilds: usize,
     largest_dof: usize,
     /// The node that a node of the first pass stands on exactly.
@@ -291,15 +306,17 @@ impl<T: Real> NodeToFacet<T> {
             dimension: D,
             positions: coordinates.clone(),
             built_at: Vec::new(),
+            listed: 0.0,
+            ends: [coordinates.clone(), coordinates.clone()],
             coordinates,
             dofs,
             surface,
             own_surface: None,
-            passes: vec![Pass { nodes: bodies[0].clone(), neighborhood: Neighborhood::default() }],
+            passes: vec![Pass::new(bodies[0].clone())],
             bodies,
             law: ContactLaw::Rigid,
             reach,
-            skin: 0.5 * reach,
+            skin: None,
             rebuilds: 0,
             largest_dof: 0,
             partners: Vec::new(),
@@ -324,7 +341,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.skin = positive("the skin of a contact search", skin.value())?;
+        self.skin = Some(positive("the skin of a contact search", skin.value())?);
         self.built_at.clear();
         Ok(self)
     }
@@ -366,7 +383,7 @@ impl<T: Real> NodeToFacet<T> {
     pub fn two_pass<F: Into<Facet>>(self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
         let mut contact = self.facing(facets)?;
         let nodes = contact.surface.nodes().to_vec();
-        contact.passes.push(Pass { nodes, neighborhood: Neighborhood::default() });
+        contact.passes.push(Pass::new(nodes));
         contact.prepare()?;
         Ok(contact)
     }
@@ -427,30 +444,67 @@ impl<T: Real> NodeToFacet<T> {
         Ok((boxes, motions))
     }
 
-    /// Makes lists of facets valid for the positions now.
-    fn update_lists(&mut self, [one, other]: &[Bounds; 2]) {
-        if !self.built_at.is_empty() && one.spread(other) <= self.skin {
+    /// The boxes of the velocities of the two bodies.
+    fn speeds(&self, v: &[T]) -> [Bounds; 2] {
+        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.vector(node, v))))
+    }
+
+    /// The entries of a vector of the system that belong to a node.
+    fn vector(&self, node: usize, x: &[T]) -> Point {
+        let mut vector = [0.0; 3];
+        for (component, &dof) in vector.iter_mut().zip(&self.dofs[node][..self.dimension]) {
+            *component = x[dof].value();
+        }
+        vector
+    }
+
+    /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
+    fn update_lists(&mut self, [one, other]: &[Bounds; 2], range: f64) {
+        if !self.built_at.is_empty() && range + one.spread(other) <= self.listed {
             return;
         }
+        self.listed = range + self.skin.unwrap_or(0.5 * range);
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
-            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.reach + self.skin);
+            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.listed);
         }
         self.built_at.clone_from(&self.positions);
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass, in the order of its nodes.
-    fn find_rows(&mut self, pass: usize, near: &Bounds, u: &[T]) {
+    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body makes with
+    /// its velocities in theirs within the time `ahead`.
+    fn find_rows(&mut self, pass: usize, (near, speeds): (&Bounds, &Bounds), u: &[T], v: &[T], ahead: f64) {
+        let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
+        self.find_rows_and(pass, (near, speeds), u, v, ahead, &mut clearance);
+        self.passes[pass].clearance = clearance;
+    }
+
+    fn find_rows_and(
+        &mut self,
+        pass: usize,
+        (near, speeds): (&Bounds, &Bounds),
+        u: &[T],
+        v: &[T],
+        ahead: f64,
+        clearance: &mut [f64],
+    ) {
         let Self { surface, own_surface, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
         let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
             return;
         };
-        for (place, &node) in ground.nodes.iter().enumerate() {
+        for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
             if !near.contains(positions[node]) {
                 continue;
             }
-            let Some(stand) = ground.closest(place, *reach) else { continue };
+            let mut velocity = [0.0; 3];
+            for (component, &dof) in velocity.iter_mut().zip(&dofs[node][..*dimension]) {
+                *component = v[dof].value();
+            }
+            let way = ahead * Bounds::of_points([velocity]).farthest(speeds);
+            let (distance, stand) = ground.clearance(place, *reach + way);
+            *clearance = distance;
+            let Some(stand) = stand else { continue };
             let vertices = ground.surface.facets()[stand.facet].nodes();
             if !partners.is_empty() {
                 let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
@@ -477,7 +531,7 @@ impl<T: Real> NodeToFacet<T> {
             let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
                 Bounds::of_points([geometry::sub(positions[node], before)]).spread(&motions[1 - pass])
             });
-            let known = self.reach + self.skin - moved;
+            let known = self.listed - moved;
             let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
                 let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
                 Some((stand, ground.surface.facets()[stand.facet].nodes()))
@@ -521,9 +575,9 @@ fn ground<'a>(
     positions: &'a [Point],
     rounding: f64,
 ) -> Option<Ground<'a>> {
-    let Pass { nodes, neighborhood } = &passes[pass];
+    let Pass { nodes, neighborhood, .. } = &passes[pass];
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    Some(Ground { nodes, neighborhood, surface, own, positions, rounding })
+    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, positions, rounding })
 }
 
 fn component<T: Real>(x: &[T], i: usize) -> f64 {
@@ -551,17 +605,22 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         }
     }
 
-    fn search(&mut self, _t: f64, u: &[T], _v: &[T]) -> Result<Candidates> {
+    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         self.check(u.len())?;
         let (boxes, motions) = self.move_nodes(u)?;
+        let speeds = self.speeds(v);
         self.found.clear();
+        let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
         // Facets go on a little beyond the rim.
-        let range = self.reach + boxes.iter().map(overhang).fold(0.0, f64::max);
-        if boxes[0].inflated(range).intersects(&boxes[1]) {
-            self.update_lists(&motions);
+        let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
+        for pass in &mut self.passes {
+            pass.clearance.fill(range);
+        }
+        if boxes[0].inflated(wide).intersects(&boxes[1]) {
+            self.update_lists(&motions, range);
             self.partners.fill(None);
             for pass in 0..self.passes.len() {
-                self.find_rows(pass, &boxes[1 - pass].inflated(range), u);
+                self.find_rows(pass, (&boxes[1 - pass].inflated(wide), &speeds[1 - pass]), u, v, ahead);
             }
         }
         let (rows, found) = (&self.rows, &self.found);
@@ -579,6 +638,10 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         let same = self.rows.jacobian == self.found.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
         Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+    }
+
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        self.look_at(step)
     }
 
     fn candidates(&self) -> usize {

@@ -2,7 +2,8 @@
 
 use super::obstacle::{dot, minus};
 use super::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Obstacle, check_mesh, positive,
+    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, LARGEST_MISS, LARGEST_TURN,
+    Obstacle, STEEP, Stride, check_mesh, positive, press_differently,
 };
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -34,9 +35,14 @@ impl<T: Real, const D: usize> Node<T, D> {
 /// identified by the number of the node.
 ///
 /// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end; schemes that
-/// impose contact on velocities see the tangent plane of the start of the step instead (and the obstacle's own motion exactly),
-/// which on a surface of radius R leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes nearer than that are candidates, and a body farther away
-/// costs a bounding box.
+/// impose contact on velocities see the tangent plane of the start of the step instead (which moves with the obstacle), and on a
+/// surface of radius R that leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes nearer than that, or than their
+/// velocity brings them within the step, are candidates, and a body farther away costs a bounding box.
+///
+/// Steps are refused ([`Error::PassedThrough`], which a smaller step mends) in which a node goes straight through the body;
+/// presses along a normal that turns by more than 30° on its way; or is stopped along a normal that is not that of the
+/// place where it is, so that the energy lost would be wrong by more than a tenth. What this cannot see is a way that is not
+/// straight: a node that turns around within a step.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
@@ -47,7 +53,7 @@ impl<T: Real, const D: usize> Node<T, D> {
 ///     .with_law(ContactLaw::Rigid)
 ///     .moving(|t| [[0.0, -0.1 * t], [0.0, -0.1], [0.0, 0.0]]); // sinks with speed 0.1
 /// let mut gaps = [0.0; 2];
-/// contact.search(0.0, &[0.0; 4], &[0.0; 4])?;
+/// contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0)?;
 /// contact.gap(0.5, &[0.0; 4], &mut gaps);
 /// assert!((gaps[0] - 0.64_f64).abs() < 1e-15 && (gaps[1] - 0.44).abs() < 1e-15);
 /// # Ok::<(), contact_dynamics::Error>(())
@@ -67,9 +73,14 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row<T, const D: usize> {
     node: usize,
-    normal: [T; D],
-    /// Where the distance is linearized.
+    /// Where the distance is linearized, in the frame of the obstacle, with distance and normal there.
     place: [T; D],
+    distance: T,
+    normal: [T; D],
+    /// The largest coordinate of the node, of which that place is what the obstacle's motion leaves.
+    size: T,
+    /// Gap and normal at the search.
+    start: (T, [T; D]),
 }
 
 impl<T: Real, const D: usize> std::fmt::Debug for NodesOnObstacle<'_, T, D> {
@@ -114,7 +125,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Nodes farther away than this (length) are no candidates; by default all are. No node must travel as far in a step.
+    /// Nodes farther away than this (length) are no candidates, unless their velocity brings them as near as that within the
+    /// step; by default all are. It saves the cost of rows that stay open.
     ///
     /// # Errors
     ///
@@ -137,13 +149,17 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self.motion.as_mut().map_or([[T::zero(); D]; 3], |motion| motion(t))
     }
 
-    /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal.
-    fn is_far(&self, u: &[T], shift: [T; D]) -> bool {
+    /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal, and than
+    /// the longest way that a node makes against the obstacle, which moves by `carried` in the time `ahead`.
+    fn is_far(&self, u: &[T], v: &[T], shift: [T; D], carried: [T; D], ahead: T) -> bool {
         if self.reach.is_infinite() {
             return false;
         }
         let (mut low, mut high) = ([T::infinity(); D], [T::neg_infinity(); D]);
+        let mut longest = T::zero();
         for node in &self.nodes {
+            let way = minus(node.of(v).map(|v| ahead * v), carried);
+            longest = longest.max(dot(way, way));
             for (axis, x) in node.at(u).into_iter().enumerate() {
                 (low[axis], high[axis]) = (low[axis].min(x), high[axis].max(x));
             }
@@ -152,7 +168,47 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         let center = std::array::from_fn(|k| half * (low[k] + high[k]));
         let diagonal = minus(high, low);
         let (distance, _) = self.obstacle.distance(minus(center, shift));
-        distance > half * dot(diagonal, diagonal).sqrt() + self.reach
+        distance > half * dot(diagonal, diagonal).sqrt() + self.reach + longest.sqrt()
+    }
+}
+
+/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is wrong,
+/// and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end: closed or not.
+fn look_at<T: Real, const D: usize>(
+    obstacle: &dyn Obstacle<T, D>,
+    row: Option<(&Row<T, D>, [bool; 2])>,
+    ends: [[T; D]; 2],
+    velocity: [T; D],
+) -> std::result::Result<(), (&'static str, T)> {
+    let way = minus(ends[1], ends[0]);
+    let (gap, normal) = obstacle.distance(ends[1]);
+    let Some((row, [was_closed, closed])) = row else {
+        let start = obstacle.distance(ends[0]).0;
+        return match gap < T::zero() || obstacle.passage(ends[0], ends[1]).is_some() {
+            true => Err(("was out of reach, and is in the body or beyond it", start)),
+            false => Ok(()),
+        };
+    };
+    let (start, start_normal) = row.start;
+    if closed {
+        if dot(start_normal, normal) < T::of(LARGEST_TURN) {
+            return Err(("presses on a surface that turns by more than 30 degrees on the way", start));
+        }
+        let speed = dot(velocity, velocity).sqrt();
+        let shares = [start_normal, normal].map(|n| (dot(n, velocity) / speed).value());
+        if !was_closed && speed > T::zero() && press_differently(shares) {
+            return Err(("was stopped along a normal that is not the one where it met the surface", start));
+        }
+        return Ok(());
+    }
+    // (Between the ends the gap of the search is linear; what is inside in truth alone was missed.)
+    let missed = start + dot(start_normal, way) - gap;
+    if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(way, way).sqrt() {
+        return Err(("is in the body, and was taken to be outside", start));
+    }
+    match obstacle.passage(ends[0], ends[1]) {
+        Some(passage) if passage.steepness > T::of(STEEP) => Err(("went through the body", start)),
+        _ => Ok(()),
     }
 }
 
@@ -180,17 +236,27 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         }
     }
 
-    fn search(&mut self, t: f64, u: &[T], _: &[T]) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         std::mem::swap(&mut self.rows, &mut self.before);
         self.rows.clear();
         let [shift, ..] = self.motion(t);
-        if !self.is_far(u, shift) {
+        let carried = match self.reach.is_infinite() || self.motion.is_none() {
+            true => [T::zero(); D],
+            false => minus(self.motion(t + ahead)[0], shift),
+        };
+        let ahead = T::of(ahead);
+        if !self.is_far(u, v, shift, carried, ahead) {
             for (index, node) in self.nodes.iter().enumerate() {
-                let place = node.at(u);
-                let (distance, normal) = self.obstacle.distance(minus(place, shift));
+                let (x, size) = (node.at(u), |size: T, x: &T| size.max(x.abs()));
+                let (place, size) = (minus(x, shift), x.iter().fold(T::zero(), size));
+                let (distance, normal) = self.obstacle.distance(place);
+                let near = || {
+                    let way = minus(node.of(v).map(|v| ahead * v), carried);
+                    distance <= self.reach + dot(way, way).sqrt()
+                };
                 // NaN stays, to be reported as a gap.
-                if distance <= self.reach || distance.is_nan() {
-                    self.rows.push(Row { node: index, normal, place });
+                if distance <= self.reach || distance.is_nan() || near() {
+                    self.rows.push(Row { node: index, place, distance, normal, size, start: (distance, normal) });
                 }
             }
         }
@@ -208,8 +274,9 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         let [shift, ..] = self.motion(t);
         let mut moved = Candidates::Unchanged;
         for row in &mut self.rows {
-            row.place = self.nodes[row.node].at(u);
-            let (_, normal) = self.obstacle.distance(minus(row.place, shift));
+            row.place = minus(self.nodes[row.node].at(u), shift);
+            let (distance, normal) = self.obstacle.distance(row.place);
+            row.distance = distance;
             if let Some(x) = normal.iter().find(|x| !x.is_finite()) {
                 let contact = ContactId { constraint: 0, feature: self.nodes[row.node].number, candidate: 0 };
                 return Err(Error::ContactNotFinite { t, what: "the normal", contact, value: x.value() });
@@ -220,6 +287,31 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             }
         }
         Ok(moved)
+    }
+
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        // Through a plane a row lets nothing pass.
+        if self.reach.is_infinite() && self.obstacle.fixed_normal().is_some() {
+            return Ok(());
+        }
+        let [[from, speed, _], [to, ..]] = step.t.map(|t| self.motion(t));
+        let Self { nodes, rows, obstacle, reach, .. } = self;
+        let mut rows = rows.iter().enumerate().peekable();
+        for (index, node) in nodes.iter().enumerate() {
+            let row = rows.next_if(|(_, row)| row.node == index);
+            let ends = [minus(node.at(step.u[0]), from), minus(node.at(step.u[1]), to)];
+            let way = minus(ends[1], ends[0]);
+            let length = dot(way, way).sqrt();
+            // What is no candidate was farther away than the reach.
+            if row.map_or(*reach, |(_, row)| row.start.0) > length {
+                continue;
+            }
+            let row = row.map(|(k, row)| (row, step.closed.map(|flags| flags[k])));
+            if let Err((what, gap)) = look_at(&**obstacle, row, ends, minus(node.of(step.v), speed)) {
+                return Err(step.refuse((node.number, 0), what, length.value(), gap.value()));
+            }
+        }
+        Ok(())
     }
 
     fn candidates(&self) -> usize {
@@ -235,7 +327,8 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn magnitude(&self, row: usize) -> T {
-        self.rows[row].place.iter().fold(T::zero(), |most, x| most.max(x.abs()))
+        let Row { place, size, .. } = &self.rows[row];
+        place.iter().fold(*size, |most, x| most.max(x.abs()))
     }
 
     fn jacobian(&self, out: &mut ContactJacobian<T>) {
@@ -256,8 +349,8 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
         let [shift, ..] = self.motion(t);
         for (row, gap) in self.rows.iter().zip(out) {
-            let (distance, _) = self.obstacle.distance(minus(row.place, shift));
-            *gap = distance + dot(row.normal, minus(self.nodes[row.node].at(u), row.place));
+            let place = minus(self.nodes[row.node].at(u), shift);
+            *gap = row.distance + dot(row.normal, minus(place, row.place));
         }
     }
 

@@ -40,6 +40,90 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
     fn fixed_normal(&self) -> Option<[T; D]> {
         None
     }
+
+    /// Where a straight way goes into the body and turns outward again, if it does: what moves so in one step has missed a
+    /// contact. Default: found by going along the way in steps that the distance allows, but no shorter than 1/16 of it;
+    /// hollows and crests smaller than that may be missed.
+    fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
+        trace(|x| self.distance(x), from, minus(to, from))
+    }
+}
+
+/// How a straight way goes through a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage<T> {
+    /// The depth of its deepest point (length).
+    pub depth: T,
+    /// Cosine of the angle between the way and the inward normal where it enters, or starts.
+    pub steepness: T,
+}
+
+/// The first passage of a way through a body of any shape.
+fn trace<T: Real, const D: usize>(
+    distance: impl Fn([T; D]) -> (T, [T; D]),
+    from: [T; D],
+    way: [T; D],
+) -> Option<Passage<T>> {
+    const SHORTEST: f64 = 1.0 / 16.0;
+    const HALVINGS: usize = 30;
+    let length = dot(way, way).sqrt();
+    let at = |s: T| distance(std::array::from_fn(|k| from[k] + s * way[k]));
+    let (half, mut s) = (T::of(0.5), T::zero());
+    let (mut gap, mut normal) = at(s);
+    while s < T::one() && length > T::zero() {
+        let next = (s + (gap / length).max(T::of(SHORTEST))).min(T::one());
+        let (next_gap, next_normal) = at(next);
+        if dot(normal, way) < T::zero() && dot(next_normal, way) > T::zero() {
+            // The deepest point lies between.
+            let (mut down, mut up) = (s, next);
+            for _ in 0..HALVINGS {
+                let middle = half * (down + up);
+                match dot(at(middle).1, way) < T::zero() {
+                    true => down = middle,
+                    false => up = middle,
+                }
+            }
+            let deepest = at(down).0;
+            if deepest < T::zero() {
+                let (mut outside, mut inside) = (s, down);
+                for _ in 0..if gap > T::zero() { HALVINGS } else { 0 } {
+                    let middle = half * (outside + inside);
+                    match at(middle).0 > T::zero() {
+                        true => outside = middle,
+                        false => inside = middle,
+                    }
+                }
+                return Some(Passage { depth: -deepest, steepness: -dot(at(outside).1, way) / length });
+            }
+        }
+        (s, gap, normal) = (next, next_gap, next_normal);
+    }
+    None
+}
+
+/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are across its axis; `length` is
+/// that of the whole way.
+fn through_round<T: Real, const D: usize>(
+    from: [T; D],
+    way: [T; D],
+    length: T,
+    radius: T,
+    side: Side,
+) -> Option<Passage<T>> {
+    let (square, along) = (dot(way, way), -dot(from, way));
+    // From inside of a hollow body no straight way comes back. Elsewhere the deepest point must lie between the ends.
+    if side == Side::Inside || !(along > T::zero() && along < square) {
+        return None;
+    }
+    let share = along / square;
+    let deepest: [T; D] = std::array::from_fn(|k| from[k] + share * way[k]);
+    let nearest = dot(deepest, deepest).sqrt();
+    let start = dot(from, from).sqrt();
+    // Where it enters, the distance from the middle is the radius, or that of a start inside.
+    let entry = start.min(radius);
+    let sine = (nearest / entry).min(T::one());
+    let steepness = (T::one() - sine * sine).sqrt() * square.sqrt() / length;
+    (nearest < radius).then_some(Passage { depth: radius - nearest, steepness })
 }
 
 /// A half-space: everything on the other side of a plane (a line in two dimensions).
@@ -75,6 +159,10 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Plane<T, D> {
 
     fn fixed_normal(&self) -> Option<[T; D]> {
         Some(self.normal)
+    }
+
+    fn passage(&self, _: [T; D], _: [T; D]) -> Option<Passage<T>> {
+        None
     }
 }
 
@@ -134,6 +222,11 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Sphere<T, D> {
     fn curvature(&self, x: [T; D], w: [T; D]) -> T {
         round_curvature(minus(x, self.center), w, self.side)
     }
+
+    fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
+        let way = minus(to, from);
+        through_round(minus(from, self.center), way, dot(way, way).sqrt(), self.radius, self.side)
+    }
 }
 
 /// A straight cylinder without ends, or the space outside of one.
@@ -179,6 +272,12 @@ impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
     fn curvature(&self, x: [T; 3], w: [T; 3]) -> T {
         round_curvature(self.across(minus(x, self.point)), self.across(w), self.side)
     }
+
+    fn passage(&self, from: [T; 3], to: [T; 3]) -> Option<Passage<T>> {
+        let way = minus(to, from);
+        let (length, start) = (dot(way, way).sqrt(), self.across(minus(from, self.point)));
+        through_round(start, self.across(way), length, self.radius, self.side)
+    }
 }
 
 /// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is right.
@@ -210,6 +309,9 @@ impl<T: Real, const D: usize, O: Obstacle<T, D> + ?Sized> Obstacle<T, D> for Box
     }
     fn fixed_normal(&self) -> Option<[T; D]> {
         (**self).fixed_normal()
+    }
+    fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
+        (**self).passage(from, to)
     }
 }
 

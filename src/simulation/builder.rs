@@ -275,7 +275,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let (state, history) = if let Some((state, history)) = self.resumed {
             let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
             check_resumed(&state, &history, &scheme, (own, h), [dofs, massless.len()])?;
-            constraints.search(state.motion.t, &state.motion.u, &state.motion.v, &mut g)?;
+            constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
             (state, history)
         } else {

@@ -1,11 +1,13 @@
 //! All constraints of a simulation as one list of rows.
 
-use crate::contact::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE};
+use crate::contact::{
+    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE, Stride,
+};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
-use crate::state::ContactState;
+use crate::state::{ContactState, Motion};
 
 /// The constraints in the order given, their rows one after the other.
 pub(crate) struct Constraints<'a, T: Real> {
@@ -117,12 +119,37 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.parts.iter().map(ContactConstraint::max_entries).sum()
     }
 
-    pub(crate) fn search(&mut self, t: f64, u: &[T], v: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+    /// Finds the candidates of a step that looks so far `ahead`.
+    pub(crate) fn search(
+        &mut self,
+        motion: &Motion<T>,
+        ahead: f64,
+        jacobian: &mut ContactJacobian<T>,
+    ) -> Result<Candidates> {
         for part in &mut self.parts {
             // Remembered beyond an error of a later part: the rows are read again by the next search that succeeds.
-            self.stale |= part.search(t, u, v)? == Candidates::Changed;
+            self.stale |= part.search(motion.t, &motion.u, &motion.v, ahead)? == Candidates::Changed;
         }
         self.read_stale(jacobian)
+    }
+
+    /// Shows every constraint the step that is about to be accepted.
+    pub(crate) fn inspect(&mut self, [from, to]: [&Motion<T>; 2], closed: [&[bool]; 2]) -> Result<()> {
+        let mut rest = closed;
+        for (constraint, part) in self.parts.iter_mut().enumerate() {
+            let count = part.candidates();
+            let (own, others) = (rest.map(|flags| &flags[..count]), rest.map(|flags| &flags[count..]));
+            let step = Stride { t: [from.t, to.t], u: [&from.u, &to.u], v: &from.v, closed: own };
+            part.inspect(&step).map_err(|error| match error {
+                Error::PassedThrough { t, h, contact, what, way, gap } => {
+                    let contact = ContactId { constraint, ..contact };
+                    Error::PassedThrough { t, h, contact, what, way, gap }
+                }
+                other => other,
+            })?;
+            rest = others;
+        }
+        Ok(())
     }
 
     /// Moves the linearization of the rows to u.

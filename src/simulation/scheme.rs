@@ -36,6 +36,11 @@ impl<'a> Scheme<'a> {
         Self { integrator, tableau, depth, shifts, start_up, starter, covectors }
     }
 
+    /// How far ahead of the state contact is looked at in a step, in steps.
+    pub(super) fn ahead(&self) -> f64 {
+        self.tableau.stages.iter().map(|stage| stage.end + stage.contact.lead()).fold(1.0, f64::max)
+    }
+
     /// ψ of the known states over h, one entry a dof: times M it is the momentum that the scheme conserves. `past` holds the
     /// states before the newest, in the spacing h.
     pub(super) fn momentum<T: Real>(&self, newest: &Motion<T>, past: &[Motion<T>], h: f64) -> Vec<T> {

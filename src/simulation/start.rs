@@ -109,7 +109,7 @@ impl<T: Real> Start<'_, T> {
             put(&mut motion.v[dof], support[1], "velocity", dof)?;
             motion.a[dof] = support[2];
         }
-        constraints.search(t, &motion.u, &motion.v, g)?;
+        constraints.search(&motion, scheme.ahead() * h, g)?;
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
         projection.reset();
 

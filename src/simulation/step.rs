@@ -25,8 +25,9 @@ impl<T: Real> Simulation<'_, T> {
     /// # Errors
     ///
     /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
-    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::LinearNotConverged`],
-    /// [`Error::TimeNotAdvancing`], or what the host's own parts return; [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
+    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::PassedThrough`],
+    /// [`Error::LinearNotConverged`], [`Error::TimeNotAdvancing`], or what the host's own parts return;
+    /// [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
     /// were.
     pub fn step(&mut self) -> Result<()> {
         match self.judge {
@@ -37,9 +38,9 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Tries a step of the present size.
     pub(super) fn attempt(&mut self) -> Result<Verdict> {
-        let Self { constraints, g, state, history, work, ledger, .. } = self;
+        let Self { constraints, g, state, history, work, ledger, scheme, .. } = self;
         history.clock.check()?;
-        constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g)?;
+        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g)?;
         work.trial.carry_over(&state.contacts, &constraints.ids);
         if let Some(ledger) = ledger {
             ledger.begin(state);
@@ -48,7 +49,7 @@ impl<T: Real> Simulation<'_, T> {
         work.backup.begin();
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
-        let result = self.stages().and_then(|()| self.accept());
+        let result = self.stages().and_then(|()| self.inspect()).and_then(|()| self.accept());
         if !matches!(result, Ok(Verdict::Accepted)) {
             self.undo();
         }
@@ -57,11 +58,19 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Undoes what an attempt has done to state, history and rows.
     fn undo(&mut self) {
-        let Self { constraints, g, state, history, work, .. } = self;
+        let Self { constraints, g, state, history, work, scheme, .. } = self;
         work.backup.undo(&mut history.slots);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its error.
-        constraints.search(state.motion.t, &state.motion.u, &state.motion.v, g).ok();
+        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
+    }
+
+    /// Lets the constraints look at the motion in slot 0 of the history.
+    fn inspect(&mut self) -> Result<()> {
+        let Self { constraints, history, work, .. } = self;
+        let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
+        // (States of the past that were edited have their displacements.)
+        constraints.inspect([&past[work.backup.rotations - 1], new], [&work.closed_at_start, &work.trial.closed])
     }
 
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be

@@ -59,7 +59,7 @@ pub fn gap_jacobian<T: Real>(
     step: f64,
 ) -> Result<GapJacobianError> {
     constraint.check(u.len())?;
-    constraint.search(t, u, v)?;
+    constraint.search(t, u, v, 0.0)?;
     let rows = constraint.candidates();
     let ids: Vec<_> = (0..rows).map(|row| constraint.identity(row)).collect();
     let mut g = ContactJacobian::default();
@@ -133,7 +133,7 @@ pub fn gap_jacobian<T: Real>(
             }
         }
     }
-    constraint.search(t, u, v)?;
+    constraint.search(t, u, v, 0.0)?;
     error.rows_lost = lost.iter().filter(|&&lost| lost).count();
     Ok(error)
 }
@@ -146,7 +146,7 @@ fn gaps_of<T: Real>(
     u: &[T],
     v: &[T],
 ) -> Result<Vec<Option<f64>>> {
-    constraint.search(t, u, v)?;
+    constraint.search(t, u, v, 0.0)?;
     let mut found = vec![T::zero(); constraint.candidates()];
     constraint.gap(t, u, &mut found);
     let mut gaps = vec![None; ids.len()];

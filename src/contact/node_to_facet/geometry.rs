@@ -99,6 +99,18 @@ impl Shape {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
+    /// A corner.
+    pub(super) fn corner(&self, k: usize) -> Point {
+        self.corners[k]
+    }
+
+    /// Whether the projection of a point is on a segment or a triangle, its rim included.
+    pub(super) fn holds(&self, p: Point) -> bool {
+        const RIM_OF_RAY: f64 = 1e-9;
+        let rim = Rim { sides: [true; 4], vertices: [true; 4], beyond: RIM_OF_RAY };
+        self.project(p, rim).is_some_and(|foot| foot.location == Location::Inside)
+    }
+
     /// Length of the longest side.
     pub(super) fn size(&self) -> f64 {
         (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max).sqrt()

@@ -1,6 +1,6 @@
 //! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
 
-use super::geometry::{Point, RIM};
+use super::geometry::{Point, RIM, norm};
 use super::surface::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -39,6 +39,12 @@ impl Bounds {
 
     pub(super) fn contains(&self, x: Point) -> bool {
         (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
+    }
+
+    /// A bound of |x − y| over x in one box and y in the other.
+    pub(super) fn farthest(&self, other: &Self) -> f64 {
+        let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
+        norm([one(0), one(1), one(2)])
     }
 
     /// Largest absolute coordinate: the scale of rounding.

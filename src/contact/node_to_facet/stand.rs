@@ -33,7 +33,8 @@ pub(super) struct Stand {
 #[derive(Clone, Copy)]
 pub(super) struct Ground<'a> {
     pub(super) nodes: &'a [usize],
-    pub(super) neighborhood: &'a Neighborhood,
+    /// Facets to look at; all of them, if there is none.
+    pub(super) neighborhood: Option<&'a Neighborhood>,
     pub(super) surface: &'a Surface,
     /// The surface of the nodes, if known.
     pub(super) own: Option<&'a Surface>,
@@ -43,13 +44,33 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
+    /// Facets to look at for the node at a place of the list.
+    pub(super) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
+        let list = self.neighborhood.map(|lists| lists.of(place));
+        let count = list.map_or(self.surface.facets().len(), <[usize]>::len);
+        (0..count).map(move |k| list.map_or(k, |list| list[k]))
+    }
+
     /// The closest facet within `reach` of the node at a place of the list; none beyond the rim.
     pub(super) fn closest(&self, place: usize, reach: f64) -> Option<Stand> {
+        let (facet, projected) = self.nearest(place, reach)?;
+        self.on(place, facet, &projected)
+    }
+
+    /// The distance of that facet, or of its rim, and the stand on it; `reach` if there is no facet as near.
+    pub(super) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
+        match self.nearest(place, reach) {
+            Some((facet, projected)) => (projected.1.distance, self.on(place, facet, &projected)),
+            None => (reach, None),
+        }
+    }
+
+    fn nearest(&self, place: usize, reach: f64) -> Option<(usize, (Shape, Foot))> {
         let Self { surface, positions, .. } = *self;
         let p = positions[self.nodes[place]];
         let own_normal = self.own_normal(place);
         let mut best: Option<(usize, (Shape, Foot))> = None;
-        for &index in self.neighborhood.of(place) {
+        for index in self.near(place) {
             let limit = best.map_or(reach, |(_, (_, foot))| foot.distance);
             let [lower, upper] = surface.facets()[index].shape(positions).bounds();
             let bounds = Bounds { lower, upper };
@@ -65,8 +86,7 @@ impl Ground<'_> {
                 best = Some((index, projected));
             }
         }
-        let (facet, projected) = best?;
-        self.on(place, facet, &projected)
+        best
     }
 
     /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node
@@ -78,7 +98,7 @@ impl Ground<'_> {
         stays.then(|| self.on(place, facet, &projected)).flatten()
     }
 
-    fn own_normal(&self, place: usize) -> Option<Point> {
+    pub(super) fn own_normal(&self, place: usize) -> Option<Point> {
         self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
     }
 
@@ -91,6 +111,11 @@ impl Ground<'_> {
         let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
         Some(Stand { place, facet, location, weights, normal, gap, jumps: 0 })
     }
+}
+
+/// Whether a node with this normal, if it has one, meets the front of a facet with that one.
+pub(super) fn meets(normal: Point, own_normal: Option<Point>) -> bool {
+    own_normal.is_none_or(|own| dot(own, normal) <= SAME_SIDE)
 }
 
 /// Whether a facet is turned against the normal of a node, if that is known.

@@ -15,6 +15,8 @@ pub(super) struct Surface {
     nodes: Vec<usize>,
     /// (node, facet, vertex of the facet), sorted: the facets around a node are a range.
     around: Vec<(usize, usize, usize)>,
+    /// The longest side of the smallest facet, in the reference coordinates.
+    finest: f64,
 }
 
 fn refuse(facet: usize, reason: &'static str) -> Error {
@@ -39,6 +41,7 @@ impl Surface {
                 return Err(refuse(index, "it has no length or area, or its normals point to both sides"));
             }
         }
+        let finest = facets.iter().map(|facet| facet.shape(coordinates).size()).fold(f64::INFINITY, f64::min);
         let mut around: Vec<_> = facets
             .iter()
             .enumerate()
@@ -53,6 +56,7 @@ impl Surface {
             facets,
             nodes,
             around,
+            finest,
         };
         surface.connect(dimension)?;
         surface.find_rim();
@@ -118,6 +122,11 @@ impl Surface {
 
     pub(super) fn facets(&self) -> &[Facet] {
         &self.facets
+    }
+
+    /// The longest side of the smallest facet, in the reference coordinates.
+    pub(super) fn finest(&self) -> f64 {
+        self.finest
     }
 
     /// Nodes of the facets, sorted.

@@ -1,0 +1,207 @@
+//! What nodes have passed through in a step: their ways against facets that move.
+
+use super::geometry::{Point, Shape, add_scaled, dot, norm, sub};
+use super::search::Bounds;
+use super::stand::{Ground, Stand, meets};
+use super::{Facet, NodeToFacet};
+use crate::contact::{LARGEST_MISS, STEEP, Stride, press_differently};
+use crate::error::Result;
+use crate::real::Real;
+
+/// Share of the smallest facet that a node may move against the other surface without being looked at: what it can pass by
+/// then is not smaller than the mesh.
+const FINE: f64 = 0.125;
+
+/// The same above which the normal is looked at along which a node was stopped: below, only at an edge it can be another than
+/// that of the facet, and there it is anyone's.
+const COARSE: f64 = 0.6;
+
+/// A node and the surface of its pass, at the start and at the end of a step.
+struct Crossing<'a> {
+    grounds: [Ground<'a>; 2],
+    place: usize,
+    node: usize,
+    /// A bound of its way against the surface.
+    way: f64,
+}
+
+impl<T: Real> NodeToFacet<T> {
+    /// Refuses a step in which a node has gone through the other surface, or was stopped where there is none.
+    pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        let mut ends = std::mem::take(&mut self.ends);
+        let result = self.look_along(step, &mut ends);
+        self.ends = ends;
+        result
+    }
+
+    fn look_along(&self, step: &Stride<'_, T>, ends: &mut [Vec<Point>; 2]) -> Result<()> {
+        let moved = |node: usize| sub(self.vector(node, step.u[1]), self.vector(node, step.u[0]));
+        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| moved(node))));
+        let longest = motions[0].farthest(&motions[1]);
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        if longest <= FINE * surfaces.iter().flatten().map(|surface| surface.finest()).fold(f64::INFINITY, f64::min) {
+            return Ok(());
+        }
+        for (positions, u) in ends.iter_mut().zip(step.u) {
+            for &node in self.bodies.iter().flatten() {
+                positions[node] = add_scaled(self.coordinates[node], 1.0, self.vector(node, u));
+            }
+        }
+        let mut rows = self.rows.identities.iter().copied().enumerate().peekable();
+        for (pass, (list, surface)) in self.passes.iter().zip(surfaces.into_iter().flatten()).enumerate() {
+            let own = if pass == 0 { self.own_surface.as_ref() } else { Some(&self.surface) };
+            for (place, &node) in list.nodes.iter().enumerate() {
+                let row = rows.next_if(|&(_, identity)| identity == (node, pass)).map(|(row, _)| row);
+                let way = Bounds::of_points([moved(node)]).farthest(&motions[1 - pass]);
+                if way <= list.clearance[place] || way <= FINE * surface.finest() {
+                    continue;
+                }
+                // Lists know what a node may meet, unless it was faster than its velocity promised.
+                let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.listed);
+                let [start, end] = [&ends[0], &ends[1]].map(|positions| Ground {
+                    nodes: &list.nodes,
+                    neighborhood,
+                    surface,
+                    own,
+                    positions,
+                    rounding: Self::rounding(),
+                });
+                let crossing = Crossing { grounds: [start, end], place, node, way };
+                let closed = row.map(|row| step.closed.map(|flags| flags[row]));
+                let velocity = |node: usize| self.vector(node, step.v);
+                if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
+                    return Err(step.refuse((node, pass), what, way, gap));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Crossing<'_> {
+    fn facet(&self, facet: usize) -> &Facet {
+        &self.grounds[0].surface.facets()[facet]
+    }
+
+    /// Says what is wrong with the way of the node, how long it is, and the gap at its start. `closed` are the flags of its
+    /// row at the start and at the end, if it has one.
+    fn look_at(
+        &self,
+        closed: Option<[bool; 2]>,
+        velocity: impl Fn(usize) -> Point,
+    ) -> std::result::Result<(), (&'static str, f64, f64)> {
+        let range = 2.0 * self.way;
+        let [start, end] = &self.grounds;
+        let before = closed.and_then(|_| start.closest(self.place, f64::INFINITY));
+        let after = end.closest(self.place, range);
+        let gap = before.map_or(f64::INFINITY, |stand| stand.gap);
+        let Some(from) = before else {
+            return match self.passes(f64::INFINITY) {
+                true => Err(("was out of reach, and went through a facet", self.way, gap)),
+                false => Ok(()),
+            };
+        };
+        // The way against the point of the facet where the node stands, and the gap that follows from it.
+        let against = |vector: &dyn Fn(usize) -> Point| {
+            let nodes = self.facet(from.facet).nodes;
+            let carried = nodes.iter().zip(from.weights);
+            carried.fold(vector(self.node), |sum, (&vertex, weight)| add_scaled(sum, -weight, vector(vertex)))
+        };
+        let way = against(&|node| sub(end.positions[node], start.positions[node]));
+        let length = norm(way);
+        let linear = gap + dot(from.normal, way);
+        if let Some([false, true]) = closed {
+            let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
+                return Err(("was stopped where the surface has ended", length, gap));
+            };
+            if to.gap.abs() > LARGEST_MISS * length {
+                return Err(("was stopped away from the surface", length, gap));
+            }
+            let speed = against(&velocity);
+            let size = norm(speed);
+            let coarse = length > COARSE * start.surface.finest();
+            if coarse
+                && size > 0.0
+                && press_differently([from.normal, to.normal].map(|normal| dot(normal, speed) / size))
+            {
+                return Err(("was stopped along a normal that is not the one where it met the surface", length, gap));
+            }
+        }
+        // Inside, as its row says; or on the way around an edge that it was at.
+        let explained = |to: Stand| {
+            let turn = dot(from.normal, to.normal);
+            let inside = to.gap < 0.0 && linear - to.gap <= LARGEST_MISS * length && turn > 0.5;
+            inside || gap.max(-to.gap) < LARGEST_MISS * length && turn > -0.5
+        };
+        if !after.is_some_and(explained) && self.passes(length) {
+            return Err(("went through a facet", length, gap));
+        }
+        let turned = after.is_some_and(|to| dot(from.normal, to.normal) < 0.0);
+        if gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
+            return Err(("went through the body that it was in", length, gap));
+        }
+        Ok(())
+    }
+
+    /// Whether the node goes through a facet that it may meet, from the front to the back.
+    fn passes(&self, length: f64) -> bool {
+        let Self { grounds: [start, end], place, node, .. } = *self;
+        let own_normal = start.own_normal(place);
+        let ends = [start.positions[node], end.positions[node]];
+        let whole = Bounds::of_points(ends);
+        start.near(place).any(|index| {
+            let facet = self.facet(index);
+            let corners = [start, end].map(|ground| facet.nodes.map(|vertex| ground.positions[vertex]));
+            let swept = Bounds::of_points(corners.iter().flatten().copied());
+            if !whole.intersects(&swept) {
+                return false;
+            }
+            let triangles: &[[usize; 3]] = match facet.nodes().len() {
+                4 => &[[0, 1, 2], [0, 2, 3]],
+                _ => &[[0, 1, 2]],
+            };
+            let segment = facet.nodes().len() == 2;
+            triangles.iter().any(|triangle| {
+                let corners = corners.map(|corners| triangle.map(|k| corners[k]));
+                pierces(ends, corners, segment, length, |normal| meets(normal, own_normal))
+            })
+        })
+    }
+}
+
+/// Whether a point goes through a triangle, or a segment in the plane, from the front to the back; both move in straight lines.
+fn pierces(
+    ends: [Point; 2],
+    corners: [[Point; 3]; 2],
+    segment: bool,
+    length: f64,
+    meets: impl Fn(Point) -> bool,
+) -> bool {
+    const HALVINGS: usize = 40;
+    let at = |s: f64| {
+        let between = |[from, to]: [Point; 2]| add_scaled(from, s, sub(to, from));
+        let [a, b, c] = [0, 1, 2].map(|k| between([corners[0][k], corners[1][k]]));
+        let shape = Shape::new([a, b, if segment { b } else { c }, c], if segment { 2 } else { 3 });
+        (between(ends), shape)
+    };
+    let middle = [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0];
+    let height = |s: f64| {
+        let (p, shape) = at(s);
+        shape.normal(&middle).map(|normal| (dot(normal, sub(p, shape.corner(0))), normal))
+    };
+    let (Some((before, normal)), Some((after, _))) = (height(0.0), height(1.0)) else { return false };
+    // What goes in so little, as over a convex corner, has not gone through. (A way is not shorter than its share in height.)
+    if !(before >= 0.0 && after < -STEEP * length.min(before - after) && meets(normal)) {
+        return false;
+    }
+    let (mut front, mut back) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let s = 0.5 * (front + back);
+        match height(s).is_some_and(|(height, _)| height >= 0.0) {
+            true => front = s,
+            false => back = s,
+        }
+    }
+    let (p, shape) = at(front);
+    shape.holds(p)
+}
