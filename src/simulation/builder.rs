@@ -13,9 +13,9 @@ use super::stability::{self, StepLimit};
 use super::start::{self, Start, Violation};
 use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
 use crate::analysis::{self, LocalError};
-use crate::contact::ContactConstraint;
+use crate::contact::{ContactConstraint, ContactLaw};
 use crate::contact_solver::{ActiveSet, ContactSolver};
-use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection, PersistencyCorrection};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
@@ -36,6 +36,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     constraints: Vec<Box<dyn ContactConstraint<T> + 'a>>,
     contact_solver: Box<dyn ContactSolver<T> + 'a>,
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
+    correction: DefaultCorrection,
     linear_solver: Box<dyn LinearSolver<T> + 'a>,
     start_up: StartUp,
     newton: Option<Newton>,
@@ -43,6 +44,13 @@ pub struct SimulationBuilder<'a, T: Real> {
     resumed: Option<(State<T>, History<T>)>,
     balance: EnergyBalance,
     stability: Stability,
+}
+
+/// Whether the correctors are those that suit most runs, or were chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DefaultCorrection {
+    Wanted,
+    Replaced,
 }
 
 /// Whether the step size is compared with the stability limit of the scheme.
@@ -82,6 +90,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             constraints: Vec::new(),
             contact_solver: Box::new(ActiveSet::default()),
             correctors: Vec::new(),
+            correction: DefaultCorrection::Wanted,
             linear_solver: Box::new(Automatic),
             start_up: StartUp::default(),
             newton: None,
@@ -127,24 +136,32 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Leaves contact as the scheme solves it: correctors given before are dropped. For comparisons, and for schemes that are
-    /// studied raw.
+    /// Leaves contact as the scheme solves it: without correctors, and without the one that is there by default. Contact forces
+    /// then spike at impact, and velocities oscillate: the trapezoidal rule may end the fall of a block with many times its
+    /// energy. For comparisons, and for schemes that are studied raw.
     #[must_use]
     pub fn uncorrected(mut self) -> Self {
         self.correctors.clear();
+        self.correction = DefaultCorrection::Replaced;
         self
     }
 
-    /// Adds a corrector; several act in the order given.
+    /// Adds a corrector; several act in the order given, and in place of the one that is there by default:
+    /// [`PersistencyCorrection::with_history_projection`], where contact is rigid, on dofs with mass, and imposed on the
+    /// displacements of the state. (Contact on velocities or ahead of the state leaves nothing to correct, compliant laws
+    /// and [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] have cures of their own.)
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
+        self.correction = DefaultCorrection::Replaced;
         self.correctors.push(Box::new(corrector));
         self
     }
 
-    /// Adds correctors that were chosen at run time: any number, an `Option` for instance.
+    /// Adds correctors that were chosen at run time: any number, an `Option` for instance. None leave contact
+    /// [as it is](Self::uncorrected).
     #[must_use]
     pub fn correctors(mut self, correctors: impl IntoIterator<Item = Box<dyn Corrector<T> + 'a>>) -> Self {
+        self.correction = DefaultCorrection::Replaced;
         self.correctors.extend(correctors);
         self
     }
@@ -284,6 +301,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Refused)?
         };
         contact_solver.reserve(rows);
+        let mut correctors = self.correctors;
+        if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
+            correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
+        }
         let limit = match self.stability {
             Stability::Checked => stability::check_step(&mut *system, &scheme, &state.motion, history.clock.h)?,
             Stability::Unchecked => StepLimit::Unchecked,
@@ -302,7 +323,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let slots = history.slots.len();
         let interface = constraints.interface().len();
         let contact = ([rows, constraints.entries()], interface);
-        let mut work = workspace(&mut *system, &program, &self.correctors, projection, contact, slots);
+        let mut work = workspace(&mut *system, &program, &correctors, projection, contact, slots);
         work.massless = massless;
         work.newton = match (self.newton, system.linearity()) {
             (None, Linearity::Linear) => None,
@@ -333,7 +354,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             constraints,
             g,
             contact_solver,
-            correctors: self.correctors,
+            correctors,
             linear_solver: self.linear_solver,
             scheme,
             program,
@@ -347,6 +368,17 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
+}
+
+/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not known
+/// yet), on dofs with mass.
+fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
+    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
+    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
+        && constraints.capacity() > 0
+        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
+        && constraints.interface().iter().any(has_mass)
 }
 
 /// Refuses a state and history that another run could not have left.
