@@ -202,12 +202,13 @@ fn release_returns_what_the_impact_took() {
 fn books_close_with_every_corrector() {
     let dissimilar = Bars { young: [49.0, 100.0], elements: [35, 50], ..bars(50, 0.3) };
     let transit = 0.2 / 100.0;
-    let correctors: [fn(f64) -> Correctors; 5] = [
+    let correctors: [fn(f64) -> Correctors; 6] = [
         |_| list([Box::new(ContactImplicit)]),
         |_| list([Box::new(ContactStabilized::new())]),
         |_| list([Box::new(ContactStabilized::improved())]),
         |_| list([Box::new(PersistencyCorrection::new()), Box::new(Release)]),
         |transit| list([Box::new(TaylorPapadopoulos::new(transit).unwrap())]),
+        |_| list([Box::new(TaylorPapadopoulos::with_impedances([0.7, 1.0].map(|c| 0.25 * c)).unwrap())]),
     ];
     for make in correctors {
         for mass in [MassKind::Lumped, MassKind::Consistent] {
@@ -259,6 +260,43 @@ fn wave_release_is_the_impulse_of_the_last_force() {
     drop(system);
     let jump = path(Box::new(TaylorPapadopoulos::new(0.04).unwrap())) - path(Box::new(PersistencyCorrection::new()));
     assert!((jump - 0.5 * 0.04 * 7.0 / 2.0).abs() < 1e-12, "{jump}");
+}
+
+/// Two masses pressed together by loads that turn around: the gap opens at the rate that the impedances say, and the momentum
+/// of both together is that of the loads.
+#[test]
+fn impedances_give_the_rate_of_opening_and_take_no_momentum() {
+    let masses = [2.0, 0.3];
+    let path = |corrector: Box<dyn Corrector<f64>>| {
+        let zero = SparseColMat::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let system = LinearSystem::lumped(masses.to_vec(), zero).unwrap();
+        let system = system.load(|t, f| {
+            let force = if t < 0.099 { 7.0 } else { -5.0 };
+            (f[0], f[1]) = (force, -force);
+        });
+        let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0).unwrap(), 0.01)
+            .constraint(LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.0))
+            .corrector(corrector)
+            .build()
+            .unwrap();
+        run.run_until(0.1, &mut ()).unwrap();
+        let v = run.state().velocity();
+        assert!((masses[0] * v[0] + masses[1] * v[1]).abs() < 1e-14, "{v:?}");
+        v[1] - v[0]
+    };
+    let still = path(Box::new(PersistencyCorrection::new()));
+    let opening = |corrector: TaylorPapadopoulos| path(Box::new(corrector)) - still;
+    let found = opening(TaylorPapadopoulos::with_impedances([40.0, 9.0]).unwrap());
+    assert!((found - 7.0 * (1.0 / 40.0 + 1.0 / 9.0)).abs() < 1e-12, "{found}");
+    let found = opening(TaylorPapadopoulos::with_impedances([f64::INFINITY, 9.0]).unwrap());
+    assert!((found - 7.0 / 9.0).abs() < 1e-12, "{found}");
+    // Nodes of mass ½ τ Z with one τ: both ways to say it are one.
+    let one_time = TaylorPapadopoulos::with_impedances(masses.map(|m| 2.0 * m / 0.04)).unwrap();
+    let by_time = opening(TaylorPapadopoulos::new(0.04).unwrap());
+    assert!((opening(one_time) - by_time).abs() < 1e-13, "{by_time}");
+    for wrong in [[0.0, 1.0], [-1.0, 1.0], [f64::NAN, 1.0], [f64::INFINITY, f64::INFINITY]] {
+        assert!(matches!(TaylorPapadopoulos::with_impedances(wrong), Err(Error::Parameter { .. })), "{wrong:?}");
+    }
 }
 
 #[test]

@@ -505,6 +505,12 @@ impl<T: Real> Correction<'_, T> {
         self.move_past(row, impulse)
     }
 
+    /// Applies an impulse along a row to the velocities, and to the past as if they had always been so.
+    pub(super) fn part(&mut self, row: usize, impulse: T) -> Result<()> {
+        self.apply_impulses(&[row], &[impulse])?;
+        self.move_past(row, impulse)
+    }
+
     /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later rows read
     /// them. Schemes that difference displacements would see a part of it else, or more than all.
     fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {

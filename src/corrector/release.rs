@@ -1,7 +1,7 @@
 //! What velocities become where a contact opens.
 
 use super::{Correction, Corrector, Edits};
-use crate::error::{Result, positive};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
 /// Gives back at release what corrections took at impact: the release counterpart of the λ_v/λ_a correction, to be added
@@ -50,21 +50,25 @@ impl<T: Real> Corrector<T> for Release {
 }
 
 /// Impact and release conditions from waves in the contact elements (Hughes, Taylor, Sackman, Curnier, Kanoknukulchai, Comput.
-/// Methods Appl. Mech. Eng. 8, 1976; Taylor, Papadopoulos, Int. J. Numer. Methods Eng. 36, 1993), in the form that the masses of
-/// the contact nodes allow.
+/// Methods Appl. Mech. Eng. 8, 1976; Taylor, Papadopoulos, Int. J. Numer. Methods Eng. 36, 1993), in a form that conserves
+/// momentum.
 ///
 /// At impact, and as long as it lasts, velocity and acceleration of both sides are the common ones, as by
 /// [`PersistencyCorrection`](super::PersistencyCorrection). At release the stress p that the contact has held runs off as a
-/// wave, and changes the velocity of either side by p/(ρ c): with a contact node of mass m = ρ A h_e/2 and the time τ = h_e/c of a
-/// wave through its element this is the impulse ½ τ λ,
+/// wave, and changes the velocity of side i by p/(ρ_i c_i): the gap opens at the rate λ (1/Z₁ + 1/Z₂), with the impedances Z_i = ρ_i c_i A of
+/// the bodies behind the contact and λ the last force reported. The nodes get this relative velocity from one impulse j along the
+/// row,
 ///
 /// ```text
-/// v ← v + M⁻¹ Gᵀ (½ τ λ)
+/// v ← v + M⁻¹ Gᵀ j,      S j = λ (1/Z₁ + 1/Z₂)        (S = G M⁻¹ Gᵀ)
 /// ```
 ///
-/// with λ the last force reported. One τ serves all contacts; where the elements on both sides have different ones, it is not
-/// the condition of the papers, which would not conserve momentum there. As derived here linear momentum is conserved; energy
-/// may rise at release, by ½ S (½ τ λ)².
+/// which takes from one side the momentum that it gives to the other, whatever the bodies. With contact nodes of mass m_i = ½ τ_i Z_i, whose
+/// elements a wave crosses in τ_i, it is j = ½ λ (τ₁ m₂ + τ₂ m₁)/(m₁ + m₂): the papers' own condition where τ₁ = τ₂, and then
+/// [`new`](Self::new) says it with τ alone, j = ½ τ λ. Where they differ, the papers' velocities of the two sides would not
+/// conserve momentum on the nodes; here each side has its share of the relative velocity by its mass.
+///
+/// Energy changes at release by ½ S j² + j [[v]], which may be a rise.
 ///
 /// Known failure: where the force falls to zero over several steps, as waves on a mesh make it, there is hardly any left to be
 /// released, and the condition does next to nothing.
@@ -72,37 +76,81 @@ impl<T: Real> Corrector<T> for Release {
 /// ```
 /// use contact_dynamics::Corrector;
 /// use contact_dynamics::corrector::TaylorPapadopoulos;
-/// // Steel, c = 5000 m/s, elements of 1 mm.
+/// // Steel, c = 5000 m/s, elements of 1 mm on both sides.
 /// let corrector = TaylorPapadopoulos::new(1e-3 / 5000.0)?;
 /// assert_eq!(Corrector::<f64>::name(&corrector), "Taylor–Papadopoulos(2e-7)");
+/// // Steel on aluminium, 1 cm² behind each contact, in kg/s.
+/// let corrector = TaylorPapadopoulos::with_impedances([7850.0 * 5000.0 * 1e-4, 2700.0 * 5100.0 * 1e-4])?;
+/// // Steel on a rigid wall.
+/// let wall = TaylorPapadopoulos::with_impedances([7850.0 * 5000.0 * 1e-4, f64::INFINITY])?;
+/// # let _: [&dyn Corrector<f64>; 2] = [&corrector, &wall];
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TaylorPapadopoulos {
-    transit: f64,
+pub struct TaylorPapadopoulos(Waves);
+
+/// What is known of the waves behind the contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Waves {
+    /// Time through a contact element, the same on both sides.
+    Transit(f64),
+    /// Impedances of the two sides.
+    Impedances([f64; 2]),
 }
 
 impl TaylorPapadopoulos {
-    /// With the time that a wave takes through a contact element.
+    /// With the time that a wave takes through a contact element, one for both sides of all contacts.
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`](crate::Error::Parameter) unless it is positive and finite.
     pub fn new(transit: f64) -> Result<Self> {
-        positive("the transit time of the contact elements", transit).map(|transit| Self { transit })
+        positive("the transit time of the contact elements", transit).map(|transit| Self(Waves::Transit(transit)))
+    }
+
+    /// With the impedances ρ c A of the two sides (mass/time), A the area that belongs to a contact; of all contacts the same. The
+    /// impedance of what is rigid is infinite.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`](crate::Error::Parameter) unless both are positive, and one of them finite.
+    pub fn with_impedances(impedances: [f64; 2]) -> Result<Self> {
+        for value in impedances {
+            if !(value > 0.0 && value.recip().is_finite()) {
+                let range = "positive, and infinite for one side at most";
+                return Err(Error::Parameter { name: "the impedance of a side", value, range });
+            }
+        }
+        let softer = impedances[0].min(impedances[1]);
+        positive("the smaller impedance", softer).map(|_| Self(Waves::Impedances(impedances)))
     }
 }
 
 impl<T: Real> Corrector<T> for TaylorPapadopoulos {
     fn name(&self) -> String {
-        format!("Taylor–Papadopoulos({:e})", self.transit)
+        match self.0 {
+            Waves::Transit(transit) => format!("Taylor–Papadopoulos({transit:e})"),
+            Waves::Impedances([first, second]) => format!("Taylor–Papadopoulos(Z = {first:e}, {second:e})"),
+        }
+    }
+
+    fn edits(&self) -> Edits {
+        Edits::Past
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         super::PersistencyCorrection::new().correct(step)?;
         step.each_released(|step, row| {
-            let impulse = T::of(0.5 * self.transit) * step.previous_force(row).max(T::zero());
-            step.apply_impulses(&[row], &[impulse])
+            let force = step.previous_force(row).max(T::zero());
+            let impulse = match self.0 {
+                Waves::Transit(transit) => T::of(0.5 * transit) * force,
+                Waves::Impedances(sides) => {
+                    let s = step.compliance(row);
+                    let opening = T::of(sides.map(f64::recip).iter().sum()) * force;
+                    if s > T::zero() { opening / s } else { T::zero() }
+                }
+            };
+            step.part(row, impulse)
         })
     }
 }
