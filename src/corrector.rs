@@ -39,8 +39,7 @@ use crate::tableau::Tableau;
 ///     }
 ///     fn correct(&self, step: &mut Correction<'_, f64>) -> Result<()> {
 ///         step.solve_velocity_jumps()?;
-///         step.push_velocity();
-///         Ok(())
+///         step.push_velocity()
 ///     }
 /// }
 /// let correctors: Vec<Box<dyn Corrector<f64>>> = vec![Box::new(Plastic), Box::new(PersistencyCorrection::new())];
@@ -61,6 +60,17 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     ///
     /// The reason, for the [`Error::Incompatible`](crate::Error::Incompatible) that a builder returns.
     fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        let _ = tableau;
+        Ok(())
+    }
+
+    /// Whether it can act with a scheme where bodies have damping, or why not; asked once, at build, of such systems. Default:
+    /// it can.
+    ///
+    /// # Errors
+    ///
+    /// The reason, as from [`check`](Self::check).
+    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
         let _ = tableau;
         Ok(())
     }
@@ -108,6 +118,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
         (**self).check(tableau)
+    }
+    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        (**self).check_damping(tableau)
     }
     fn predicts(&self) -> bool {
         (**self).predicts()

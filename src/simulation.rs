@@ -38,7 +38,7 @@ use contact_step::{ContactRowsWork, InterfaceWork};
 use control::Judge;
 use energy::Ledger;
 use newton_step::NewtonWork;
-use operator::Operator;
+pub(crate) use operator::Operator;
 use program::Program;
 use scheme::Scheme;
 use stability::StepLimit;

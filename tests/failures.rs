@@ -3,7 +3,7 @@
 
 use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::tableau::{Row, Rows, Stage, Tableau, U, V, Z};
+use contact_dynamics::tableau::{Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
     CentralDifference, Cholesky, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem, Newmark,
     PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,

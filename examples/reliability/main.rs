@@ -5,6 +5,7 @@
 //! the code is gone.
 
 mod absolute_time;
+mod damping;
 mod finite;
 mod release;
 
@@ -24,8 +25,12 @@ struct Case {
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
 type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
 
-const SUBJECTS: [Subject; 3] =
-    [("absolute time", absolute_time::cases), ("NaN from the host", finite::cases), ("release", release::cases)];
+const SUBJECTS: [Subject; 4] = [
+    ("absolute time", absolute_time::cases),
+    ("NaN from the host", finite::cases),
+    ("release", release::cases),
+    ("damping and corrections", damping::cases),
+];
 
 fn main() -> Result<(), Anything> {
     let output = Output::from_command_line("reliability")?;

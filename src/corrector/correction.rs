@@ -6,6 +6,7 @@ use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::simulation::Operator;
 use crate::state::{ContactState, Motion};
 use crate::system::{Damping, Linearity, System};
 
@@ -22,6 +23,8 @@ pub struct Correction<'a, T: Real> {
     pub(crate) scheme: Scheme<'a>,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) projection: &'a mut JumpProjection<T>,
+    /// The factorized effective matrix of the stage.
+    pub(crate) operator: &'a mut Operator<T>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
     pub(crate) system: Erased<'a, T>,
     pub(crate) constraints: ErasedGaps<'a, T>,
@@ -31,6 +34,8 @@ pub struct Correction<'a, T: Real> {
     pub(crate) contacts: &'a mut ContactState<T>,
     /// Closed flags before this stage.
     pub(crate) was_closed: &'a [bool],
+    pub(crate) massless: &'a [usize],
+    pub(crate) prescribed: &'a [usize],
     pub(crate) buffers: &'a mut Buffers<T>,
     /// Change of kinetic energy by corrections of velocity.
     pub(crate) energy: &'a mut T,
@@ -341,28 +346,43 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping
-    /// forces to a.
-    pub fn push_velocity(&mut self) {
+    /// forces to a, as [`apply_impulses`](Self::apply_impulses) does.
+    ///
+    /// # Errors
+    ///
+    /// As [`apply_impulses`](Self::apply_impulses).
+    pub fn push_velocity(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
         let impulses = std::mem::take(&mut self.buffers.impulses);
-        self.apply(&rows, &impulses);
+        let result = self.apply(&rows, &impulses);
         for (&row, &impulse) in rows.iter().zip(&impulses).filter(|(_, impulse)| **impulse != T::zero()) {
             self.contacts.lambda_a[row] = -T::of(self.h) * impulse;
         }
         self.buffers.closed = rows;
         self.buffers.impulses = impulses;
+        result
     }
 
-    /// Applies impulses to v along rows, v ← v + M⁻¹ Gᵀ impulses, and the change of damping forces to a. They are booked as
-    /// impulses of their contacts, and the energy they take, seen from the obstacle, as dissipated by these.
+    /// Applies impulses to v along rows, v ← v + δv with δv = M⁻¹ Gᵀ impulses, and with damping the change of its forces
+    /// to a. They are booked as impulses of their contacts, and the energy they take, seen from the obstacle, as dissipated by
+    /// these.
+    ///
+    /// ```text
+    /// a ← a − M⁻¹ C δv               by schemes that read no a: the balance holds at the corrected state
+    /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others: it holds to order h
+    /// ```
+    ///
+    /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of δv at
+    /// this instant; with h C large beside M it changes v by many times δv, though the damping would have stopped the bodies
+    /// by then. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for large ones; momentum
+    /// is conserved as before. It costs a solve where v changes.
     ///
     /// # Errors
     ///
-    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    /// [`Error::ContactNotFinite`] if a rate of the gaps is, and those of the linear solver, which direct ones do not have.
     pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         self.read_rates()?;
-        self.apply(rows, impulses);
-        Ok(())
+        self.apply(rows, impulses)
     }
 
     /// Reads what the rates of the gaps have of their own.
@@ -371,9 +391,9 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// The same if the rates of the rows are known.
-    fn apply(&mut self, rows: &[usize], impulses: &[T]) {
+    fn apply(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
-            return;
+            return Ok(());
         }
         self.projection.prepare(self.g, rows);
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
@@ -416,10 +436,32 @@ impl<T: Real> Correction<'_, T> {
                 }
             };
             if present == Damping::Present {
-                projection.apply_inverse(damping);
-                T::axpy(-T::one(), damping, &mut new.a);
+                self.accelerate_by_damping()?;
             }
         }
+        Ok(())
+    }
+
+    /// Adds to a what the change of damping forces in `damping` makes.
+    fn accelerate_by_damping(&mut self) -> Result<()> {
+        let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
+        let change = &mut buffers.damping;
+        if !scheme.read.iter().any(|[.., a]| *a) {
+            // No step starts from a.
+            projection.apply_inverse(change);
+            T::axpy(-T::one(), change, &mut new.a);
+            return Ok(());
+        }
+        // Dofs without mass respond too, so that internal damping keeps its momentum, but have no acceleration.
+        for &dof in *prescribed {
+            change[dof] = T::zero();
+        }
+        operator.solve(change)?;
+        for &dof in *massless {
+            change[dof] = T::zero();
+        }
+        T::axpy(-T::of(scheme.balance / (*h * *h)), change, &mut new.a);
+        Ok(())
     }
 
     /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative
@@ -474,13 +516,13 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    /// As [`apply_impulses`](Self::apply_impulses).
     pub fn exchange_energy(&mut self, row: usize, energy: T) -> Result<()> {
         let (s, rate) = (self.compliance(row), self.rate(row)?);
         if s > T::zero() && energy != T::zero() && energy.is_finite() {
             // ½ S j² + rate j = energy; beyond what the rate holds, all of it.
             let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
-            self.apply(&[row], &[(root - rate) / s]);
+            return self.apply(&[row], &[(root - rate) / s]);
         }
         Ok(())
     }
@@ -501,7 +543,7 @@ impl<T: Real> Correction<'_, T> {
             true => T::of(2.0) * taken / (root + rate),
             false => (root - rate) / s,
         };
-        self.apply(&[row], &[impulse]);
+        self.apply(&[row], &[impulse])?;
         self.move_past(row, impulse)
     }
 
@@ -604,17 +646,18 @@ impl<T: Real> Correction<'_, T> {
             let column = &self.buffers.s[i * size..(i + 1) * size];
             square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
         }
+        let mut result = Ok(());
         if square > T::zero() {
             let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
             let factor = (root - rate) / square;
             for x in &mut impulses {
                 *x *= factor;
             }
-            self.apply(&rows, &impulses);
+            result = self.apply(&rows, &impulses);
         }
         self.buffers.closed = rows;
         self.buffers.impulses = impulses;
-        Ok(())
+        result
     }
 
     /// Calls a function with every row that has opened, up to its first error.

@@ -32,12 +32,12 @@ pub enum HistoryProjection {
 /// After the contact problem of a stage, on closed rows, with S = G M⁻¹ Gᵀ and γ the motion of the obstacle:
 ///
 /// ```text
-/// λ_a = h S⁻¹ (G v − γ_v)             v ← v − M⁻¹ Gᵀ λ_a / h          a ← a − M⁻¹ C δv
+/// λ_a = h S⁻¹ (G v − γ_v)             v ← v − M⁻¹ Gᵀ λ_a / h          a ← a − M⁻¹ C δv, or as in `apply_impulses`
 /// λ_v = −(h/w_a) S⁻¹ (G a − γ_a)      a ← a − M⁻¹ Gᵀ S⁻¹ (G a − γ_a)
 /// p' = p − (w_ā/w_a) S⁻¹ (G a − γ_a)
 /// ```
 ///
-/// p' is the reported force; the raw p keeps deciding release. Rows that touch without pressure are corrected on
+/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses). p' is the reported force; the raw p keeps deciding release. Rows that touch without pressure are corrected on
 /// approach only. Linear momentum is conserved, kinetic energy never rises: an impact costs ½ jumpᵀ S⁻¹ jump, which is
 /// 1/(2n) of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly
 /// closed contact are projected too; multistep schemes need it, one-step schemes that read no past ignore it.
@@ -112,7 +112,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.solve_velocity_jumps()?;
         if self.parts != Parts::Acceleration {
-            step.push_velocity();
+            step.push_velocity()?;
         }
         if self.parts != Parts::Velocity {
             step.solve_acceleration_jumps()?;

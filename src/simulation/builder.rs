@@ -277,7 +277,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         }
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         if rows > 0 {
-            check_corrections(&*integrator, &tableau, &self.correctors)?;
+            check_corrections(&*integrator, &tableau, &mut *system, &self.correctors)?;
         }
         let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {
@@ -413,8 +413,7 @@ fn workspace<T: Real>(
     slots: usize,
 ) -> Workspace<T> {
     let dofs = system.dofs();
-    let (still, mut force) = (vec![T::zero(); dofs], vec![T::zero(); dofs]);
-    let damped = match system.damping_force(&still, &still, &mut force) {
+    let damped = match damping(system) {
         Damping::Present if !correctors.is_empty() => dofs,
         _ => 0,
     };
@@ -516,10 +515,11 @@ fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<()> {
     Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
 }
 
-/// Refuses corrections of contact that is not imposed on the displacements of the state.
+/// Refuses corrections of contact that is not imposed on the displacements of the state, and those that cannot act.
 fn check_corrections<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
+    system: &mut dyn System<T>,
     correctors: &[Box<dyn Corrector<T> + '_>],
 ) -> Result<()> {
     let refuse = |corrector: &dyn Corrector<T>, reason| {
@@ -539,12 +539,23 @@ fn check_corrections<T: Real>(
         };
         return refuse(&**corrector, reason);
     }
+    let damping = damping(system);
     for corrector in correctors {
-        if let Err(reason) = corrector.check(tableau) {
+        let mut checked = corrector.check(tableau);
+        if damping == Damping::Present {
+            checked = checked.and_then(|()| corrector.check_damping(tableau));
+        }
+        if let Err(reason) = checked {
             return refuse(&**corrector, reason);
         }
     }
     Ok(())
+}
+
+/// Whether a system has damping.
+fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
+    let still = vec![T::zero(); system.dofs()];
+    system.damping_force(&still, &still, &mut still.clone())
 }
 
 /// What the local error of a scheme follows from; refused where contact would not show in it.
@@ -587,8 +598,7 @@ fn check_lagged_damping<T: Real>(
     let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
     let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
     if lags && grows() {
-        let zero = vec![T::zero(); system.dofs()];
-        if system.damping_force(&zero, &zero, &mut zero.clone()) == Damping::Present {
+        if damping(system) == Damping::Present {
             return Err(Error::Incompatible {
                 part: integrator.name(),
                 reason: "it takes damping forces from the start of the step, which makes it unstable for every step \

@@ -249,6 +249,11 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
+    /// `x ← A⁻¹ x`; x is zero on prescribed dofs, before and after.
+    pub(crate) fn solve(&mut self, x: &mut [T]) -> Result<()> {
+        self.factor.solve(x)
+    }
+
     /// `f ← A⁻¹ f` on the interface, for one column of forces there.
     pub(crate) fn respond(&mut self, forces: &mut [T]) -> Result<()> {
         respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces)

@@ -232,6 +232,7 @@ impl<T: Real> Simulation<'_, T> {
                         },
                         g,
                         projection,
+                        operator,
                         solver: &mut **contact_solver,
                         system: Erased(&mut **system),
                         constraints: ErasedGaps(constraints),
@@ -240,6 +241,8 @@ impl<T: Real> Simulation<'_, T> {
                         backup: &mut work.backup,
                         contacts: &mut work.trial,
                         was_closed: &work.was_closed,
+                        massless: &work.massless,
+                        prescribed: &work.prescribed,
                         buffers: &mut work.buffers,
                         energy: &mut work.correction_energy,
                     };
