@@ -7,6 +7,7 @@ mod control;
 mod curved_rows;
 mod energy;
 mod finite;
+mod massless;
 mod newton;
 mod newton_step;
 mod operator;
@@ -37,6 +38,7 @@ use crate::system::System;
 use contact_step::{ContactRowsWork, InterfaceWork};
 use control::Judge;
 use energy::Ledger;
+use massless::MasslessBlock;
 use newton_step::NewtonWork;
 pub(crate) use operator::Operator;
 use program::Program;
@@ -126,6 +128,8 @@ struct Workspace<T: Real> {
     prescribed: Vec<usize>,
     /// Free dofs without mass.
     massless: Vec<usize>,
+    /// For explicit schemes, if there are any.
+    block: Option<MasslessBlock<T>>,
     /// Prescribed u, v, a at the time of the state and at that of the balance.
     supports: Vec<[T; 3]>,
     balance_supports: Vec<[T; 3]>,

@@ -123,7 +123,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// The mass matrix (constant), not negative. Prescribed dofs may have none, other dofs with schemes that take it
-    /// ([`massless_factor`](crate::analysis::massless_factor)).
+    /// ([`massless_factor`](crate::analysis::massless_factor); of the explicit ones central differences and Noh–Bathe's, for linear
+    /// systems).
     fn mass(&self) -> Mass<'_, T>;
 
     /// `out = f(t, u, v)`: external minus internal force, `out` holding anything on entry.

@@ -3,7 +3,7 @@
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::{self, Mass};
 use contact_dynamics::{
-    Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Preset, Simulation, TimeIntegrator,
+    CdLagrange, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Preset, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::record_run;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -136,14 +136,28 @@ fn presets_beat_the_corrected_lumped_mass() {
 }
 
 #[test]
-fn the_explicit_preset_is_exact_at_courant_one() {
+fn central_differences_are_exact_at_courant_one() {
     // The impact inside a step: all forces are F0 but the first and the last.
-    let preset = Preset::explicit();
-    let found = sweep(100, 1.0, |bars| by_preset(preset, bars));
+    let found = sweep(100, 1.0, |bars| {
+        let mut run = Simulation::builder(bars.system::<f64>(), CdLagrange, H)
+            .velocity(bars.velocities())
+            .constraint(bars.contact())
+            .uncorrected()
+            .build()
+            .unwrap();
+        record_run(bars, &mut run, 0.4)
+    });
     assert!(found.mean[MAX] < 1.0 + 1e-9 && found.mean[VARIATION] < 2.0 + 1e-9, "{:?}", found.mean);
-    // Below it loses what the mass of the contact nodes had.
-    let found = sweep(50, 1.0, |bars| by_preset(preset, bars));
-    assert!(found.mean[MAX] < 1.12 && (found.mean[LOSS] - 0.01).abs() < 2e-3, "{:?}", found.mean);
+}
+
+#[test]
+fn the_explicit_preset_takes_any_courant_number() {
+    // 0.1, 0.2, 0.5 and the limit.
+    for (n, error) in [(10, 0.08), (20, 0.04), (50, 0.02), (100, 0.006)] {
+        let found = sweep(n, 1.0, |bars| by_preset(Preset::explicit(), bars));
+        assert!(found.mean[L1] < error && found.worst[MAX] < 1.09, "{n}: {:?}", found.mean);
+        assert!(found.mean[LOSS].abs() < 0.002 && found.mean[VARIATION] < 2.5, "{n}: {:?}", found.mean);
+    }
 }
 
 /// A bar that falls on the floor under gravity, and its energy over that at the start after six periods.

@@ -30,7 +30,8 @@ pub(crate) fn all() -> Vec<Combination> {
     let mut rows = vec![
         preset(CHUNG_HULBERT_09, tapered, Preset::smooth()),
         preset(BATHE_1, tapered, Preset::conservative()),
-        preset(CD_LAGRANGE, Treatment::Lumped, Preset::explicit()),
+        preset(CD_LAGRANGE, Treatment::Redistributed(Takers::Tapered), Preset::explicit()),
+        plain(CD_LAGRANGE),
     ];
     let mut add = |makes: &[Make], corrections: &[Correction], masses: &[Treatment]| {
         for &make in makes {

@@ -74,7 +74,7 @@ pub(crate) fn all() -> Vec<Row> {
         row(BATHE_1, None, Lumped),
         row(BATHE_1, History, Lumped),
         preset(BATHE_1, tapered, Preset::conservative()).drawn("conservative"),
-        preset(CD_LAGRANGE, Lumped, Preset::explicit()).drawn("explicit"),
+        row(CD_LAGRANGE, None, Lumped).drawn("CD-Lagrange"),
         row(CENTRAL, None, Lumped),
         row(MOREAU_JEAN, None, Lumped),
         row(ENERGY_MOMENTUM, Persistency, Lumped),

@@ -3,6 +3,7 @@
 use super::contact_step::{ContactRowsWork, InterfaceWork};
 use super::control::{Judge, StepControl};
 use super::energy::Ledger;
+use super::massless::MasslessBlock;
 use super::newton::Newton;
 use super::newton_step::NewtonWork;
 use super::operator::{At, TangentOf};
@@ -287,7 +288,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
         let massless = mass::massless(system.mass(), system.prescribed());
-        check_massless(&scheme, massless.first())?;
+        let follows = check_massless(&scheme, massless.first())?;
         let mut projection = start::projection(&*system, dofs, rows)?;
         let (state, history) = if let Some((state, history)) = self.resumed {
             let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
@@ -324,6 +325,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let interface = constraints.interface().len();
         let contact = ([rows, constraints.entries()], interface);
         let mut work = workspace(&mut *system, &program, &correctors, projection, contact, slots);
+        if follows {
+            let (name, contact) = (scheme.integrator.name(), (rows, constraints.interface()));
+            work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, contact)?);
+            work.rows.on_massless = vec![false; rows];
+        }
         work.massless = massless;
         work.newton = match (self.newton, system.linearity()) {
             (None, Linearity::Linear) => None,
@@ -432,6 +438,7 @@ fn workspace<T: Real>(
         coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
         prescribed,
         massless: Vec::new(),
+        block: None,
         newton: None,
         trial: ContactState::with_capacity(rows),
         shown: [Vec::new(), Vec::new()],
@@ -498,18 +505,20 @@ fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
     admitted
 }
 
-/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive.
-fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<()> {
-    let Some(dof) = dof else { return Ok(()) };
+/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether they
+/// follow statically before the other dofs move.
+fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
+    let Some(dof) = dof else { return Ok(false) };
     let reason = match analysis::massless_factor(&scheme.tableau) {
-        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(()),
+        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(false),
         Some(_) => {
             "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
              choose a scheme that damps high frequencies, or give the dof a mass"
         }
+        None if analysis::massless_follow(&scheme.tableau) => return Ok(true),
         None => {
-            "its balance does not determine the displacement of a dof without mass; choose an implicit scheme, or give \
-             the dof a mass"
+            "its balance does not determine the displacement of a dof without mass at the end of the step; choose central \
+             differences or an implicit scheme, or give the dof a mass"
         }
     };
     Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })

@@ -28,6 +28,28 @@ enum Measure {
     Undecided,
 }
 
+/// Which rows a contact problem is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// All of them.
+    All,
+    /// Those that act on dofs without mass in an explicit stage, where these follow before anything else moves.
+    Massless,
+    /// The others, after that.
+    Massive,
+}
+
+impl Part {
+    /// Whether a row has a part in the problem.
+    pub(super) fn takes(self, on_massless: &[bool], row: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Massless => on_massless[row],
+            Self::Massive => !on_massless[row],
+        }
+    }
+}
+
 /// Buffers of the contact problem, one entry a candidate unless said otherwise.
 pub(super) struct ContactRowsWork<T> {
     pub(super) rates: Vec<GapRates<T>>,
@@ -50,6 +72,8 @@ pub(super) struct ContactRowsWork<T> {
     /// Rows that may press in this stage; at velocity level those whose gap is forecast to be closed.
     pub(super) enabled: Vec<bool>,
     pub(super) in_problem: Vec<bool>,
+    /// Rows of [`Part::Massless`]; empty where dofs without mass are solved for with the others.
+    pub(super) on_massless: Vec<bool>,
     /// Rows of the problem, and its data, one entry a row of the problem.
     pub(super) problem: Vec<usize>,
     /// Delassus operators assembled so far.
@@ -86,6 +110,7 @@ impl<T: Real> ContactRowsWork<T> {
             start_tolerance: zero(),
             enabled: vec![true; rows],
             in_problem: vec![false; rows],
+            on_massless: Vec::new(),
             problem: Vec::with_capacity(rows),
             versions: 0,
             offset: reserved(),
@@ -319,6 +344,7 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     /// The part of the unknown that motions contain already, in Newton's method: d is then measured from there, and
     /// accelerations are complete.
     pub(super) iterate: Option<&'s [T]>,
+    pub(super) part: Part,
 }
 
 /// Times a stage is solved with another linearization of its power laws, at most.
@@ -430,8 +456,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// Sets the weights of d in what the rows constrain by the scheme and by compliant laws.
     fn weigh(&self, rows: &mut ContactRowsWork<T>) {
         let [rigid, balance_u, balance_a] = self.weights();
-        for (weight, law) in rows.weight.iter_mut().zip(self.constraints.laws()) {
-            *weight = if law.is_compliant() { balance_u + T::of(law.inertia()) * balance_a } else { rigid };
+        for (row, law) in self.constraints.laws().iter().enumerate() {
+            let weight = if law.is_compliant() { balance_u + T::of(law.inertia()) * balance_a } else { rigid };
+            rows.weight[row] = if self.part.takes(&rows.on_massless, row) { weight } else { T::zero() };
         }
     }
 
@@ -446,7 +473,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
 
     /// Decides which rows the problem begins with, and says whether any has to press.
     fn condition(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> bool {
-        let Self { stage, clock, constraints, g, .. } = self;
+        let Self { stage, clock, constraints, g, part, .. } = self;
         let Workspace { trial, rows, .. } = work;
         let mut needed = false;
         for row in 0..constraints.len() {
@@ -458,7 +485,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {
                 (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
-                rows.weight[row] = rows.own_weight(stage, clock.h, row).unwrap_or(rows.weight[row]);
+                let own = rows.own_weight(stage, clock.h, row).filter(|_| part.takes(&rows.on_massless, row));
+                rows.weight[row] = own.unwrap_or(rows.weight[row]);
                 rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
             }
             let coupled = rows.weight[row] > T::zero();
@@ -534,11 +562,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         operator: &mut Operator<T>,
         work: &mut Workspace<T>,
     ) -> Result<bool> {
-        let Self { constraints, g, .. } = self;
+        let Self { constraints, g, part, .. } = self;
         let Workspace { interface, rows, trial, .. } = work;
         let forces = rows.curved.forces(g);
         let mut pressed = false;
-        for row in 0..constraints.len() {
+        for row in (0..constraints.len()).filter(|&row| part.takes(&rows.on_massless, row)) {
             let law = constraints.law(row);
             if law.is_compliant() && rows.weight[row] == T::zero() {
                 let force = law.force(rows.balance_gap[row]);
@@ -776,6 +804,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
         }
         rows.measure(stage, clock.h, constraints, g, new, None)?;
+        if self.part != Part::All && level.target.is_some() {
+            // Rows on dofs without mass hold for the gaps of the state.
+            for row in (0..constraints.len()).filter(|&row| rows.on_massless[row]) {
+                let rate = g.product(row, &new.v) + rows.rates[row].rate;
+                let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
+                (rows.y[row], rows.enabled[row]) = (trial.gap[row], true);
+                rows.tolerance[row] = rounded + T::of(1e-10 * clock.h) * rate.abs();
+            }
+        }
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         buffers.closed.clear();

@@ -179,12 +179,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// moves them, of forces relative to themselves. Leaves y of the rows where d is placed.
     pub(super) fn miss(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<f64> {
         self.evaluate(new, work)?;
-        let Self { constraints, g, .. } = self;
+        let Self { constraints, g, part, .. } = self;
         let Workspace { rows, trial, interface, .. } = work;
         let forces = rows.curved.forces(g);
         let (mut worst, mut largest) = ((0, T::zero()), 0.0_f64);
         interface.response.fill(T::zero());
-        for row in 0..constraints.len() {
+        for row in (0..constraints.len()).filter(|&row| part.takes(&rows.on_massless, row)) {
             let (law, lambda) = (constraints.law(row), trial.lambda_raw[row]);
             forces.interface_scatter(row, lambda, &mut interface.response);
             let mut scale = rows.weight[row].abs() * forces.interface_magnitude(row, &interface.increment);

@@ -3,7 +3,7 @@
 use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
-use crate::mass::Mass;
+use crate::mass::{self, Mass};
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
@@ -64,6 +64,18 @@ struct Delassus<T> {
     version: u64,
 }
 
+impl<T: Real> Delassus<T> {
+    /// Memory for `rows` rows.
+    fn new(rows: usize) -> Result<Self> {
+        Ok(Self {
+            rows: Vec::with_capacity(rows),
+            values: memory::reserve(rows, rows, "the Delassus operator")?,
+            diagonal: Vec::with_capacity(rows),
+            version: 0,
+        })
+    }
+}
+
 /// Where a tangent is taken.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct At<'m, T> {
@@ -115,12 +127,7 @@ impl<T: Real> Operator<T> {
             _ => Vec::new(),
         };
         let (interface, computed) = (interface.to_vec(), vec![false; rows]);
-        let delassus = Delassus {
-            rows: Vec::with_capacity(rows),
-            values: memory::reserve(rows, rows, "the Delassus operator")?,
-            diagonal: Vec::with_capacity(rows),
-            version: 0,
-        };
+        let delassus = Delassus::new(rows)?;
         let mut operator = Self {
             weights,
             tangent,
@@ -148,6 +155,28 @@ impl<T: Real> Operator<T> {
             operator.factor.solve(&mut operator.full)?;
         }
         Ok(operator)
+    }
+
+    /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it, it is
+    /// not factorized again.
+    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, rows: usize, interface: &[usize]) -> Result<Self> {
+        Ok(Self {
+            weights: [f64::NAN; 3],
+            tangent: Tangent::Absent,
+            linearity: Linearity::Linear,
+            combination: Combination::diagonal(0, &[], &[])?,
+            part: Vec::new(),
+            end: Vec::new(),
+            values: Vec::new(),
+            factor,
+            interface: interface.to_vec(),
+            columns: memory::zeros(rows, interface.len(), "the responses of the contact rows")?,
+            computed: vec![false; rows],
+            rows: 0,
+            delassus: Delassus::new(rows)?,
+            contact: ContactPath::Condensed,
+            full: Vec::new(),
+        })
     }
 
     /// Whether stages with these weights can use it.
@@ -427,12 +456,18 @@ fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Ta
         && system.linearity() == Linearity::Linear
         && has_diagonal_damping(system)?;
     let own = (tangent == Tangent::Present).then_some(system.pattern());
+    let mut fixed = system.prescribed().to_vec();
+    if weights[0] == 0.0 {
+        // Dofs without mass have followed before: here they do not move.
+        fixed.append(&mut mass::massless(system.mass(), system.prescribed()));
+        fixed.sort_unstable();
+    }
     let combination = match system.mass() {
-        Mass::Lumped(_) if diagonal => Combination::diagonal(dofs, system.prescribed(), &[system.pattern()])?,
-        Mass::Lumped(_) => Combination::new(dofs, system.prescribed(), own.as_slice())?,
+        Mass::Lumped(_) if diagonal => Combination::diagonal(dofs, &fixed, &[system.pattern()])?,
+        Mass::Lumped(_) => Combination::new(dofs, &fixed, own.as_slice())?,
         Mass::Consistent(mass) => {
             let sources: Vec<_> = own.into_iter().chain([mass.symbolic()]).collect();
-            Combination::new(dofs, system.prescribed(), &sources)?
+            Combination::new(dofs, &fixed, &sources)?
         }
     };
     Ok((tangent, combination))

@@ -184,6 +184,26 @@ pub(crate) struct CompiledStage<T> {
 }
 
 impl<T: Real> CompiledStage<T> {
+    /// A stage whose unknown is the displacement itself, solved for at the end of the step.
+    pub(crate) fn of_displacements() -> Self {
+        let row = |weight: f64| ScaledRow { terms: Vec::new(), plain: 0, weight: T::of(weight) };
+        Self {
+            recovery: ScaledRows([row(1.0), row(0.0), row(0.0)]),
+            balance: None,
+            contact: None,
+            load: 1.0,
+            start: 0.0,
+            end: 1.0,
+            along_path: false,
+            operator: 0,
+            acceleration: 0.0,
+            balance_acceleration: 0.0,
+            response: [1.0, 0.0, 0.0],
+            covector: Vec::new(),
+            read: Vec::new(),
+        }
+    }
+
     /// The rows at which the balance holds.
     pub(crate) fn balanced(&self) -> &ScaledRows<T> {
         self.balance.as_ref().unwrap_or(&self.recovery)

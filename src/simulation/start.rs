@@ -144,7 +144,6 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        let mut solved = Vec::new();
         if !massless.is_empty() {
             // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
             let mut forces = vec![T::zero(); dofs];
@@ -158,7 +157,7 @@ impl<T: Real> Start<'_, T> {
             problem.offset = (0..constraints.len()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..constraints.len()).map(|row| rounding(g.magnitude(row, &forces))).collect();
             problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
-            solved.append(&mut problem.press(g, projection, &mut motion, &mut contacts));
+            problem.press(g, projection, &mut motion, &mut contacts);
         }
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let mut problem = match contact.lead() > 0.0 {
@@ -166,7 +165,11 @@ impl<T: Real> Start<'_, T> {
             false => StartProblem::at_rest(constraints, g, &motion, h, &touching)?,
         };
         problem.add_inertial(constraints, g, &motion, &contacts.gap)?;
-        problem.rows.retain(|row| !solved.contains(row));
+        if !massless.is_empty() {
+            // Those are solved, or open.
+            problem.rows.retain(|&row| !g.acts_on(row, massless));
+            problem.waiting.retain(|&row| !g.acts_on(row, massless));
+        }
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts);
         Ok((motion, contacts))
@@ -317,14 +320,14 @@ impl<T: Real> StartProblem<T> {
         Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })
     }
 
-    /// Applies the multipliers and closes their contacts; returns the rows.
+    /// Applies the multipliers and closes their contacts.
     fn press(
         self,
         g: &ContactJacobian<T>,
         projection: &mut JumpProjection<T>,
         motion: &mut Motion<T>,
         contacts: &mut ContactState<T>,
-    ) -> Vec<usize> {
+    ) {
         projection.prepare(g, &self.rows);
         for (&row, &lambda) in self.rows.iter().zip(&self.lambda) {
             projection.push(g, row, lambda, &mut motion.a);
@@ -332,7 +335,6 @@ impl<T: Real> StartProblem<T> {
             contacts.lambda_raw[row] = lambda;
             contacts.closed[row] = true;
         }
-        self.rows
     }
 
     fn solve(

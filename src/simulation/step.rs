@@ -1,6 +1,6 @@
 //! One step: stages, corrections, acceptance; a failed step leaves everything as it was.
 
-use super::contact_step::ContactStep;
+use super::contact_step::{ContactStep, Part};
 use super::control::Verdict;
 use super::curved_rows::FOLLOWED;
 use super::energy::StepBooks;
@@ -201,8 +201,8 @@ impl<T: Real> Simulation<'_, T> {
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let mut solve = StageSolve { stage, clock, system: parts, operator, constraints, g, solver, statistics };
             match work.newton {
-                None => solve.directly(new, past, work)?,
-                Some(_) => solve.by_iteration(new, past, work)?,
+                Some(_) if work.block.is_none() => solve.by_iteration(new, past, work)?,
+                _ => solve.directly(new, past, work)?,
             }
             for (&dof, support) in work.prescribed.iter().zip(&work.supports) {
                 new.a[dof] = support[2];
@@ -213,7 +213,8 @@ impl<T: Real> Simulation<'_, T> {
             }
             if constraints.len() > 0 {
                 let solver = &mut **contact_solver;
-                let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None };
+                let part = if work.block.is_some() { Part::Massive } else { Part::All };
+                let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None, part };
                 let is_last = stages_before + 1 == program.stages.len();
                 contact.close(new, impulse_weight(stage.response, covector), is_last, work)?;
                 if let Some(projection) = work.projection.as_mut().filter(|_| work.buffers.has_touched()) {
@@ -291,18 +292,18 @@ pub(super) struct StageSolve<'s, 'a, T: Real> {
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Moves the predicted motion of a linear system to where the balance and the contact conditions hold.
     fn directly(&mut self, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) -> Result<()> {
-        let Self { stage, clock, system, operator, .. } = self;
-        residual(stage, clock.at(stage.load), &mut **system, new, work)?;
-        operator.begin(&mut work.increment, &mut work.interface.increment)?;
+        residual(self.stage, self.clock.at(self.stage.load), self.system, new, work)?;
+        if let Some(mut block) = work.block.take() {
+            let settled = self.settle(&mut block, new, past, work);
+            work.block = Some(block);
+            settled?;
+        }
+        self.operator.begin(&mut work.increment, &mut work.interface.increment)?;
         work.interface.forces.fill(T::zero());
         self.statistics.linear_solves += 1;
         if self.constraints.len() > 0 && T::all_finite(&work.interface.increment) {
             let settled = self.contact(None, new, past, work)?;
-            if !settled {
-                let (row, residual) = work.rows.curved.worst;
-                let failure = ContactFailure::NotConverged { iterations: FOLLOWED, row, residual };
-                return Err(contact_error(new.t, failure, |row| self.constraints.ids[row]));
-            }
+            self.refuse_unsettled(settled, new.t, work)?;
         }
         self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
         let recovery = &self.stage.recovery;
@@ -327,9 +328,20 @@ impl<T: Real> StageSolve<'_, '_, T> {
         work: &mut Workspace<T>,
     ) -> Result<bool> {
         let Self { stage, clock, system, operator, constraints, g, solver, statistics } = self;
+        let part = if work.block.is_some() { Part::Massive } else { Part::All };
         let mut contact =
-            ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate };
+            ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate, part };
         contact.solve(&mut **system, operator, new, past, work)
+    }
+
+    /// Refuses contact whose curved rows do not fit where it ends.
+    pub(super) fn refuse_unsettled(&self, settled: bool, t: f64, work: &Workspace<T>) -> Result<()> {
+        if settled {
+            return Ok(());
+        }
+        let (row, residual) = work.rows.curved.worst;
+        let failure = ContactFailure::NotConverged { iterations: FOLLOWED, row, residual };
+        Err(contact_error(t, failure, |row| self.constraints.ids[row]))
     }
 
     pub(super) fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {

@@ -1,0 +1,396 @@
+//! Dofs without mass in explicit stages: they follow from static balance with the others and with contact, before anything else
+//! of the stage is solved.
+
+use super::Workspace;
+use super::contact_step::{ContactStep, Part};
+use super::operator::Operator;
+use super::program::CompiledStage;
+use super::step::StageSolve;
+use crate::contact::{Candidates, ContactLaw};
+use crate::corrector::{Gaps, rounding};
+use crate::error::{Error, Result};
+use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver};
+use crate::real::Real;
+use crate::sparse::{self, Combination};
+use crate::state::Motion;
+use crate::system::{Damping, Linearity, System, TangentWeights};
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat};
+
+/// The dofs b without mass of a linear system, and what of K is theirs.
+pub(super) struct MasslessBlock<T: Real> {
+    /// Ascending.
+    pub(super) dofs: Vec<usize>,
+    columns: Columns<T>,
+    /// K_bb⁻¹, with its responses to contact.
+    operator: Operator<T>,
+    /// Where it is solved: d is the displacement itself.
+    stage: CompiledStage<T>,
+    /// The dofs of the interface that have a mass, and their places there.
+    massive: Vec<(usize, usize)>,
+    /// The places of its own dofs on the interface; beyond its end for those that are not there.
+    places: Vec<usize>,
+    /// Version of the rows that have been sorted into those on massless dofs and others.
+    sorted: u64,
+}
+
+/// Columns of K, one a massless dof: its couplings to all free dofs.
+struct Columns<T> {
+    pointers: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<T>,
+}
+
+impl<T: Real> Columns<T> {
+    /// From the tangent, or for an empty pattern by one evaluation of the force a column. (The system is linear: where the
+    /// tangent is taken says nothing.)
+    fn of(system: &mut dyn System<T>, dofs: &[usize], at: &Motion<T>) -> Result<Self> {
+        let mut free = vec![true; system.dofs()];
+        for &dof in system.prescribed() {
+            free[dof] = false;
+        }
+        let mut columns = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
+        let entries = system.pattern().row_idx().len();
+        if entries > 0 {
+            let mut values = vec![T::zero(); entries];
+            let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
+            system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
+            let k = SparseColMatRef::new(system.pattern(), &values);
+            for &dof in dofs {
+                columns.push(k.row_idx_of_col_raw(dof).iter().copied().zip(k.val_of_col(dof).iter().copied()), &free);
+            }
+            return Ok(columns);
+        }
+        let mut force = vec![T::zero(); system.dofs()];
+        let (mut moved, mut u) = (force.clone(), at.u.clone());
+        system.force(at.t, &u, &at.v, &mut force)?;
+        // The step is as large as what it is added to, so that the difference keeps its digits.
+        let size = at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs()));
+        let size = if size > T::zero() { size } else { T::one() };
+        for &dof in dofs {
+            u[dof] += size;
+            system.force(at.t, &u, &at.v, &mut moved)?;
+            let step = u[dof] - at.u[dof];
+            u[dof] = at.u[dof];
+            let largest = moved.iter().zip(&force).fold(T::zero(), |largest, (&x, &y)| largest.max((x - y).abs()));
+            let differences = moved.iter().zip(&force).map(|(&x, &y)| {
+                let difference = y - x;
+                // What is rounding of the forces is no coupling.
+                let known = difference.abs() > rounding(x.abs().max(y.abs())).min(rounding(largest));
+                if known { difference / step } else { T::zero() }
+            });
+            columns.push(differences.enumerate(), &free);
+        }
+        Ok(columns)
+    }
+
+    fn push(&mut self, entries: impl Iterator<Item = (usize, T)>, free: &[bool]) {
+        for (row, value) in entries.filter(|&(row, value)| free[row] && value != T::zero()) {
+            self.rows.push(row);
+            self.values.push(value);
+        }
+        self.pointers.push(self.rows.len());
+    }
+
+    fn column(&self, j: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        let range = self.pointers[j]..self.pointers[j + 1];
+        self.rows[range.clone()].iter().copied().zip(self.values[range].iter().copied())
+    }
+
+    /// The couplings to other dofs alone.
+    fn without(&self, dofs: &[usize]) -> Self {
+        let mut others = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
+        for j in 0..dofs.len() {
+            for (row, value) in self.column(j).filter(|(row, _)| dofs.binary_search(row).is_err()) {
+                others.rows.push(row);
+                others.values.push(value);
+            }
+            others.pointers.push(others.rows.len());
+        }
+        others
+    }
+
+    /// K_bb, in the numbering of `dofs`.
+    fn own(&self, dofs: &[usize]) -> Result<SparseColMat<usize, T>> {
+        let (mut pointers, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+        for j in 0..dofs.len() {
+            for (row, value) in self.column(j) {
+                if let Ok(row) = dofs.binary_search(&row) {
+                    rows.push(row);
+                    values.push(value);
+                }
+            }
+            pointers.push(rows.len());
+        }
+        let own = SymbolicSparseColMat::new_checked(dofs.len(), dofs.len(), pointers, None, rows);
+        let own = SparseColMat::new(own, values);
+        sparse::check_symmetric("stiffness", own.as_ref())?;
+        // With its whole diagonal.
+        let sum = Combination::new(dofs.len(), &[], &[own.symbolic()])?;
+        let mut values = vec![T::zero(); sum.len()];
+        sum.fill(&[(T::one(), own.val())], None, &mut values);
+        Ok(sum.into_matrix(values))
+    }
+}
+
+/// A factor of K_bb that takes vectors of the whole system, and an interface of which it knows a part: other dofs do not respond.
+#[derive(Debug)]
+struct Embedded<T> {
+    inner: Box<dyn Factorization<T>>,
+    dofs: Vec<usize>,
+    /// Where on the interface its own dofs there are, ascending, and how many are there in all.
+    places: Vec<usize>,
+    interface: usize,
+    /// One entry a dof of its own, and one a dof of its own on the interface.
+    vector: Vec<T>,
+    on_interface: Vec<T>,
+}
+
+fn gather<T: Copy>(all: &[T], places: &[usize], some: &mut [T]) {
+    for (x, &place) in some.iter_mut().zip(places) {
+        *x = all[place];
+    }
+}
+
+fn scatter<T: Copy>(some: &[T], places: &[usize], all: &mut [T]) {
+    for (&x, &place) in some.iter().zip(places) {
+        all[place] = x;
+    }
+}
+
+impl<T: Real> Factorization<T> for Embedded<T> {
+    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let dofs = &self.dofs;
+        self.inner.factorize(a).map_err(|error| match error {
+            Error::Singular { dof, .. } => Error::Singular {
+                matrix: "stiffness of the dofs without mass",
+                dof: dofs.get(dof).copied().unwrap_or(dof),
+            },
+            other => other,
+        })
+    }
+
+    /// Entries of other dofs are left as they are.
+    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
+        gather(rhs, &self.dofs, &mut self.vector);
+        self.inner.solve(&mut self.vector)?;
+        scatter(&self.vector, &self.dofs, rhs);
+        Ok(())
+    }
+
+    fn stored_values(&self) -> usize {
+        self.inner.stored_values()
+    }
+
+    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
+        Some(self)
+    }
+}
+
+impl<T: Real> Condensation<T> for Embedded<T> {
+    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
+        let Self { inner, dofs, places, vector, on_interface, .. } = self;
+        gather(rhs, dofs, vector);
+        interface.fill(T::zero());
+        match inner.condensation().filter(|_| !places.is_empty()) {
+            Some(condensed) => condensed.condense(vector, on_interface)?,
+            None => inner.solve(vector)?,
+        }
+        scatter(on_interface, places, interface);
+        Ok(())
+    }
+
+    /// Entries of other dofs are left as they are.
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+        let Self { inner, dofs, places, vector, on_interface, .. } = self;
+        gather(interface, places, on_interface);
+        if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
+            condensed.expand(on_interface, vector);
+        }
+        scatter(vector, dofs, solution);
+    }
+
+    fn solve(&mut self, forces: &mut [T]) {
+        let Self { inner, places, on_interface, interface, .. } = self;
+        for column in forces.chunks_exact_mut((*interface).max(1)) {
+            gather(column, places, on_interface);
+            column.fill(T::zero());
+            if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
+                condensed.solve(on_interface);
+                scatter(on_interface, places, column);
+            }
+        }
+    }
+}
+
+impl<T: Real> Embedded<T> {
+    /// K_bb from its columns, factorized.
+    fn factorized(columns: &Columns<T>, dofs: &[usize], interface: &[usize]) -> Result<Self> {
+        let own = columns.own(dofs)?;
+        let shared =
+            interface.iter().enumerate().filter_map(|(place, dof)| Some((place, dofs.binary_search(dof).ok()?)));
+        let (places, last): (Vec<usize>, Vec<usize>) = shared.unzip();
+        let mut factor = Self {
+            inner: Automatic.analyze(own.symbolic(), &last)?,
+            dofs: dofs.to_vec(),
+            on_interface: vec![T::zero(); places.len()],
+            places,
+            interface: interface.len(),
+            vector: vec![T::zero(); dofs.len()],
+        };
+        factor.factorize(own.as_ref())?;
+        Ok(factor)
+    }
+}
+
+/// Times rows are linearized again where the dofs without mass have gone, at most.
+const LINEARIZATIONS: usize = 20;
+
+impl<T: Real> MasslessBlock<T> {
+    /// Refuses systems for which it cannot be made.
+    pub(super) fn new(
+        system: &mut dyn System<T>,
+        integrator: &str,
+        dofs: &[usize],
+        at: &Motion<T>,
+        (rows, interface): (usize, &[usize]),
+    ) -> Result<Self> {
+        let refuse = |reason| {
+            Err(Error::Incompatible { part: format!("{integrator} with dof {} without mass", dofs[0]), reason })
+        };
+        if system.linearity() == Linearity::Nonlinear {
+            return refuse(
+                "explicit stages find the displacements of dofs without mass by one factor of their stiffness, and the system \
+                 is nonlinear; choose an implicit scheme, or give the dofs a mass",
+            );
+        }
+        if is_damped(system, dofs) {
+            return refuse(
+                "explicit stages balance dofs without mass by stiffness alone, and damping acts on them; choose damping \
+                 proportional to mass or an implicit scheme, or give the dofs a mass",
+            );
+        }
+        let columns = Columns::of(system, dofs, at)?;
+        let factor = Embedded::factorized(&columns, dofs, interface)?;
+        let massive = interface.iter().enumerate().filter(|(_, dof)| dofs.binary_search(dof).is_err());
+        Ok(Self {
+            dofs: dofs.to_vec(),
+            columns: columns.without(dofs),
+            operator: Operator::of_part(Box::new(factor), rows, interface)?,
+            stage: CompiledStage::of_displacements(),
+            massive: massive.map(|(place, &dof)| (dof, place)).collect(),
+            places: dofs.iter().map(|dof| interface.binary_search(dof).unwrap_or(interface.len())).collect(),
+            sorted: 0,
+        })
+    }
+}
+
+/// Whether damping forces depend on the velocities of some dofs.
+pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> bool {
+    let mut v = vec![T::zero(); system.dofs()];
+    let (u, mut force) = (v.clone(), v.clone());
+    for &dof in dofs {
+        // (Without a pattern, so that nothing cancels.)
+        v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
+    }
+    system.damping_force(&u, &v, &mut force) == Damping::Present && force.iter().any(|&force| force != T::zero())
+}
+
+impl<T: Real> StageSolve<'_, '_, T> {
+    /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact. The
+    /// residual in `work.increment` becomes that of the others in this configuration, with the forces of contact on the dofs
+    /// without mass.
+    ///
+    /// Rows follow these dofs: an iteration of Newton's method on the gaps alone, for the balance is linear.
+    pub(super) fn settle(
+        &mut self,
+        block: &mut MasslessBlock<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        work: &mut Workspace<T>,
+    ) -> Result<()> {
+        (block.stage.load, block.stage.end) = (self.stage.load, self.stage.end);
+        let mut first = T::zero();
+        for pass in 0..LINEARIZATIONS {
+            self.sort_rows(block, work)?;
+            block.operator.follow(self.constraints.version());
+            block.operator.begin(&mut work.increment, &mut work.interface.increment)?;
+            self.statistics.linear_solves += 1;
+            work.interface.forces.fill(T::zero());
+            if self.constraints.len() > 0 && T::all_finite(&work.interface.increment) {
+                let Self { clock, system, constraints, g, solver, statistics, .. } = self;
+                let (stage, solver, part) = (&block.stage, &mut **solver, Part::Massless);
+                let mut contact =
+                    ContactStep { stage, clock: *clock, constraints, g, solver, statistics, iterate: None, part };
+                let settled = contact.solve(&mut **system, &mut block.operator, new, past, work)?;
+                self.refuse_unsettled(settled, new.t, work)?;
+            }
+            let Workspace { increment, interface, balance, .. } = &mut *work;
+            block.operator.finish(increment, &interface.increment, &interface.forces)?;
+            let (mut largest, mut scale) = (T::zero(), T::zero());
+            for (j, &dof) in block.dofs.iter().enumerate() {
+                let d = increment[dof];
+                if !d.is_finite() {
+                    let (t, h, value) = (self.clock.at(0.0), self.clock.h, d.value());
+                    return Err(Error::StepNotFinite { t, h, what: "the increment", dof, value });
+                }
+                new.u[dof] += d;
+                (largest, scale) = (largest.max(d.abs()), scale.max(new.u[dof].abs()));
+                for (row, k) in block.columns.column(j) {
+                    increment[row] -= k * d;
+                }
+                increment[dof] = T::zero();
+            }
+            if pass == 0 {
+                first = largest;
+            }
+            let moved = self.constraints.follow(new.t, &new.u, self.g)?;
+            let settled = pass > 0 && largest <= rounding(scale) + T::of(1e-9) * first;
+            if moved == Candidates::Unchanged || settled {
+                for &(dof, place) in &block.massive {
+                    increment[dof] += interface.forces[place];
+                }
+                if let Some(balance) = balance {
+                    for &dof in &block.dofs {
+                        balance.u[dof] = new.u[dof];
+                    }
+                }
+                self.operator.follow(self.constraints.version());
+                return self.sort_rows(block, work);
+            }
+            // What is left without contact is what contact has balanced.
+            for (&dof, &place) in block.dofs.iter().zip(&block.places) {
+                increment[dof] = if place < interface.forces.len() { -interface.forces[place] } else { T::zero() };
+            }
+        }
+        let (t, h) = (self.clock.at(0.0), self.clock.h);
+        Err(Error::NewtonNotConverged {
+            t,
+            h,
+            iterations: LINEARIZATIONS,
+            residual: 0.0,
+            increment: if first > T::zero() { 1.0 } else { 0.0 },
+            dof: block.dofs[0],
+        })
+    }
+
+    /// Says of every row whether it acts on dofs without mass, and refuses laws that ask for more than a gap there.
+    fn sort_rows(&self, block: &mut MasslessBlock<T>, work: &mut Workspace<T>) -> Result<()> {
+        if block.sorted == self.constraints.version() {
+            return Ok(());
+        }
+        for row in 0..self.constraints.len() {
+            let on_massless = self.g.acts_on(row, &block.dofs);
+            work.rows.on_massless[row] = on_massless;
+            let law = self.constraints.law(row);
+            let rebounds = matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
+            if on_massless && (rebounds || law.inertia() > 0.0) {
+                return Err(Error::Incompatible {
+                    part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),
+                    reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a mass",
+                });
+            }
+        }
+        block.sorted = self.constraints.version();
+        Ok(())
+    }
+}
