@@ -298,6 +298,17 @@ pub enum Error {
         /// Rounding tolerance of that gap.
         tolerance: f64,
     },
+    /// Dofs without mass were not brought into static balance at the start.
+    #[error(
+        "dofs without mass ({dof} and others) not in static balance after {iterations} iterations from the initial displacements; \
+         start nearer to it, or give them a mass"
+    )]
+    StartNotBalanced {
+        /// Iterations spent.
+        iterations: usize,
+        /// One of the dofs.
+        dof: usize,
+    },
     /// A step produced NaN or infinity.
     #[error("step from t = {t:e} with h = {h:e}: {what} of dof {dof} is {value}")]
     StepNotFinite {

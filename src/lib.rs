@@ -44,7 +44,8 @@ pub use observer::{Control, Observer, StepView};
 pub use preset::Preset;
 pub use real::Real;
 pub use simulation::{
-    Energy, Iteration, Newton, Outcome, Simulation, SimulationBuilder, Statistics, StepControl, Works,
+    Energy, InitialOverclosure, Iteration, Newton, Outcome, Simulation, SimulationBuilder, StartAdjustment, Statistics,
+    StepControl, Works,
 };
 pub use state::{ContactState, History, State};
 pub use system::{Damping, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};

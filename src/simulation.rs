@@ -20,10 +20,12 @@ mod start;
 mod step;
 
 pub use builder::SimulationBuilder;
-pub(crate) use constraints::{Admitted, Constraints};
+pub(crate) use constraints::{Admitted, Constraints, Overclosures};
 pub use control::StepControl;
 pub use energy::{Energy, Works};
+pub use massless::StartAdjustment;
 pub use newton::{Iteration, Newton};
+pub use start::InitialOverclosure;
 
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
@@ -116,6 +118,7 @@ pub struct Simulation<'a, T: Real> {
     ledger: Option<Ledger<T>>,
     /// For runs that control their step size.
     judge: Option<Judge<T>>,
+    adjustment: Option<StartAdjustment<T>>,
     statistics: Statistics,
 }
 
@@ -236,6 +239,12 @@ impl<'a, T: Real> Simulation<'a, T> {
     /// Work counts.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+
+    /// What was moved when the simulation was built: dofs without mass that were not in static balance with the others, the load
+    /// and contact. Left there they would jump in the first step, and take their energy with them unseen. None if nothing was.
+    pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
+        self.adjustment
     }
 
     /// Number of scalars in the factors of the effective matrices.

@@ -3,6 +3,7 @@
 use crate::contact::ContactId;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::simulation::Overclosures;
 
 /// Stored values of one state: displacement, velocity and acceleration at its time.
 #[derive(Clone, Debug, PartialEq)]
@@ -251,6 +252,8 @@ pub struct History<T> {
     pub(crate) slopes: Vec<T>,
     /// Name of the integrator: another one would read other things out of the same states.
     pub(crate) scheme: String,
+    /// What is added to the gaps because bodies overlapped at the start.
+    pub(crate) overclosures: Option<Overclosures<T>>,
 }
 
 /// Motions before the current one as they were computed, newest first, whatever their spacing.

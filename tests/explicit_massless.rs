@@ -89,10 +89,10 @@ fn balance<const D: usize>(
     let (u, k) = (run.state().displacement(), solid.stiffness::<f64>());
     let mut force = vec![0.0; u.len()];
     let mut size = 0.0_f64;
-    for column in 0..u.len() {
+    for (column, &displacement) in u.iter().enumerate() {
         for (&row, value) in k.symbolic().row_idx_of_col_raw(column).iter().zip(k.as_ref().val_of_col(column)) {
-            force[row] -= value * u[column];
-            size = size.max((value * u[column]).abs());
+            force[row] -= value * displacement;
+            size = size.max((value * displacement).abs());
         }
     }
     let contacts = run.state().contacts();

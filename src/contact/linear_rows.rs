@@ -57,6 +57,7 @@ pub struct LinearRows<'a, T: Real> {
     jacobian: ContactJacobian<T>,
     laws: Vec<ContactLaw>,
     offsets: Vec<GapOffset<'a, T>>,
+    coordinates: T,
 }
 
 impl<T: Real> Default for LinearRows<'_, T> {
@@ -68,7 +69,7 @@ impl<T: Real> Default for LinearRows<'_, T> {
 impl<'a, T: Real> LinearRows<'a, T> {
     /// No rows yet.
     pub fn new() -> Self {
-        Self { jacobian: ContactJacobian::default(), laws: Vec::new(), offsets: Vec::new() }
+        Self { jacobian: ContactJacobian::default(), laws: Vec::new(), offsets: Vec::new(), coordinates: T::zero() }
     }
 
     /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
@@ -134,6 +135,14 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
+    /// The size of the coordinates from which the host has computed the gaps (length), for all rows: gaps within their rounding
+    /// are zero. Zero by default, as if the gaps were exact.
+    #[must_use]
+    pub fn coordinates(mut self, size: T) -> Self {
+        self.coordinates = size.abs();
+        self
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.laws.len()
@@ -183,6 +192,10 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
 
     fn law(&self, row: usize) -> ContactLaw {
         self.laws[row]
+    }
+
+    fn magnitude(&self, _: usize) -> T {
+        self.coordinates
     }
 
     fn jacobian(&self, out: &mut ContactJacobian<T>) {

@@ -11,7 +11,7 @@ use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
-use super::start::{self, Start, Violation};
+use super::start::{self, Begun, InitialOverclosure, Start, Violation};
 use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
 use crate::analysis::{self, LocalError};
 use crate::contact::{ContactConstraint, ContactLaw};
@@ -45,6 +45,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     resumed: Option<(State<T>, History<T>)>,
     balance: EnergyBalance,
     stability: Stability,
+    overclosure: InitialOverclosure,
 }
 
 /// Whether the correctors are those that suit most runs, or were chosen.
@@ -99,6 +100,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             resumed: None,
             balance: EnergyBalance::Off,
             stability: Stability::Checked,
+            overclosure: InitialOverclosure::Refused,
         }
     }
 
@@ -224,6 +226,34 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Says what becomes of bodies that overlap at the start; [`InitialOverclosure::Refused`] by default.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
+    ///
+    /// // A mass on a spring at rest, 1e-3 deep in a wall.
+    /// let start = |overclosure| {
+    ///     let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 9.0)])?;
+    ///     let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.01)
+    ///         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], -1e-3))
+    ///         .corrector(PersistencyCorrection::new())
+    ///         .initial_overclosure(overclosure)
+    ///         .build()?;
+    ///     run.run_until(1.0, &mut ())?;
+    ///     Ok::<f64, contact_dynamics::Error>(run.state().displacement()[0])
+    /// };
+    /// assert!(start(InitialOverclosure::Refused).is_err());
+    /// assert_eq!(start(InitialOverclosure::AdjustedGaps)?, 0.0); // it stays where it is
+    /// assert!((start(InitialOverclosure::RemovedOver(0.5))? - 1e-3).abs() < 1e-12); // it is pushed out
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn initial_overclosure(mut self, overclosure: InitialOverclosure) -> Self {
+        self.overclosure = overclosure;
+        self
+    }
+
     /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused, and a
     /// step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
     ///
@@ -257,12 +287,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// prescribed dofs, initial penetration, a singular effective matrix, parts that do not fit together.
     pub fn build(self) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
-        if !(h > 0.0 && h.is_finite()) {
-            return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
-        }
-        if !t.is_finite() {
-            return Err(Error::Parameter { name: "the start time", value: t, range: "finite" });
-        }
+        check_times(h, t, self.overclosure)?;
         match &self.resumed {
             None => Clock::new(t, h).check()?,
             Some((_, history)) => history.clock.check()?,
@@ -290,17 +315,22 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let massless = mass::massless(system.mass(), system.prescribed());
         let follows = check_massless(&scheme, massless.first())?;
         let mut projection = start::projection(&*system, dofs, rows)?;
-        let (state, history) = if let Some((state, history)) = self.resumed {
+        let begun = if let Some((state, history)) = self.resumed {
             let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
             check_resumed(&state, &history, &scheme, (own, h), [dofs, massless.len()])?;
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
-            (state, history)
+            if let Some(overclosures) = &history.overclosures {
+                constraints.adjust(overclosures.clone());
+            }
+            Begun { state, history, adjustment: None }
         } else {
             let (solver, massless) = (&mut *contact_solver, &massless[..]);
             let start = Start { system: &mut *system, contact_solver: solver, scheme: &scheme, h, t, massless };
-            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Refused)?
+            let violation = Violation::Initial(self.overclosure);
+            start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
+        let Begun { state, history, adjustment } = begun;
         contact_solver.reserve(rows);
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
@@ -331,18 +361,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             work.rows.on_massless = vec![false; rows];
         }
         work.massless = massless;
-        work.newton = match (self.newton, system.linearity()) {
-            (None, Linearity::Linear) => None,
-            (settings, linearity) => {
-                let along_path =
-                    program.stages.iter().any(|stage| stage.along_path) && linearity == Linearity::Nonlinear;
-                if along_path {
-                    check_path(&mut *system, &scheme, &state.motion)?;
-                }
-                let path = along_path.then(|| PathWork::new(dofs));
-                Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path))
-            }
-        };
+        work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
         let ledger = match self.balance {
             EnergyBalance::Off => None,
@@ -371,6 +390,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             work,
             ledger,
             judge,
+            adjustment,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
@@ -385,6 +405,43 @@ fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, 
         && constraints.capacity() > 0
         && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
         && constraints.interface().iter().any(has_mass)
+}
+
+/// Refuses a step size and times that are none.
+fn check_times(h: f64, t: f64, overclosure: InitialOverclosure) -> Result<()> {
+    let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
+        true => Ok(()),
+        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
+    };
+    positive("the step size h", h)?;
+    if let InitialOverclosure::RemovedOver(time) = overclosure {
+        positive("the time over which overclosures are removed", time)?;
+    }
+    match t.is_finite() {
+        true => Ok(()),
+        false => Err(Error::Parameter { name: "the start time", value: t, range: "finite" }),
+    }
+}
+
+/// Memory of Newton's method, for systems that need it and runs that ask for it.
+fn newton<T: Real>(
+    settings: Option<Newton>,
+    system: &mut dyn System<T>,
+    scheme: &Scheme<'_>,
+    program: &Program<T>,
+    motion: &Motion<T>,
+) -> Result<Option<NewtonWork<T>>> {
+    let linearity = system.linearity();
+    if settings.is_none() && linearity == Linearity::Linear {
+        return Ok(None);
+    }
+    let along_path = program.stages.iter().any(|stage| stage.along_path) && linearity == Linearity::Nonlinear;
+    if along_path {
+        check_path(system, scheme, motion)?;
+    }
+    let dofs = motion.u.len();
+    let path = along_path.then(|| PathWork::new(dofs));
+    Ok(Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path)))
 }
 
 /// Refuses a state and history that another run could not have left.

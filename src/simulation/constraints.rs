@@ -27,6 +27,50 @@ pub(crate) struct Constraints<'a, T: Real> {
     stale: bool,
     /// Counts how often the rows have been read.
     version: u64,
+    /// What is added to gaps that were negative at the start, and of it what each row gets; empty without.
+    overclosures: Option<Overclosures<T>>,
+    added: Vec<T>,
+}
+
+/// Depths at the start of a run, which are added to the gaps from then on, or for a while.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Overclosures<T> {
+    /// (constraint, feature) and what is added, ascending.
+    depths: Vec<((usize, usize), T)>,
+    start: f64,
+    /// The time over which they are removed.
+    over: Option<f64>,
+}
+
+impl<T: Real> Overclosures<T> {
+    /// From the gaps of contacts at the start; of a feature with several the deepest counts.
+    pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
+        let mut depths: Vec<((usize, usize), T)> = Vec::new();
+        for &(id, gap) in gaps {
+            let feature = (id.constraint, id.feature);
+            match depths.iter_mut().find(|(other, _)| *other == feature) {
+                Some((_, depth)) => *depth = depth.max(-gap),
+                None => depths.push((feature, -gap)),
+            }
+        }
+        depths.sort_unstable_by_key(|(feature, _)| *feature);
+        Self { depths, start, over }
+    }
+
+    /// The share that is left at t, with its first two derivatives.
+    fn share(&self, t: f64) -> [f64; 3] {
+        let Some(over) = self.over else { return [1.0, 0.0, 0.0] };
+        let x = ((t - self.start) / over).max(0.0);
+        if x >= 1.0 {
+            return [0.0; 3];
+        }
+        [1.0 - x * x * (3.0 - 2.0 * x), -6.0 * x * (1.0 - x) / over, (12.0 * x - 6.0) / (over * over)]
+    }
+
+    fn of(&self, id: ContactId) -> T {
+        let found = self.depths.binary_search_by_key(&(id.constraint, id.feature), |(feature, _)| *feature);
+        found.map_or(T::zero(), |at| self.depths[at].1)
+    }
 }
 
 /// Which laws a scheme can serve.
@@ -102,9 +146,21 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let mut jacobian = ContactJacobian::with_capacity(rows, entries);
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
-        let (scratch, rates) = (ContactJacobian::with_capacity(rows, entries), vec![GapRates::default(); rows]);
-        let mut constraints =
-            Self { parts, ids, laws, magnitudes, scratch, rates, interface, places, admitted, stale: true, version: 0 };
+        let mut constraints = Self {
+            parts,
+            ids,
+            laws,
+            magnitudes,
+            scratch: ContactJacobian::with_capacity(rows, entries),
+            rates: vec![GapRates::default(); rows],
+            interface,
+            places,
+            admitted,
+            stale: true,
+            version: 0,
+            overclosures: None,
+            added: Vec::new(),
+        };
         constraints.read_rows(&mut jacobian)?;
         Ok((constraints, jacobian))
     }
@@ -243,7 +299,28 @@ impl<'a, T: Real> Constraints<'a, T> {
         jacobian.locate(places);
         *stale = false;
         self.version += 1;
+        self.distribute();
         Ok(())
+    }
+
+    /// Adds the depths at the start to the gaps from now on.
+    pub(crate) fn adjust(&mut self, overclosures: Overclosures<T>) {
+        self.overclosures = Some(overclosures);
+        self.added.reserve(self.capacity());
+        self.distribute();
+    }
+
+    /// What [`adjust`](Self::adjust) was given.
+    pub(crate) fn overclosures(&self) -> Option<&Overclosures<T>> {
+        self.overclosures.as_ref()
+    }
+
+    /// Says of every row what is added to its gap.
+    fn distribute(&mut self) {
+        if let Some(overclosures) = &self.overclosures {
+            self.added.clear();
+            self.added.extend(self.ids.iter().map(|&id| overclosures.of(id)));
+        }
     }
 
     /// The free dofs that contact may ever act on, ascending.
@@ -284,6 +361,12 @@ impl<'a, T: Real> Constraints<'a, T> {
             part.gap(t, u, own);
             rest = others;
         }
+        if let Some(overclosures) = &self.overclosures {
+            let share = T::of(overclosures.share(t)[0]);
+            for (gap, &added) in out.iter_mut().zip(&self.added) {
+                *gap += share * added;
+            }
+        }
         self.refuse_infinite(t, "the gap", out)
     }
 
@@ -302,6 +385,13 @@ impl<'a, T: Real> Constraints<'a, T> {
             let (own, others) = rest.split_at_mut(part.candidates());
             part.rates(t, u, v, own);
             rest = others;
+        }
+        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.over.is_some()) {
+            let [_, rate, acceleration] = overclosures.share(t).map(T::of);
+            for (rates, &added) in out.iter_mut().zip(&self.added) {
+                rates.rate += rate * added;
+                rates.acceleration += acceleration * added;
+            }
         }
         for (&contact, rates) in self.ids.iter().zip(&*out) {
             for (what, value) in [("the gap rate", rates.rate), ("the gap acceleration", rates.acceleration)] {
@@ -386,6 +476,12 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
             self.stale |= back.is_err();
             found.and(back)?;
             first += count;
+        }
+        if let Some(overclosures) = &self.overclosures {
+            let share = T::of(overclosures.share(t)[field.min(2)]);
+            for (out, &added) in out.iter_mut().zip(&self.added) {
+                *out += share * added;
+            }
         }
         self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
     }

@@ -4,7 +4,7 @@ use super::operator::{At, TangentOf};
 use super::program::Compiler;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
-use super::start::{self, Start, Violation, taylor};
+use super::start::{self, Begun, Start, Violation, taylor};
 use super::{Constraints, Simulation};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
@@ -154,25 +154,26 @@ impl<T: Real> Simulation<'_, T> {
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
         let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
         let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
-        let begun = start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
+        let Begun { state: begun, history: past, .. } =
+            start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
         let rows = constraints.capacity();
         contact_solver.reserve(rows);
         let depth = scheme.depth;
-        if begun.1.known < depth && startup.is_none() {
+        if past.known < depth && startup.is_none() {
             let contact = (rows, constraints.interface());
-            let at = At { t, u: &begun.0.motion.u, v: &begun.0.motion.v, of: TangentOf::State };
+            let at = At { t, u: &begun.motion.u, v: &begun.motion.v, of: TangentOf::State };
             let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, contact };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);
-        } else if begun.1.known == depth {
+        } else if past.known == depth {
             *startup = None;
         }
         if let Some(ledger) = &mut self.ledger {
-            ledger.restart(&mut **system, &begun.0, (constraints, g))?;
+            ledger.restart(&mut **system, &begun, (constraints, g))?;
         }
         let (pace, clock) = (history.pace, history.clock);
-        (*state, *history) = begun;
+        (*state, *history) = (begun, past);
         (history.pace, history.clock) = (pace, clock);
         Ok(())
     }

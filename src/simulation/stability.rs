@@ -76,24 +76,23 @@ pub(super) fn check_step<T: Real>(
     let allowance = 1.0 + SLIVER.max(64.0 * T::epsilon().value());
     let lags = lags(tableau, system);
     let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed())?, system.dofs());
-    let highest = match system.highest_frequency() {
-        Some(omega) => Highest { at_least: omega * omega, at_most: omega * omega },
-        None => {
-            let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(StepLimit::Cleared(h)) };
-            if let Some(circles) = stiffness.circles(system, &lanczos.inverse) {
-                let largest = critical / circles.largest.value().sqrt();
-                if h <= largest * allowance && !lags {
-                    return Ok(StepLimit::Cleared(h.max(largest)));
-                }
-                lanczos.start = circles.rows;
+    let highest = if let Some(omega) = system.highest_frequency() {
+        Highest { at_least: omega * omega, at_most: omega * omega }
+    } else {
+        let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(StepLimit::Cleared(h)) };
+        if let Some(circles) = stiffness.circles(system, &lanczos.inverse) {
+            let largest = critical / circles.largest.value().sqrt();
+            if h <= largest * allowance && !lags {
+                return Ok(StepLimit::Cleared(h.max(largest)));
             }
-            if !stiffness.is_symmetric() {
-                // Ritz values say nothing.
-                return Ok(StepLimit::Cleared(h));
-            }
-            let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
-            lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
+            lanczos.start = circles.rows;
         }
+        if !stiffness.is_symmetric() {
+            // Ritz values say nothing.
+            return Ok(StepLimit::Cleared(h));
+        }
+        let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
+        lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
     };
     if lags && highest.at_least > 0.0 {
         // The mode of the highest frequency with the strongest damping of any: exact for Rayleigh's, on the safe side otherwise.

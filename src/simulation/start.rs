@@ -1,7 +1,9 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
 
 use super::Constraints;
+use super::constraints::Overclosures;
 use super::finite::check_state;
+use super::massless::{self, StartAdjustment};
 use super::scheme::Scheme;
 use super::step::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
@@ -25,13 +27,44 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) massless: &'s [usize],
 }
 
-/// Whether a motion may start inside an obstacle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Violation {
-    /// An error that names the depth.
+/// What becomes of bodies that overlap at the start (mesh generators leave slivers; rigid contacts and equality rows).
+///
+/// Gaps within the rounding of what they are computed from are zero for all of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum InitialOverclosure {
+    /// [`Error::InitialViolation`], which names the depth.
+    #[default]
     Refused,
+    /// The gap of such a contact is measured from where it starts, for good: nothing is strained. The depth is that of the
+    /// whole feature ([`ContactId::feature`](crate::ContactId)): a node that slides on keeps it.
+    AdjustedGaps,
+    /// The overlap is removed over a time from the start, along 1 − 3 τ² + 2 τ³ with τ from 0 to 1, as an interference fit is
+    /// mounted: what is strained then is strained by it.
+    RemovedOver(f64),
+}
+
+/// Whether a motion may start inside an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Violation {
+    /// As the caller has said, at the start of a run.
+    Initial(InitialOverclosure),
     /// Schemes that impose contact on velocities leave penetrations behind, from which a run may be restarted.
     Accepted,
+}
+
+/// Motion and contacts at the start.
+struct Found<T: Real> {
+    motion: Motion<T>,
+    contacts: ContactState<T>,
+    adjustment: Option<StartAdjustment<T>>,
+}
+
+/// What a run starts from.
+pub(super) struct Begun<T: Real> {
+    pub(super) state: State<T>,
+    pub(super) history: History<T>,
+    pub(super) adjustment: Option<StartAdjustment<T>>,
 }
 
 /// M⁻¹ on the free dofs with room for `rows` contacts.
@@ -49,9 +82,9 @@ impl<T: Real> Start<'_, T> {
         g: &mut ContactJacobian<T>,
         projection: &mut JumpProjection<T>,
         violation: Violation,
-    ) -> Result<(State<T>, History<T>)> {
+    ) -> Result<Begun<T>> {
         let (scheme, h, t) = (self.scheme, self.h, self.t);
-        let (mut motion, contacts) = self.motion(u, v, constraints, g, projection, violation)?;
+        let Found { mut motion, contacts, adjustment } = self.motion(u, v, constraints, g, projection, violation)?;
         let depth = scheme.depth;
         let mut slots = vec![Motion::zero(motion.u.len()); depth + scheme.tableau.stages.len()];
         straight_past(&motion, h, &mut slots[1..depth]);
@@ -80,10 +113,11 @@ impl<T: Real> Start<'_, T> {
             unmoved: [Vec::new(), Vec::new()],
             slopes: self.massless.iter().map(|&dof| motion.v[dof]).collect(),
             scheme: scheme.integrator.name(),
+            overclosures: constraints.overclosures().cloned(),
         };
         let state = State { motion, shown, contacts };
         check_state(h, &state)?;
-        Ok((state, history))
+        Ok(Begun { state, history, adjustment })
     }
 
     /// Motion and contacts at the start: supports in place, M a = f + Gᵀ λ with 0 ≤ λ ⊥ g̈ ≥ 0 on contacts at rest.
@@ -95,7 +129,7 @@ impl<T: Real> Start<'_, T> {
         g: &mut ContactJacobian<T>,
         projection: &mut JumpProjection<T>,
         violation: Violation,
-    ) -> Result<(Motion<T>, ContactState<T>)> {
+    ) -> Result<Found<T>> {
         let Self { system, contact_solver, scheme, h, t, massless } = self;
         let (h, t) = (*h, *t);
         let dofs = u.len();
@@ -109,9 +143,30 @@ impl<T: Real> Start<'_, T> {
             put(&mut motion.v[dof], support[1], "velocity", dof)?;
             motion.a[dof] = support[2];
         }
-        constraints.search(&motion, scheme.ahead() * h, g)?;
+        let ahead = scheme.ahead() * h;
+        constraints.search(&motion, ahead, g)?;
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
         projection.reset();
+        let mut contacts = ContactState::with_capacity(constraints.capacity());
+        contacts.reset(&constraints.ids);
+        let mut touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+        let mut adjustment = None;
+        if let Violation::Initial(_) = violation {
+            let (parts, solver) = (&mut **system, &mut **contact_solver);
+            adjustment = massless::balance_start(
+                parts,
+                solver,
+                (&mut *constraints, &mut *g),
+                &mut motion,
+                massless,
+                [h, ahead],
+            )?;
+            if adjustment.is_some() {
+                constraints.search(&motion, ahead, g)?;
+                contacts.reset(&constraints.ids);
+                touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+            }
+        }
 
         // Accelerations without contact: M a = f − M a_p on free dofs.
         let mut force = vec![T::zero(); dofs];
@@ -128,9 +183,6 @@ impl<T: Real> Start<'_, T> {
             return Err(Error::StepNotFinite { t, h, what: "the initial acceleration", dof, value });
         }
 
-        let mut contacts = ContactState::with_capacity(constraints.capacity());
-        contacts.reset(&constraints.ids);
-        let touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
         // Springs in compression push from the start.
         for row in 0..constraints.len() {
             let law = constraints.law(row);
@@ -172,7 +224,7 @@ impl<T: Real> Start<'_, T> {
         }
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts);
-        Ok((motion, contacts))
+        Ok(Found { motion, contacts, adjustment })
     }
 }
 
@@ -391,6 +443,10 @@ fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) ->
     Ok(())
 }
 
+/// Rounding of gaps that were computed by whoever made the mesh, over that of ours: coordinates may have gone through a file with
+/// twelve digits.
+const INPUT: f64 = 64.0;
+
 /// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle.
 fn touching_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
@@ -400,23 +456,36 @@ fn touching_contacts<T: Real>(
     violation: Violation,
     contacts: &mut ContactState<T>,
 ) -> Result<Vec<bool>> {
-    let mut touching = Vec::with_capacity(constraints.len());
     let mut rates = vec![GapRates::default(); constraints.len()];
+    let mut overclosures = Vec::new();
     constraints.finite_gaps(motion.t, &motion.u, &mut contacts.gap)?;
     constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
+    let mut touching = Vec::with_capacity(constraints.len());
     for (row, rates) in rates.iter().enumerate() {
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];
-        let rounded = constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
+        let rounded = T::of(INPUT) * constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
         let tolerance = rounded + T::of(1e-10 * h) * rate.abs();
         let law = constraints.law(row);
         let may_be_inside = law.is_compliant() || law.reads_start();
         let violated = !may_be_inside && gap < -tolerance || law.is_equality() && gap > tolerance;
-        if violated && violation == Violation::Refused {
-            let contact = constraints.ids[row];
-            return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });
+        match violation {
+            Violation::Initial(InitialOverclosure::Refused) if violated => {
+                let contact = constraints.ids[row];
+                return Err(Error::InitialViolation { contact, gap: gap.value(), tolerance: tolerance.value() });
+            }
+            Violation::Initial(_) if violated => overclosures.push((constraints.ids[row], gap)),
+            Violation::Initial(_) | Violation::Accepted => {}
         }
         touching.push(gap <= tolerance && !law.is_compliant());
+    }
+    if !overclosures.is_empty() {
+        let over = match violation {
+            Violation::Initial(InitialOverclosure::RemovedOver(time)) => Some(time),
+            Violation::Initial(_) | Violation::Accepted => None,
+        };
+        constraints.adjust(Overclosures::new(&overclosures, motion.t, over));
+        constraints.finite_gaps(motion.t, &motion.u, &mut contacts.gap)?;
     }
     Ok(touching)
 }
