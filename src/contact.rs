@@ -88,8 +88,8 @@ pub trait ContactConstraint<T: Real>: Send {
     fn check(&self, dofs: usize) -> Result<()>;
 
     /// Appends every dof that a row may ever act on or a gap depend on (repetitions allowed), whatever later searches find:
-    /// the solver eliminates these last, so that contact works on them alone. Default: the dofs of the rows there are
-    /// now.
+    /// the solver eliminates these last, so that contact works on them alone. Asked once, after a search where the run
+    /// starts. Default: the dofs of the rows which that has found.
     fn dofs(&self, out: &mut Vec<usize>) {
         let mut g = ContactJacobian::default();
         self.jacobian(&mut g);
@@ -155,13 +155,15 @@ pub trait ContactConstraint<T: Real>: Send {
         T::zero()
     }
 
-    /// Appends the rows of G, one [`ContactJacobian::push`] a candidate.
+    /// Appends the rows of G, one [`ContactJacobian::push`] a candidate: those that the last search has found. It is not
+    /// called before the first one.
     fn jacobian(&self, out: &mut ContactJacobian<T>);
 
     /// The gaps at t and u, one a candidate (length).
     fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
 
-    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: none.
+    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: none, for gaps that nothing moves but u;
+    /// a gap that changes in time while its rates are zero is refused ([`Error::SilentMotion`]).
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
         let _ = (t, u, v);
         out.fill(GapRates::default());

@@ -278,6 +278,21 @@ pub enum Error {
         /// Its complementarity residual, in units of the gap.
         residual: f64,
     },
+    /// A gap moves in time by itself, and its rates do not say so.
+    #[error(
+        "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its rates \
+         are zero; give \u{2202}g/\u{2202}t (`ContactConstraint::rates`, or the second entry of a moving offset or gap function), and check \
+         it with `verify::gap_jacobian`",
+        .gap[0], .gap[1], .t[0], .t[1]
+    )]
+    SilentMotion {
+        /// The contact.
+        contact: ContactId,
+        /// Between which times.
+        t: [f64; 2],
+        /// The gap at both.
+        gap: [f64; 2],
+    },
     /// The contact problem of a frame between two bodies was not solved.
     #[error("contact on the frame: {failure}; rows are nodes of the frame")]
     Frame {
@@ -447,16 +462,16 @@ pub enum Error {
         gap: f64,
     },
     /// The host cannot evaluate a trial state; a smaller step may help.
-    #[error("the host's {callback} does not admit the state of a step")]
+    #[error("the host's {callback} does not admit the state of a step: {source}")]
     Inadmissible {
         /// Which callback.
         callback: &'static str,
-        /// The host's own error.
+        /// The host's own error; from a step, one that says t and h as well, and has the host's own as its source.
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A callback of the host failed.
-    #[error("the host's {callback} failed")]
+    #[error("the host's {callback} failed: {source}")]
     Host {
         /// Which callback.
         callback: &'static str,
@@ -477,7 +492,26 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
     }
 }
 
+/// What a host says of a state, with the step that it belongs to.
+#[derive(Debug, thiserror::Error)]
+#[error("step from t = {t:e} with h = {h:e}: {source}")]
+struct InStep {
+    t: f64,
+    h: f64,
+    source: Box<dyn std::error::Error + Send + Sync>,
+}
+
 impl Error {
+    /// Adds the step to what a host says of one of its states.
+    pub(crate) fn in_step(self, t: f64, h: f64) -> Self {
+        match self {
+            Self::Inadmissible { callback, source } => {
+                Self::Inadmissible { callback, source: Box::new(InStep { t, h, source }) }
+            }
+            other => other,
+        }
+    }
+
     /// Whether a smaller step may help (a failed step, not a wrong input).
     ///
     /// [`Host`](Self::Host) never is: a host whose callback may succeed with a smaller step says

@@ -255,6 +255,36 @@ impl Combination {
         SparseColMat::new(self.pattern, values)
     }
 
+    /// Refuses sources (and a diagonal) of another size than they had when the pattern was made, each with its name.
+    pub(crate) fn check(
+        &self,
+        diagonal: usize,
+        sources: impl Iterator<Item = (&'static str, usize)> + Clone,
+    ) -> Result<()> {
+        let dofs = self.diagonal.len();
+        let part = || "a system whose mass or tangent has changed in a run".to_string();
+        if diagonal != dofs {
+            return Err(Error::Dimension {
+                what: "the mass, which must not change in a run,",
+                expected: dofs,
+                found: diagonal,
+            });
+        }
+        if sources.clone().count() != self.slots.len() {
+            return Err(Error::Incompatible {
+                part: part(),
+                reason: "a lumped mass stays lumped, a consistent one consistent",
+            });
+        }
+        for (slots, (what, found)) in self.slots.iter().zip(sources) {
+            let expected = slots.as_ref().map_or(self.len(), Vec::len);
+            if found != expected {
+                return Err(Error::Dimension { what, expected, found });
+            }
+        }
+        Ok(())
+    }
+
     /// `out = Σ weight · source (+ weight · diag)`, identity on the rows left out.
     pub(crate) fn fill<T: Real>(&self, sources: &[(T, &[T])], diagonal: Option<(T, &[T])>, out: &mut [T]) {
         out.fill(T::zero());

@@ -26,7 +26,7 @@ struct Row<'a, T> {
 /// * its acceleration d²/ds² g(t + s, x + s v) at s = 0 (length/time²): vᵀ H v with the second derivatives H of g, and
 ///   2 v · ∂²g/∂t∂x + ∂²g/∂t² if it depends on t.
 ///
-/// It is pure; where only the gap matters v is zero. The last two may be left zero at the price of the correctors:
+/// It is pure; where only the gap matters v is zero. The last may be left zero at the price of the correctors:
 /// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
 ///
 /// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are

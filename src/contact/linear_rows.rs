@@ -1,5 +1,6 @@
 //! Contact rows with constant G: gap = G u + g0(t).
 
+use super::obstacle::unit;
 use super::{ContactConstraint, ContactJacobian, ContactLaw, GapRates};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -102,17 +103,22 @@ impl<'a, T: Real> LinearRows<'a, T> {
 
     /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) + g0.
     ///
-    /// The normal has length one; where the pair is free to slide nothing else acts on it.
+    /// The normal has any length, as that of a [`Plane`](super::Plane): gaps are lengths, forces are forces. Where the pair is
+    /// free to slide nothing else acts on it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if the normal is zero, [`Error::NotFinite`].
     ///
     /// ```
     /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, LinearRows};
     /// let (lower, upper) = ([0, 1], [2, 3]); // x and y dofs
-    /// let mut contact = LinearRows::new().pair(ContactLaw::Rigid, lower, upper, [0.6, 0.8], 0.1);
+    /// let mut contact = LinearRows::new().pair(ContactLaw::Rigid, lower, upper, [3.0, 4.0], 0.1)?;
     /// let mut gap = [0.0_f64];
     /// contact.gap(0.0, &[0.0, 0.0, 0.0, -0.1], &mut gap);
     /// assert!((gap[0] - 0.02).abs() < 1e-15);
+    /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
-    #[must_use]
     pub fn pair<const D: usize>(
         self,
         law: ContactLaw,
@@ -120,10 +126,11 @@ impl<'a, T: Real> LinearRows<'a, T> {
         second: [usize; D],
         normal: [T; D],
         offset: impl Into<GapOffset<'a, T>>,
-    ) -> Self {
+    ) -> Result<Self> {
+        let normal = unit("the normal of a pair of nodes", normal)?;
         let from = first.into_iter().zip(normal.map(|n| -n));
         let entries: Vec<_> = from.chain(second.into_iter().zip(normal)).collect();
-        self.row(law, &entries, offset)
+        Ok(self.row(law, &entries, offset))
     }
 
     /// Adds a row under any law.

@@ -330,7 +330,7 @@ fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     }
 }
 
-fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
+pub(super) fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
     finite(name, &x)?;
     // Scaled first: squares of very small or large entries leave the range of the scalar.
     let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));

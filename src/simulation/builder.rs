@@ -296,33 +296,40 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
         let admitted = admitted(&*integrator, &tableau);
-        let (mut constraints, mut g) = Constraints::new(constraints, dofs, system.prescribed(), admitted)?;
-        let rows = constraints.capacity();
-        if self.stability == Stability::Checked {
-            stability::check_scheme(&integrator.name(), &tableau)?;
-        }
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
-        if rows > 0 {
-            check_corrections(&*integrator, &tableau, &mut *system, &self.correctors)?;
-        }
         let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {
             let values = values.unwrap_or_else(|| vec![T::zero(); dofs]);
             check_vector(what, &values, dofs).map(|()| values)
         };
-        let (u, v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
+        let (mut u, mut v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
 
         let massless = mass::massless(system.mass(), system.prescribed());
         let follows = check_massless(&scheme, massless.first())?;
+        let begin = if let Some((state, history)) = &self.resumed {
+            let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
+            check_resumed(state, history, &scheme, (own, h), [dofs, massless.len()])?;
+            (state.motion.t, &state.motion.u[..], &state.motion.v[..])
+        } else {
+            start::put_supports(&mut *system, t, &mut u, &mut v)?;
+            (t, &u[..], &v[..])
+        };
+        let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), admitted)?;
+        let rows = constraints.capacity();
+        if self.stability == Stability::Checked {
+            stability::check_scheme(&scheme.integrator.name(), &scheme.tableau)?;
+        }
+        if rows > 0 {
+            check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
+        }
         let mut projection = start::projection(&*system, dofs, rows)?;
         let begun = if let Some((state, history)) = self.resumed {
-            let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
-            check_resumed(&state, &history, &scheme, (own, h), [dofs, massless.len()])?;
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
             if let Some(overclosures) = &history.overclosures {
                 constraints.adjust(overclosures.clone());
             }
+            constraints.check_rates(&state.motion, history.clock.h, &g)?;
             Begun { state, history, adjustment: None }
         } else {
             let (solver, massless) = (&mut *contact_solver, &massless[..]);
@@ -459,6 +466,11 @@ fn check_resumed<T: Real>(
     if history.scheme != scheme.integrator.name() {
         let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
         return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
+    }
+    let (t, end) = (state.motion.t, history.clock.at(0.0));
+    if (t - end).abs() > 1e-6 * history.clock.h {
+        let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
+        return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
     }
     if own.to_bits() != h.to_bits() {
         return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });

@@ -195,6 +195,7 @@ impl<T: Real> Operator<T> {
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
         let Self { weights, tangent, linearity, combination, factor, part, end: at_end, values, .. } = self;
+        check_sources(&*system, *tangent, combination)?;
         values.resize(combination.len(), T::zero());
         if *tangent == Tangent::Present {
             part.resize(system.pattern().row_idx().len(), T::zero());
@@ -372,6 +373,20 @@ impl<T: Real> Operator<T> {
     pub(crate) fn stored_values(&self) -> usize {
         self.factor.stored_values()
     }
+}
+
+/// Refuses a pattern or a mass that is not that of the build: entries would go to places of others.
+fn check_sources<T: Real>(system: &dyn System<T>, tangent: Tangent, combination: &Combination) -> Result<()> {
+    let (mass, diagonal) = match system.mass() {
+        Mass::Lumped(mass) => (None, mass.len()),
+        Mass::Consistent(mass) => (Some(mass.val().len()), system.dofs()),
+    };
+    let own = (tangent == Tangent::Present).then(|| system.pattern().row_idx().len());
+    let what = [
+        own.map(|found| ("the pattern of the tangent (entries)", found)),
+        mass.map(|found| ("the mass matrix (entries)", found)),
+    ];
+    combination.check(diagonal, what.into_iter().flatten())
 }
 
 /// Analyzes with the interface last, or freely: where the solver does not condense, and where a matrix that varies would

@@ -134,18 +134,15 @@ impl<T: Real> Start<'_, T> {
         let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
-        let mut supports = vec![[T::zero(); 3]; prescribed.len()];
-        system.prescribed_motion(t, &mut supports);
         let mut motion = Motion { t, u, v, a: vec![T::zero(); dofs] };
-        finite_supports(t, &prescribed, &supports)?;
+        let supports = put_supports(&mut **system, t, &mut motion.u, &mut motion.v)?;
         for (&dof, support) in prescribed.iter().zip(&supports) {
-            put(&mut motion.u[dof], support[0], "displacement", dof)?;
-            put(&mut motion.v[dof], support[1], "velocity", dof)?;
             motion.a[dof] = support[2];
         }
         let ahead = scheme.ahead() * h;
         constraints.search(&motion, ahead, g)?;
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
+        constraints.check_rates(&motion, h, g)?;
         projection.reset();
         let mut contacts = ContactState::with_capacity(constraints.capacity());
         contacts.reset(&constraints.ids);
@@ -429,6 +426,24 @@ impl<T: Real> StartProblem<T> {
         }
         Ok(())
     }
+}
+
+/// Puts displacements and velocities of the supports at t in place, and returns their motions.
+pub(super) fn put_supports<T: Real>(
+    system: &mut dyn System<T>,
+    t: f64,
+    u: &mut [T],
+    v: &mut [T],
+) -> Result<Vec<[T; 3]>> {
+    let prescribed = system.prescribed().to_vec();
+    let mut supports = vec![[T::zero(); 3]; prescribed.len()];
+    system.prescribed_motion(t, &mut supports);
+    finite_supports(t, &prescribed, &supports)?;
+    for (&dof, support) in prescribed.iter().zip(&supports) {
+        put(&mut u[dof], support[0], "displacement", dof)?;
+        put(&mut v[dof], support[1], "velocity", dof)?;
+    }
+    Ok(supports)
 }
 
 /// Puts a support's value where the host left zero or gave the same.

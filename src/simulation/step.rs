@@ -50,6 +50,8 @@ impl<T: Real> Simulation<'_, T> {
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         let result = self.stages().and_then(|()| self.inspect()).and_then(|()| self.accept());
+        let clock = self.history.clock;
+        let result = result.map_err(|error| error.in_step(clock.at(0.0), clock.h));
         if !matches!(result, Ok(Verdict::Accepted)) {
             self.undo();
         }
@@ -65,12 +67,18 @@ impl<T: Real> Simulation<'_, T> {
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
 
-    /// Lets the constraints look at the motion in slot 0 of the history.
+    /// Lets the constraints look at the motion in slot 0 of the history. Where a contact has closed, and now and then, rates
+    /// of gaps are compared with their motion.
     fn inspect(&mut self) -> Result<()> {
-        let Self { constraints, history, work, .. } = self;
+        const NOW_AND_THEN: u64 = 64;
+        let Self { constraints, g, history, work, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
         // (States of the past that were edited have their displacements.)
-        constraints.inspect([&past[work.backup.rotations - 1], new], [&work.closed_at_start, &work.trial.closed])
+        let (start, closed) = (&past[work.backup.rotations - 1], [&work.closed_at_start[..], &work.trial.closed]);
+        if history.clock.steps % NOW_AND_THEN == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
+            constraints.check_rates(start, history.clock.h, g)?;
+        }
+        constraints.inspect([start, new], closed)
     }
 
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be

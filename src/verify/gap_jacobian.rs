@@ -1,6 +1,6 @@
 //! The rows of a constraint against differences of its gaps.
 
-use crate::contact::{ContactConstraint, ContactJacobian, GapRates};
+use crate::contact::{Candidates, ContactConstraint, ContactJacobian, GapRates};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::resolution;
@@ -22,6 +22,8 @@ pub struct GapJacobianError {
     pub acceleration: f64,
     /// Rows that some displacement made vanish, compared as far as they were there.
     pub rows_lost: usize,
+    /// Searches that said [`Candidates::Unchanged`] though identities or G had changed: a run would go on with the old rows.
+    pub unreported: usize,
 }
 
 /// Compares G and the gap rates of a constraint with central differences of its gap.
@@ -29,7 +31,8 @@ pub struct GapJacobianError {
 /// The gap is that after a [`search`](ContactConstraint::search) at the displaced position, so the check sees what the rows
 /// are linearized from, not only the rows themselves. `step` is the size of the displacements (length): small against
 /// what changes the geometry, large against its rounding, for instance 1e-6 of an element. Rows that a displacement makes
-/// appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out; at edges and kinks the gap has
+/// appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out, searches that keep silent about
+/// rows that have changed in [`unreported`](GapJacobianError::unreported); at edges and kinks the gap has
 /// no derivative, so check at positions that are inside of facets. Time is varied by `step` over the largest speed in
 /// `v`, without another search; for the acceleration everything moves with v, by a hundred steps. The constraint is left as
 /// after a search at (t, u, v).
@@ -59,18 +62,25 @@ pub fn gap_jacobian<T: Real>(
     step: f64,
 ) -> Result<GapJacobianError> {
     constraint.check(u.len())?;
-    constraint.search(t, u, v, 0.0)?;
-    let rows = constraint.candidates();
-    let ids: Vec<_> = (0..rows).map(|row| constraint.identity(row)).collect();
-    let mut g = ContactJacobian::default();
-    constraint.jacobian(&mut g);
+    let mut watched = Watched { constraint, rows: None, unreported: 0 };
+    watched.search(t, u, v)?;
+    let (ids, g) = watched.rows.clone().unwrap_or_default();
+    let rows = ids.len();
+    let constraint = &mut *watched.constraint;
     let mut dofs = Vec::new();
     constraint.dofs(&mut dofs);
     dofs.sort_unstable();
     dofs.dedup();
 
-    let mut error =
-        GapJacobianError { rows, jacobian: 0.0, worst: ((0, 0), 0), rate: 0.0, acceleration: 0.0, rows_lost: 0 };
+    let mut error = GapJacobianError {
+        rows,
+        jacobian: 0.0,
+        worst: ((0, 0), 0),
+        rate: 0.0,
+        acceleration: 0.0,
+        rows_lost: 0,
+        unreported: 0,
+    };
     let mut lost = vec![false; rows];
     // Rates first, while the rows are those of the search at u.
     let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
@@ -94,7 +104,7 @@ pub fn gap_jacobian<T: Real>(
             for (x, (&u, &v)) in displaced.iter_mut().zip(u.iter().zip(v)) {
                 *x = u + T::of(time) * v;
             }
-            gaps_of(constraint, &ids, t + time, &displaced, v)
+            gaps_of(&mut watched, &ids, t + time, &displaced, v)
         };
         let [before, now, after] = [along(-delay)?, along(0.0)?, along(delay)?];
         for (row, rate) in rates.iter().enumerate() {
@@ -117,7 +127,7 @@ pub fn gap_jacobian<T: Real>(
         for ((gaps, place), sign) in gaps.iter_mut().zip(&mut places).zip([-1.0, 1.0]) {
             displaced[dof] = u[dof] + T::of(sign * step);
             *place = displaced[dof].value();
-            *gaps = gaps_of(constraint, &ids, t, &displaced, v)?;
+            *gaps = gaps_of(&mut watched, &ids, t, &displaced, v)?;
         }
         displaced[dof] = u[dof];
         for row in 0..rows {
@@ -133,20 +143,46 @@ pub fn gap_jacobian<T: Real>(
             }
         }
     }
-    constraint.search(t, u, v, 0.0)?;
+    watched.search(t, u, v)?;
+    error.unreported = watched.unreported;
     error.rows_lost = lost.iter().filter(|&&lost| lost).count();
     Ok(error)
 }
 
+/// Identities and G.
+type Found<T> = (Vec<(usize, usize)>, ContactJacobian<T>);
+
+/// A constraint, and what its last search has found.
+struct Watched<'c, T: Real> {
+    constraint: &'c mut dyn ContactConstraint<T>,
+    rows: Option<Found<T>>,
+    /// Searches that kept a change for themselves.
+    unreported: usize,
+}
+
+impl<T: Real> Watched<'_, T> {
+    fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
+        let said = self.constraint.search(t, u, v, 0.0)?;
+        let mut g = ContactJacobian::default();
+        self.constraint.jacobian(&mut g);
+        let ids = (0..self.constraint.candidates()).map(|row| self.constraint.identity(row)).collect();
+        let before = self.rows.replace((ids, g));
+        let changed = before.is_some() && before != self.rows;
+        self.unreported += usize::from(changed && said == Candidates::Unchanged);
+        Ok(())
+    }
+}
+
 /// The gaps of some contacts after a search, as far as they are found.
 fn gaps_of<T: Real>(
-    constraint: &mut dyn ContactConstraint<T>,
+    watched: &mut Watched<'_, T>,
     ids: &[(usize, usize)],
     t: f64,
     u: &[T],
     v: &[T],
 ) -> Result<Vec<Option<f64>>> {
-    constraint.search(t, u, v, 0.0)?;
+    watched.search(t, u, v)?;
+    let constraint = &mut *watched.constraint;
     let mut found = vec![T::zero(); constraint.candidates()];
     constraint.gap(t, u, &mut found);
     let mut gaps = vec![None; ids.len()];
