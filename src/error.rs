@@ -129,6 +129,16 @@ pub enum Error {
         /// Why.
         reason: &'static str,
     },
+    /// A facet of a contact surface has no front, or shows its back where its neighbors show their front.
+    #[error("facet {facet} of a contact surface (nodes {nodes:?}) is inverted: {reason}")]
+    InvertedFacet {
+        /// Its index in the list of the surface.
+        facet: usize,
+        /// Its nodes.
+        nodes: Vec<usize>,
+        /// What is wrong with it, and what to do.
+        reason: &'static str,
+    },
     /// A time-integration tableau is malformed.
     #[error("tableau of {integrator}, stage {stage}: {reason}")]
     Tableau {

@@ -45,7 +45,14 @@ impl<const D: usize> Mesh<D> {
     }
 
     fn contact(&self, nodes: &[usize], reach: f64) -> NodeToFacet<f64> {
-        NodeToFacet::new(&self.coordinates, &self.dofs(), nodes, self.facets.iter().copied(), reach).unwrap()
+        let facets = self.facets.iter().copied();
+        NodeToFacet::one_pass(&self.coordinates, &self.dofs(), nodes, facets).unwrap().reach(reach).unwrap()
+    }
+
+    /// In two passes.
+    fn both(&self, own: impl IntoIterator<Item = Facet>, reach: f64) -> NodeToFacet<f64> {
+        let facets = self.facets.iter().copied();
+        NodeToFacet::new(&self.coordinates, &self.dofs(), own, facets).unwrap().reach(reach).unwrap()
     }
 
     fn positions(&self, u: &[f64]) -> Vec<[f64; D]> {
@@ -559,7 +566,6 @@ fn two_passes_treat_both_surfaces_alike() {
     let mut random = Random(5);
     // Two wavy surfaces that face each other; the upper one looks down.
     let mut mesh = grid(5, Cells::Mixed, |x, y| 0.1 * (2.0 * x).sin() * y.cos());
-    let lower: Vec<_> = (0..mesh.coordinates.len()).collect();
     let lower_facets = std::mem::take(&mut mesh.facets);
     let other = grid(4, Cells::Quadrilaterals, |x, y| 0.15 + 0.1 * x.cos() * (1.5 * y).sin());
     let upper = mesh.nodes(other.coordinates.iter().map(|x| [0.45 + x[0], 0.37 + x[1], x[2]]));
@@ -569,12 +575,12 @@ fn two_passes_treat_both_surfaces_alike() {
     };
     let upper_facets: Vec<_> = other.facets.iter().map(turned).collect();
     let dofs = mesh.dofs();
-    let make = |nodes: &[usize], own: &[Facet], facets: &[Facet]| {
-        let contact = NodeToFacet::new(&mesh.coordinates, &dofs, nodes, facets.iter().copied(), 0.6).unwrap();
-        contact.two_pass(own.iter().copied()).unwrap()
+    let make = |own: &[Facet], facets: &[Facet]| {
+        let [own, facets] = [own, facets].map(|facets| facets.iter().copied());
+        NodeToFacet::new(&mesh.coordinates, &dofs, own, facets).unwrap().reach(0.6).unwrap()
     };
-    let mut one = make(&upper, &upper_facets, &lower_facets);
-    let mut two = make(&lower, &lower_facets, &upper_facets);
+    let mut one = make(&upper_facets, &lower_facets);
+    let mut two = make(&lower_facets, &upper_facets);
     let u = random.vector(mesh.size(), 0.05);
     let (mut a, b) = (gaps(&mut one, &u), gaps(&mut two, &u));
     let count = |pass: usize| a.iter().filter(|row| row.0.1 == pass).count();
@@ -604,7 +610,7 @@ fn pressure_on_matching_meshes_is_passed_on() {
             }
         });
         // Nodes stand on each other, so that the second pass adds nothing.
-        let mut contact = mesh.contact(&upper, 0.2).two_pass(turned.collect::<Vec<_>>()).unwrap();
+        let mut contact = mesh.both(turned.collect::<Vec<_>>(), 0.2);
         let u = vec![0.0; mesh.size()];
         let found = gaps(&mut contact, &u);
         assert_eq!(
@@ -678,7 +684,12 @@ fn the_parts_of_the_interface() {
     let nodes = mesh.nodes([[0.9, 0.6, 0.1], [5.0, 5.0, 0.1]]);
     // Dofs that are not in the order of nodes.
     let dofs: Vec<[usize; 3]> = mesh.dofs().iter().map(|dofs| dofs.map(|dof| 100 - dof)).collect();
-    let make = || NodeToFacet::new(&mesh.coordinates, &dofs, &nodes, mesh.facets.iter().copied(), 0.5).unwrap();
+    let make = || {
+        NodeToFacet::one_pass(&mesh.coordinates, &dofs, &nodes, mesh.facets.iter().copied())
+            .unwrap()
+            .reach(0.5)
+            .unwrap()
+    };
     let mut contact: Box<dyn ContactConstraint<f64>> = Box::new(make().with_law(ContactLaw::Equality));
     let mut named = Vec::new();
     contact.dofs(&mut named);
@@ -713,7 +724,7 @@ fn the_parts_of_the_interface() {
 fn single_precision_keeps_the_signs() {
     let coordinates = [[2.0_f32, 0.0], [1.0, 0.3], [0.0, 0.0], [0.4, 0.5], [1.0, 0.299_99]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
-    let mut contact = NodeToFacet::new(&coordinates, &dofs, &[3, 4], [[0, 1], [1, 2]], 1.0).unwrap();
+    let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3, 4], [[0, 1], [1, 2]]).unwrap();
     contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0).unwrap();
     let mut gaps = [0.0_f32; 2];
     contact.gap(0.0, &[0.0; 10], &mut gaps);
@@ -728,7 +739,7 @@ fn wrong_input_is_refused() {
     let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.1], [2.0, 0.0, 0.0]];
     let dofs: Vec<[usize; 3]> = (0..6).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
     let make = |nodes: &[usize], facets: &[Facet], reach: f64| {
-        NodeToFacet::new(&flat, &dofs, nodes, facets.iter().copied(), reach).map(|_| ())
+        NodeToFacet::one_pass(&flat, &dofs, nodes, facets.iter().copied())?.reach(reach).map(|_| ())
     };
     let triangle = Facet::from([0, 1, 2]);
     make(&[4], &[triangle], 1.0).unwrap();
@@ -752,20 +763,21 @@ fn wrong_input_is_refused() {
         (vec![3], vec![triangle, [1, 0, 4].into(), [1, 0, 5].into()]),
     ];
     for (nodes, facets) in incompatible {
-        assert!(matches!(make(&nodes, &facets, 1.0), Err(Error::Incompatible { .. })), "{facets:?}");
+        let refused = make(&nodes, &facets, 1.0);
+        assert!(matches!(refused, Err(Error::Incompatible { .. } | Error::InvertedFacet { .. })), "{facets:?}");
     }
     let mut infinite = flat;
     infinite[2][1] = f64::INFINITY;
-    let refused = NodeToFacet::new(&infinite, &dofs, &[4], [[0, 1, 2]], 1.0);
+    let refused = NodeToFacet::one_pass(&infinite, &dofs, &[4], [[0, 1, 2]]);
     assert!(matches!(refused, Err(Error::NotFinite { index: 2, .. })));
-    let refused = NodeToFacet::new(&flat, &dofs[1..], &[4], [[0, 1, 2]], 1.0);
+    let refused = NodeToFacet::one_pass(&flat, &dofs[1..], &[4], [[0, 1, 2]]);
     assert!(matches!(refused, Err(Error::Dimension { expected: 6, found: 5, .. })));
-    let refused = NodeToFacet::new(&[[0.0], [1.0]], &[[0], [1]], &[1], [[0, 0]], 1.0);
+    let refused = NodeToFacet::one_pass(&[[0.0], [1.0]], &[[0], [1]], &[1], [[0, 0]]);
     assert!(matches!(refused, Err(Error::Dimension { found: 1, .. })));
-    let contact = NodeToFacet::new(&flat, &dofs, &[4], [[0, 1, 2]], 1.0).unwrap();
+    let contact = NodeToFacet::one_pass(&flat, &dofs, &[4], [[0, 1, 2]]).unwrap();
     assert!(matches!(contact.skin(0.0), Err(Error::Parameter { .. })));
-    let contact = NodeToFacet::new(&flat, &dofs, &[4], [[0, 1, 2]], 1.0).unwrap();
-    assert!(matches!(contact.two_pass([[3, 4, 2]]), Err(Error::Incompatible { .. })));
+    let shared = NodeToFacet::new(&flat, &dofs, [[3, 4, 2]], [[0, 1, 2]]);
+    assert!(matches!(shared, Err(Error::Incompatible { .. })));
 }
 
 /// A node flies obliquely onto two segments of elastically joined masses: it is stopped there, slides on over the
@@ -774,7 +786,7 @@ fn wrong_input_is_refused() {
 fn a_run_with_candidates_that_change() {
     let coordinates = [[2.0, 0.0], [1.0, 0.05], [0.0, 0.0], [0.4, 0.2]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-    let contact = NodeToFacet::new(&coordinates, &dofs, &[3], [[0, 1], [1, 2]], 0.1).unwrap();
+    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(0.1).unwrap();
     let mut triplets = Vec::new();
     for (i, j) in [(0, 2), (1, 3), (2, 4), (3, 5), (0, 4), (1, 5)] {
         for (row, column, k) in [(i, i, 50.0), (j, j, 50.0), (i, j, -50.0), (j, i, -50.0)] {
@@ -882,7 +894,7 @@ fn both_passes_are_followed() {
         .map(|facet| std::array::from_fn::<_, 4, _>(|k| upper[facet.nodes()[3 - k]]))
         .map(Facet::from)
         .collect();
-    let make = || mesh.contact(&upper, 0.6).two_pass(turned.iter().copied()).unwrap();
+    let make = || mesh.both(turned.iter().copied(), 0.6);
     let (mut contact, mut fresh) = (make(), make());
     let u = random.vector(mesh.size(), 0.03);
     let to = shaken(&u, &mut random, 0.05);
@@ -1183,7 +1195,7 @@ fn a_bead_on_a_turning_rod_is_pushed_by_it() {
         // The rod from (4, 0) to the origin, its free side upward; it turns upward and carries the bead along.
         let coordinates = [[4.0, 0.0], [0.0, 0.0], [0.5, 0.0]];
         let dofs = [[0, 1], [2, 3], [4, 5]];
-        let contact = NodeToFacet::new(&coordinates, &dofs, &[2], [[0, 1]], 1.0).unwrap();
+        let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[0, 1]]).unwrap();
         let none: Vec<_> = (0..6).map(|i| Triplet::new(i, i, 0.0)).collect();
         let stiffness = SparseColMat::try_new_from_triplets(6, 6, &none).unwrap();
         let end = move |axis: usize| {

@@ -346,7 +346,7 @@ mod facets {
                     let edge = meeting.map_or(f64::INFINITY, near);
                     let (nodes, facets) = body(start, size, triangles);
                     let dofs: Vec<[usize; D]> = (0..nodes.len()).map(|n| std::array::from_fn(|k| D * n + k)).collect();
-                    let contact = NodeToFacet::new(&nodes, &dofs, &[0], facets, reach).unwrap();
+                    let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets).unwrap().reach(reach).unwrap();
                     let what = format!("{name}, way {ratio:.2}, {aim}, {phase}, slope {slope}, {steps:?}");
                     let duration = 2.0 * (0.7_f64 + phase).max(0.3 / ratio) + 3.0 / (ratio * reach);
                     let held = dofs.len() * D - D;

@@ -149,14 +149,14 @@ impl Pass {
     }
 }
 
-/// Contact of the nodes of one deforming surface with the facets of another: segments in two dimensions, triangles and
-/// bilinear quadrilaterals in three.
+/// Contact of two deforming surfaces, of the nodes of each with the facets of the other: segments in two dimensions, triangles
+/// and bilinear quadrilaterals in three. Two passes are made, unless [`one_pass`](Self::one_pass) is asked for by name.
 ///
 /// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
 /// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on
 /// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
 /// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at
-/// a depth of up to `reach` are found as well as nodes outside.
+/// a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
 ///
 /// # Linearization
 ///
@@ -165,7 +165,12 @@ impl Pass {
 /// ([`follow`](ContactConstraint::follow)): closest points are found again at each trial state, in the lists of the
 /// search, and at the end of the step gaps are the distances there. G is the derivative of the distance, and
 /// [`rates`](ContactConstraint::rates) have its second derivative along the motion, from nodes that slide on facets
-/// that turn. A node must not cross the whole `reach` in one step. Geometry is computed in `f64` in every run.
+/// that turn. Geometry is computed in `f64` in every run.
+///
+/// What a step brings near is searched, whatever the speed: a node looks as far as its velocity against the other surface
+/// takes it. A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which a node, moving by more than an
+/// eighth of a facet, has gone through one, or was stopped where the surface is not; or, moving by more than a facet, was
+/// stopped along a normal that is not that of the place. Way and facets are taken as straight within the step.
 ///
 /// A row lasts for its step. Its facet goes on a quarter of itself beyond an open rim, and may turn 19° nearer to the
 /// node's own normal than [`facing`](Self::facing) lets a search find it, so that a node that slides off a table or
@@ -210,10 +215,10 @@ impl Pass {
 /// // The top side of a body, walked with the body on the left, and a node 0.1 above it.
 /// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.25, 0.1]];
 /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-/// let mut contact = NodeToFacet::new(&coordinates, &dofs, &[3], [[0, 1], [1, 2]], 0.5)?;
+/// let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]])?;
 ///
 /// let mut u = [0.0; 8];
-/// contact.search(0.0, &u, &[0.0; 8])?;
+/// contact.search(0.0, &u, &[0.0; 8], 0.0)?;
 /// assert_eq!(contact.candidates(), 1);
 /// assert_eq!(contact.identity(0), (3, 0));
 /// assert_eq!(contact.facet(0), 1);
@@ -262,31 +267,79 @@ pub struct NodeToFacet<T: Real> {
 }
 
 impl<T: Real> NodeToFacet<T> {
-    /// Contact of `nodes` with `facets`, found within the distance `reach` (length) outside and inside of the facets.
+    /// Contact of two surfaces in two passes: the nodes of the facets `one` meet the facets `other`, and the other way round.
+    ///
+    /// Two passes treat both surfaces alike, and pass the patch test on meshes that do not match, which
+    /// [one pass](Self::one_pass) fails where the nodes are coarser than the facets. Normals of both surfaces are compared as in
+    /// [`facing`](Self::facing). Of two nodes that stand on each other only the first pass makes a row. There are more rows than
+    /// independent gaps where a flat interface closes as a whole: the multipliers are then those of least norm. On curved
+    /// surfaces the gaps of both passes cannot all be zero; neither penetrates. The second pass costs its rows: one for each
+    /// node of `other`, in the search and in the contact problem.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; `nodes` and `facets` name nodes by their index there. Nodes that neither names are
-    /// not read later. The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
-    /// [`with_law`](Self::with_law) gives another.
+    /// dofs of their displacements; facets name nodes by their index there. Nodes that none names are not read later. The
+    /// two surfaces share no node. The law is [`ContactLaw::Rigid`], unless [`with_law`](Self::with_law) gives another.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::NodeToFacet;
+    ///
+    /// // Two sides face each other, 0.1 apart: three nodes below, two above, and a row for each.
+    /// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.25, 0.1], [1.75, 0.1]];
+    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
+    /// let mut contact = NodeToFacet::new(&coordinates, &dofs, [[3, 4]], [[0, 1], [1, 2]])?;
+    /// contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0)?;
+    /// // (Of the lower nodes only the middle one is below the upper side.)
+    /// assert_eq!((contact.max_candidates(), contact.candidates()), (5, 3));
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`one_pass`](Self::one_pass).
+    pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        one: impl IntoIterator<Item = F>,
+        other: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        let one: Vec<Facet> = one.into_iter().map(Into::into).collect();
+        let mut nodes: Vec<usize> = one.iter().flat_map(|facet| facet.nodes().iter().copied()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        if nodes.is_empty() {
+            let what = "the list of facets of a contact surface";
+            return Err(Error::Empty { what, remedy: "give at least one facet" });
+        }
+        let mut contact = Self::one_pass(coordinates, dofs, &nodes, other)?.facing(one)?;
+        let nodes = contact.surface.nodes().to_vec();
+        contact.passes.push(Pass::new(nodes));
+        contact.prepare()?;
+        Ok(contact)
+    }
+
+    /// Contact of `nodes` with `facets` in one pass: facets do not meet the nodes' own surface, and may pass between its
+    /// nodes. For single nodes, beams and cables, and where the nodes are finer than the facets; on two meshes that
+    /// do not match pressure errs by some percent to a half ([`new`](Self::new) is exact there).
+    ///
+    /// `coordinates`, `dofs` and facets are those of [`new`](Self::new); `nodes` names nodes by their index.
     ///
     /// # Errors
     ///
     /// [`Error::Dimension`] if D is not 2 or 3, if the lists differ in length, if a facet does not fit D, or if a node
     /// does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without nodes or
-    /// facets; [`Error::Parameter`] for `reach`; [`Error::Incompatible`] for a facet without area, folded, turned
+    /// facets; [`Error::Incompatible`] for a facet without area, folded, turned
     /// against its neighbor or at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
-    pub fn new<F: Into<Facet>, const D: usize>(
+    pub fn one_pass<F: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
         nodes: &[usize],
         facets: impl IntoIterator<Item = F>,
-        reach: T,
     ) -> Result<Self> {
         if D != 2 && D != 3 {
             return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
         }
         check_mesh(coordinates, dofs, nodes)?;
-        let reach = positive("the reach of a contact search", reach.value())?;
         if nodes.is_empty() {
             let what = "the list of contact nodes";
             return Err(Error::Empty { what, remedy: "give at least one node" });
@@ -295,6 +348,7 @@ impl<T: Real> NodeToFacet<T> {
         let dofs: Vec<[usize; 3]> =
             dofs.iter().map(|dofs| std::array::from_fn(|i| dofs.get(i).copied().unwrap_or(0))).collect();
         let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &coordinates)?;
+        let reach = surface.typical();
         let mut sorted = nodes.to_vec();
         sorted.sort_unstable();
         if let Some([node, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -334,8 +388,20 @@ impl<T: Real> NodeToFacet<T> {
         self
     }
 
+    /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the facets. What
+    /// the velocities bring near within a step is found as well, so that no reach must fit the speed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn reach(mut self, reach: T) -> Result<Self> {
+        self.reach = positive("the reach of a contact search", reach.value())?;
+        self.built_at.clear();
+        Ok(self)
+    }
+
     /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built
-    /// anew; half of the reach if not given. It changes the cost, not the result.
+    /// anew; if not given, half of what is searched. It changes the cost, not the result.
     ///
     /// # Errors
     ///
@@ -353,7 +419,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// # Errors
     ///
-    /// As those of [`new`](Self::new) about facets.
+    /// As those of [`one_pass`](Self::one_pass) about facets.
     pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
         let own = Surface::new(facets.into_iter().map(Into::into).collect(), self.dimension, &self.coordinates)?;
         let body = &mut self.bodies[0];
@@ -365,27 +431,6 @@ impl<T: Real> NodeToFacet<T> {
         self.passes.truncate(1);
         self.prepare()?;
         Ok(self)
-    }
-
-    /// Adds the second pass: the nodes of the facets given first also meet `facets`, those of the other surface.
-    ///
-    /// Normals of both surfaces are compared as in [`facing`](Self::facing). Of two nodes that stand on each other only
-    /// the first pass makes a row.
-    ///
-    /// Two passes treat both surfaces alike, and pass the patch test on meshes that do not match, which one pass fails
-    /// where the nodes are coarser than the facets. They have more rows than independent gaps where a flat interface
-    /// closes as a whole: the multipliers are then those of least norm. On curved surfaces the gaps of both passes
-    /// cannot all be zero; neither penetrates.
-    ///
-    /// # Errors
-    ///
-    /// As those of [`new`](Self::new) about facets.
-    pub fn two_pass<F: Into<Facet>>(self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
-        let mut contact = self.facing(facets)?;
-        let nodes = contact.surface.nodes().to_vec();
-        contact.passes.push(Pass::new(nodes));
-        contact.prepare()?;
-        Ok(contact)
     }
 
     /// Index of the facet that a row of the last search stands on, in the list of its pass.

@@ -198,6 +198,15 @@ impl Shape {
         unit(mean).is_some_and(|mean| (0..self.count).all(|k| dot(mean, corner(k)) > SMALL * size * size))
     }
 
+    /// Whether it has no length or area.
+    pub(super) fn is_degenerate(&self) -> bool {
+        const SMALL: f64 = 1e-10;
+        let size = self.size();
+        let corner = |k: usize| cross(self.side(k), sub(self.corners[self.before(k)], self.corners[k]));
+        let flat = |k: usize| norm(corner(k)) <= SMALL * size * size;
+        size <= 0.0 || self.count > 2 && (0..self.count).any(flat)
+    }
+
     fn foot(&self, p: Point, weights: [f64; 4], location: Location) -> Foot {
         let point = self.point(&weights);
         Foot { weights, point, distance: norm(sub(p, point)), location }

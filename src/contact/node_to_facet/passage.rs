@@ -4,7 +4,7 @@ use super::geometry::{Point, Shape, add_scaled, dot, norm, sub};
 use super::search::Bounds;
 use super::stand::{Ground, Stand, meets};
 use super::{Facet, NodeToFacet};
-use crate::contact::{LARGEST_MISS, STEEP, Stride, press_differently};
+use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -12,9 +12,12 @@ use crate::real::Real;
 /// then is not smaller than the mesh.
 const FINE: f64 = 0.125;
 
-/// The same above which the normal is looked at along which a node was stopped: below, only at an edge it can be another than
-/// that of the facet, and there it is anyone's.
+/// The same above which it is looked at what a node that has its row has gone through, and the normal along which it was
+/// stopped: below, rows let nodes in over an edge only, and there the normal is anyone's.
 const COARSE: f64 = 0.6;
+
+/// Share of the smallest facet below which a depth is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// A node and the surface of its pass, at the start and at the end of a step.
 struct Crossing<'a> {
@@ -23,6 +26,7 @@ struct Crossing<'a> {
     node: usize,
     /// A bound of its way against the surface.
     way: f64,
+    law: ContactLaw,
 }
 
 impl<T: Real> NodeToFacet<T> {
@@ -66,7 +70,7 @@ impl<T: Real> NodeToFacet<T> {
                     positions,
                     rounding: Self::rounding(),
                 });
-                let crossing = Crossing { grounds: [start, end], place, node, way };
+                let crossing = Crossing { grounds: [start, end], place, node, way, law: self.law };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
                 let velocity = |node: usize| self.vector(node, step.v);
                 if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
@@ -109,6 +113,7 @@ impl Crossing<'_> {
         };
         let way = against(&|node| sub(end.positions[node], start.positions[node]));
         let length = norm(way);
+        let coarse = length > COARSE * start.surface.finest();
         let linear = gap + dot(from.normal, way);
         if let Some([false, true]) = closed {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
@@ -119,7 +124,6 @@ impl Crossing<'_> {
             }
             let speed = against(&velocity);
             let size = norm(speed);
-            let coarse = length > COARSE * start.surface.finest();
             if coarse
                 && size > 0.0
                 && press_differently([from.normal, to.normal].map(|normal| dot(normal, speed) / size))
@@ -133,11 +137,14 @@ impl Crossing<'_> {
             let inside = to.gap < 0.0 && linear - to.gap <= LARGEST_MISS * length && turn > 0.5;
             inside || gap.max(-to.gap) < LARGEST_MISS * length && turn > -0.5
         };
-        if !after.is_some_and(explained) && self.passes(length) {
+        // What is in already, because an edge has come in beside it for instance, comes out as it may.
+        let outside = gap > -ROUNDING * start.surface.finest();
+        if coarse && outside && !after.is_some_and(explained) && self.passes(length) {
             return Err(("went through a facet", length, gap));
         }
         let turned = after.is_some_and(|to| dot(from.normal, to.normal) < 0.0);
-        if gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
+        // (A rigid law throws out at once what it finds inside, and no smaller step throws it less.)
+        if self.law.is_compliant() && gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
             return Err(("went through the body that it was in", length, gap));
         }
         Ok(())

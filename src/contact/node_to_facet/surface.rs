@@ -17,6 +17,8 @@ pub(super) struct Surface {
     around: Vec<(usize, usize, usize)>,
     /// The longest side of the smallest facet, in the reference coordinates.
     finest: f64,
+    /// The mean of the longest sides of all facets there.
+    typical: f64,
 }
 
 fn refuse(facet: usize, reason: &'static str) -> Error {
@@ -38,10 +40,16 @@ impl Surface {
             }
             super::super::check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
             if !facet.shape(coordinates).is_regular() {
-                return Err(refuse(index, "it has no length or area, or its normals point to both sides"));
+                let reason = match facet.shape(coordinates).is_degenerate() {
+                    true => "it has no length or area",
+                    false => "its normals point to both sides; give its nodes in the order around it",
+                };
+                return Err(Error::InvertedFacet { facet: index, nodes: nodes.to_vec(), reason });
             }
         }
-        let finest = facets.iter().map(|facet| facet.shape(coordinates).size()).fold(f64::INFINITY, f64::min);
+        let sizes = facets.iter().map(|facet| facet.shape(coordinates).size());
+        let finest = sizes.clone().fold(f64::INFINITY, f64::min);
+        let typical = sizes.sum::<f64>() / facets.len() as f64;
         let mut around: Vec<_> = facets
             .iter()
             .enumerate()
@@ -57,6 +65,7 @@ impl Surface {
             nodes,
             around,
             finest,
+            typical,
         };
         surface.connect(dimension)?;
         surface.find_rim();
@@ -76,17 +85,17 @@ impl Surface {
             }
         }
         sides.sort_unstable();
+        // Facets side by side, and whether both show the same face.
+        let mut pairs = Vec::new();
         for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             match *group {
                 [] | [_] => {}
-                [(.., i, k, one), (.., j, l, other)] if one != other => {
+                [(.., i, k, one), (.., j, l, other)] => {
+                    pairs.push((i, j, one != other));
                     self.neighbors[i][k] = Some((j, l));
                     self.neighbors[j][l] = Some((i, k));
                     self.rims[i].sides[k] = false;
                     self.rims[j].sides[l] = false;
-                }
-                [_, (_, _, facet, ..)] => {
-                    return Err(refuse(facet, "its normal points to the other side than that of a neighbor; turn it"));
                 }
                 [_, _, (_, _, facet, ..), ..] => {
                     return Err(refuse(
@@ -94,6 +103,47 @@ impl Surface {
                         "it shares a side with two facets or more, and a surface must not branch",
                     ));
                 }
+            }
+        }
+        self.orient(&pairs)
+    }
+
+    /// Refuses facets turned against their neighbors: of two parts that contradict each other the smaller one.
+    fn orient(&self, pairs: &[(usize, usize, bool)]) -> Result<()> {
+        if pairs.iter().all(|&(.., agree)| agree) {
+            return Ok(());
+        }
+        // The face of each facet as the first of its part shows it, once the part is walked.
+        let mut faces: Vec<Option<bool>> = vec![None; self.facets.len()];
+        for first in 0..self.facets.len() {
+            if faces[first].is_some() {
+                continue;
+            }
+            faces[first] = Some(true);
+            let mut part = vec![first];
+            let mut next = 0;
+            while let Some(&facet) = part.get(next) {
+                next += 1;
+                for &(i, j, agree) in pairs.iter().filter(|&&(i, j, _)| i == facet || j == facet) {
+                    let other = if i == facet { j } else { i };
+                    let expected = (faces[facet] == Some(true)) == agree;
+                    match faces[other] {
+                        None => {
+                            faces[other] = Some(expected);
+                            part.push(other);
+                        }
+                        Some(found) if found != expected => {
+                            return Err(refuse(other, "the surface has one side only"));
+                        }
+                        Some(_) => {}
+                    }
+                }
+            }
+            let front = part.iter().filter(|&&facet| faces[facet] == Some(true)).count();
+            let smaller = 2 * front < part.len();
+            if let Some(&facet) = part.iter().filter(|&&facet| faces[facet] == Some(smaller)).min() {
+                let reason = "its normal points to the other side than those of its neighbors; turn it";
+                return Err(Error::InvertedFacet { facet, nodes: self.facets[facet].nodes().to_vec(), reason });
             }
         }
         Ok(())
@@ -127,6 +177,11 @@ impl Surface {
     /// The longest side of the smallest facet, in the reference coordinates.
     pub(super) fn finest(&self) -> f64 {
         self.finest
+    }
+
+    /// The mean of the longest sides of the facets, in the reference coordinates.
+    pub(super) fn typical(&self) -> f64 {
+        self.typical
     }
 
     /// Nodes of the facets, sorted.
