@@ -192,7 +192,11 @@ impl<T: Real> ContactState<T> {
         &self.gap
     }
 
-    /// Contact forces, compression positive: after correction, consistent with the accelerations of the state.
+    /// Contact forces, compression positive: those of the instant of the state, after correction, so that M a = f + Gᵀ λ there.
+    ///
+    /// They are values, not means over the step: summed over the steps, times h, they are not the change of momentum. The
+    /// force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a coarse
+    /// block). [`impulses`](Self::impulses) close to rounding.
     pub fn forces(&self) -> &[T] {
         &self.lambda
     }
@@ -207,7 +211,8 @@ impl<T: Real> ContactState<T> {
         &self.closed
     }
 
-    /// Impulses of the last step, corrections included: their sum over the steps is the change of momentum.
+    /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change of the
+    /// momentum that the scheme conserves ([`Simulation::momentum`](crate::Simulation::momentum)), to rounding.
     pub fn impulses(&self) -> &[T] {
         &self.impulse
     }

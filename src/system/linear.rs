@@ -116,6 +116,15 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         if n == 0 {
             return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
         }
+        // K knows how many dofs there are, if it is square; else it is the one that is wrong.
+        let dofs = stiffness.nrows();
+        if dofs == stiffness.ncols() && dofs != n {
+            return Err(Error::Dimension {
+                what: "the mass (the stiffness matrix counts the dofs)",
+                expected: dofs,
+                found: n,
+            });
+        }
         same_size("stiffness matrix", n, stiffness.as_ref())?;
         let symmetry = sparse::symmetry("stiffness", stiffness.as_ref())?;
         Ok(Self {
