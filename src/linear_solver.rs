@@ -18,8 +18,9 @@ pub use lu::Lu;
 pub use ordering::Ordering;
 pub use tridiagonal::Tridiagonal;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// A method to solve `A x = b` with sparse A; a small value, whose memory is the [`Factorization`].
@@ -47,8 +48,10 @@ pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Incompatible`](crate::Error::Incompatible) for a
-    /// pattern the solver cannot handle.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Incompatible`](crate::Error::Incompatible) for a
+    /// pattern the solver cannot handle, and of the solvers of this crate [`Error::MissingDof`](crate::Error::MissingDof),
+    /// [`Error::RepeatedDof`](crate::Error::RepeatedDof) and [`Error::Incompatible`](crate::Error::Incompatible) for a list `last`
+    /// that names no dofs, a dof twice, or is not ascending.
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize])
     -> Result<Box<dyn Factorization<T>>>;
 }
@@ -69,8 +72,9 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::Singular`](crate::Error::Singular) with the failing dof; the factorization is then unusable until the
-    /// next success.
+    /// [`Error::Singular`](crate::Error::Singular) with the failing dof, and of the solvers of this crate
+    /// [`Error::Dimension`](crate::Error::Dimension) and [`Error::Incompatible`](crate::Error::Incompatible) for a matrix of another
+    /// size or pattern; the factorization is then unusable until the next success.
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()>;
 
     /// Solves in place; `rhs` holds one or more columns of the system's size, one after the other.
@@ -151,6 +155,57 @@ pub trait Condensation<T: Real> {
     fn solve(&mut self, forces: &mut [T]);
 }
 
+/// Checks what is to be analyzed, and returns the number of dofs.
+fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
+    let (dofs, what) = (sparse::check_effective_pattern(pattern)?, "the list of contact dofs");
+    if let Some(&dof) = last.iter().find(|&&dof| dof >= dofs) {
+        return Err(Error::MissingDof { what, dof, dofs });
+    }
+    match last.windows(2).find(|pair| pair[0] >= pair[1]) {
+        None => Ok(dofs),
+        Some(&[dof, next]) if dof == next => Err(Error::RepeatedDof { what, dof }),
+        Some(_) => Err(Error::Incompatible { part: what.into(), reason: "it is not ascending" }),
+    }
+}
+
+/// What a matrix must share with the pattern that was analyzed: a fingerprint, for the pattern itself can be as large as a factor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Fingerprint {
+    dofs: usize,
+    entries: usize,
+    mixed: u64,
+}
+
+impl Fingerprint {
+    fn of(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
+        // Each row index by the place where it stands: an odd factor mixes, a rotation keeps the order.
+        let mix = |mixed: u64, index: usize| (mixed.rotate_left(5) ^ index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let (mut entries, mut mixed) = (0, 0);
+        for column in 0..pattern.ncols() {
+            let rows = pattern.row_idx_of_col_raw(column);
+            entries += rows.len();
+            mixed = rows.iter().fold(mix(mixed, rows.len()), |mixed, &row| mix(mixed, row));
+        }
+        Self { dofs: pattern.ncols(), entries, mixed }
+    }
+
+    /// Refuses a matrix with another pattern.
+    fn check<T: Real>(&self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let what = "effective matrix";
+        let found = sparse::square(what, a)?;
+        if found != self.dofs {
+            return Err(Error::Dimension { what, expected: self.dofs, found });
+        }
+        match Self::of(a.symbolic()) == *self {
+            true => Ok(()),
+            false => Err(Error::Incompatible {
+                part: "the effective matrix".into(),
+                reason: "its pattern is not the one that was analyzed; analyze it again",
+            }),
+        }
+    }
+}
+
 /// Columns of forces on the interface that are solved for at once without allocating.
 pub(crate) const COLUMNS: usize = 16;
 
@@ -169,6 +224,7 @@ impl<T: Real> LinearSolver<T> for Automatic {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
+        check_analysis(pattern, last)?;
         match diagonal::is_diagonal(pattern) {
             true => Diagonal.analyze(pattern, last),
             false => match tridiagonal::try_analyze(pattern, last) {

@@ -1,9 +1,9 @@
 //! A factorization for each body: the connected components of a matrix, one by one.
 
-use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, LinearSolver};
+use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::{sparse, threads};
+use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use std::convert::Infallible;
 use std::ops::Range;
@@ -92,10 +92,7 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let n = sparse::check_effective_pattern(pattern)?;
-        if let Some(&dof) = last.iter().find(|dof| **dof >= n) {
-            return Err(Error::MissingDof { what: "the list of contact dofs", dof, dofs: n });
-        }
+        let n = check_analysis(pattern, last)?;
         let (body_of, mut bodies) = components(pattern);
         let solvers = self.solvers(&body_of, bodies.len())?;
         if let [body] = &bodies[..] {
@@ -116,9 +113,17 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
         }
         let widest = parts.iter().map(|part| part.interface.len()).max().unwrap_or(0);
         let on_interface = vec![T::zero(); COLUMNS * widest];
-        let entries = pattern.row_idx().len();
+        let fingerprint = Fingerprint::of(pattern);
         let apart = threads::worthwhile(parts.iter().map(|part| part.factor.stored_values()));
-        Ok(Box::new(Factors { parts, size: n, height: last.len(), entries, columns: Vec::new(), on_interface, apart }))
+        Ok(Box::new(Factors {
+            parts,
+            size: n,
+            height: last.len(),
+            fingerprint,
+            columns: Vec::new(),
+            on_interface,
+            apart,
+        }))
     }
 }
 
@@ -324,10 +329,10 @@ fn in_system(error: Error, whole: impl Fn(usize) -> usize) -> Error {
 #[derive(Debug)]
 struct Factors<T: Real> {
     parts: Vec<Part<T>>,
-    /// Dofs, dofs of contact, and entries of the whole matrix.
+    /// Dofs, dofs of contact, and the pattern of the whole matrix.
     size: usize,
     height: usize,
-    entries: usize,
+    fingerprint: Fingerprint,
     /// Columns of a part and of its interface: room for as many as were ever asked for, of the interface at least for
     /// `COLUMNS`.
     columns: Vec<T>,
@@ -346,10 +351,7 @@ fn room<T: Real>(scratch: &mut Vec<T>, size: usize) -> &mut [T] {
 
 impl<T: Real> Factorization<T> for Factors<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        if a.val().len() != self.entries {
-            let what = "the entries of the effective matrix";
-            return Err(Error::Dimension { what, expected: self.entries, found: a.val().len() });
-        }
+        self.fingerprint.check(a)?;
         match self.apart {
             true => threads::try_each(&mut self.parts, &|part| part.factorize(a.val())),
             false => self.parts.iter_mut().try_for_each(|part| part.factorize(a.val())),

@@ -2,7 +2,7 @@
 
 use super::forest::Forest;
 use super::ordering::{self, Ordering};
-use super::{COLUMNS, Condensation, Factorization, LinearSolver};
+use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -71,11 +71,13 @@ impl Cholesky {
     ///
     /// Those of [`analyze`](LinearSolver::analyze); [`Error::OutOfMemory`] only if the analysis itself finds no memory.
     pub fn estimate(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
+        check_analysis(pattern, last)?;
         Ok(ordering::symbolic_cholesky(&self.ordering, pattern, last)?.len_val())
     }
 }
 
 struct Factor<T: Real> {
+    fingerprint: Fingerprint,
     symbolic: SymbolicCholesky<usize>,
     kind: Kind,
     values: Vec<T>,
@@ -118,6 +120,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
+        check_analysis(pattern, last)?;
         let symbolic = ordering::symbolic_cholesky(&self.ordering, pattern, last)?;
         let values = memory::zeros(symbolic.len_val(), 1, "a sparse Cholesky factor")?;
         let (kind, below) = match symbolic.raw() {
@@ -142,6 +145,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         // Without an interface there are still the sweeps over one right-hand side.
         let below = memory::zeros(if last.is_empty() { 1 } else { COLUMNS }, below, what)?;
         Ok(Box::new(Factor {
+            fingerprint: Fingerprint::of(pattern),
             symbolic,
             kind,
             values,
@@ -280,7 +284,8 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { symbolic, kind, values, pivots, memory, par, cursor, .. } = self;
+        let Self { fingerprint, symbolic, kind, values, pivots, memory, par, cursor, .. } = self;
+        fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
         T::cholesky(*kind, symbolic, a, values, pivots, *par, memory).map_err(singular)?;

@@ -1,6 +1,6 @@
 //! Preconditioned conjugate gradients: large bodies at small steps.
 
-use super::{Factorization, LinearSolver};
+use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -122,7 +122,7 @@ impl ConjugateGradients {
 struct Matrix<T: Real> {
     settings: ConjugateGradients,
     dofs: usize,
-    entries: usize,
+    fingerprint: Fingerprint,
     /// Dofs of a block: 1, 2 or 3.
     size: usize,
     /// Blocks below the diagonal, row by row: their columns, ascending, and values.
@@ -192,9 +192,9 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
     fn analyze(
         &self,
         pattern: SymbolicSparseColMatRef<'_, usize>,
-        _last: &[usize],
+        last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let dofs = sparse::check_effective_pattern(pattern)?;
+        let dofs = check_analysis(pattern, last)?;
         // The size that needs the least memory: zeros are stored in blocks, an index is half a number.
         let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
         for size in [3, 2, 1].into_iter().filter(|size| dofs.is_multiple_of(*size)) {
@@ -218,7 +218,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
         Ok(Box::new(Matrix {
             settings: *self,
             dofs,
-            entries: pattern.row_idx().len(),
+            fingerprint: Fingerprint::of(pattern),
             size,
             pointers,
             columns,
@@ -287,14 +287,7 @@ impl<T: Real> Matrix<T> {
 impl<T: Real> Factorization<T> for Matrix<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         self.state = Ready::No;
-        for (what, expected, found) in [
-            ("the effective matrix", self.dofs, a.ncols()),
-            ("the entries of the effective matrix", self.entries, a.val().len()),
-        ] {
-            if expected != found {
-                return Err(Error::Dimension { what, expected, found });
-            }
-        }
+        self.fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
         self.fill(a)?;
         T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)

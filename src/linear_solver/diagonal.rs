@@ -1,8 +1,9 @@
 //! Diagonal systems: explicit schemes with a lumped mass.
 
-use super::{Condensation, Factorization, LinearSolver};
+use super::{Condensation, Factorization, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// Division by the diagonal.
@@ -28,6 +29,7 @@ impl<T: Real> LinearSolver<T> for Diagonal {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
+        check_analysis(pattern, last)?;
         if !is_diagonal(pattern) {
             return Err(Error::Incompatible {
                 part: "the diagonal solver".into(),
@@ -41,6 +43,14 @@ impl<T: Real> LinearSolver<T> for Diagonal {
 
 impl<T: Real> Factorization<T> for Inverse<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let dofs = sparse::square("effective matrix", a)?;
+        if dofs != self.reciprocals.len() {
+            return Err(Error::Dimension { what: "effective matrix", expected: self.reciprocals.len(), found: dofs });
+        }
+        if !is_diagonal(a.symbolic()) {
+            let reason = "its pattern is not the one that was analyzed; analyze it again";
+            return Err(Error::Incompatible { part: "the effective matrix".into(), reason });
+        }
         for (dof, inverse) in self.reciprocals.iter_mut().enumerate() {
             let value = a.val_of_col(dof).iter().copied().sum::<T>();
             if !(value > T::zero() && value.is_finite()) {

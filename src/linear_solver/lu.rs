@@ -1,6 +1,6 @@
 //! Sparse LU through faer: matrices that are not symmetric, or not definite.
 
-use super::{Factorization, LinearSolver};
+use super::{Factorization, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -95,9 +95,9 @@ impl<T: Real> LinearSolver<T> for Lu {
     fn analyze(
         &self,
         pattern: SymbolicSparseColMatRef<'_, usize>,
-        _last: &[usize],
+        last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
-        let n = sparse::check_effective_pattern(pattern)?;
+        let n = check_analysis(pattern, last)?;
         let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU" };
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(no_memory)?;
         let bound = bound(pattern, &symbolic)?;

@@ -1,7 +1,7 @@
 //! Chains: L D Lᵀ of matrices whose dofs hang together like beads on strings.
 
 use super::cholesky::negligible;
-use super::{Condensation, Factorization, LinearSolver};
+use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::real::chain::Chains;
@@ -39,8 +39,9 @@ impl<T: Real> LinearSolver<T> for Tridiagonal {
         pattern: SymbolicSparseColMatRef<'_, usize>,
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
+        check_analysis(pattern, last)?;
         match strings(pattern, last) {
-            Some(strings) => factorization(strings, last),
+            Some(strings) => factorization(strings, pattern, last),
             None => Err(Error::Incompatible {
                 part: "the tridiagonal solver".into(),
                 reason: "the effective matrix is not one of strings with contact at one end each; use Cholesky",
@@ -54,7 +55,7 @@ pub(super) fn try_analyze<T: Real>(
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
 ) -> Option<Result<Box<dyn Factorization<T>>>> {
-    strings(pattern, last).map(|strings| factorization(strings, last))
+    strings(pattern, last).map(|strings| factorization(strings, pattern, last))
 }
 
 /// The dofs along all strings, one string after the other.
@@ -195,6 +196,7 @@ impl Numbering {
 
 #[derive(Debug)]
 struct Factor<T> {
+    fingerprint: Fingerprint,
     numbering: Numbering,
     /// Where each string begins, and where its dofs of contact begin; behind the last one the number of dofs.
     begins: Vec<[usize; 2]>,
@@ -213,7 +215,11 @@ struct Factor<T> {
     cursor: Vec<usize>,
 }
 
-fn factorization<T: Real>(Strings { order, mut begins }: Strings, last: &[usize]) -> Result<Box<dyn Factorization<T>>> {
+fn factorization<T: Real>(
+    Strings { order, mut begins }: Strings,
+    pattern: SymbolicSparseColMatRef<'_, usize>,
+    last: &[usize],
+) -> Result<Box<dyn Factorization<T>>> {
     let n = order.len();
     let what = "the factor of a tridiagonal matrix";
     let zeros = || memory::zeros(n, 1, what);
@@ -231,6 +237,7 @@ fn factorization<T: Real>(Strings { order, mut begins }: Strings, last: &[usize]
     };
     let places = interface.iter().map(place).collect();
     Ok(Box::new(Factor {
+        fingerprint: Fingerprint::of(pattern),
         numbering: Numbering::new(order),
         begins,
         lower: zeros()?,
@@ -320,9 +327,7 @@ enum Ends {
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         let n = self.x.len();
-        if a.ncols() != n {
-            return Err(Error::Dimension { what: "effective matrix", expected: n, found: a.ncols() });
-        }
+        self.fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
         let Self { numbering, begins, lower, inverse, .. } = self;
         let negligible = negligible::<T>(n);
