@@ -173,7 +173,7 @@ impl Loop {
             let rows: Vec<_> = rows.into_iter().filter(|&row| raw[row] > 0.0 || g.product(row, x) < 0.0).collect();
             let (still, mut y) = (vec![0.0; rows.len()], vec![0.0; rows.len()]);
             projection.close(g, &rows).expect("masses are positive");
-            projection.remove_jump(g, &still, x, &mut y);
+            projection.remove_jump(g, &still, x, &mut y).expect("one entry a row");
             (rows, y)
         };
         // v ← v − M⁻¹Gᵀ S⁻¹ G v, and then a ← a − M⁻¹Gᵀ y with y = S⁻¹ G a.

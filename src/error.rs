@@ -480,6 +480,12 @@ pub enum Error {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A callback of the host has panicked in an earlier call, and the host's own parts may have stopped half way.
+    #[error(
+        "a callback of the host has panicked in an earlier call: this simulation does not go on; its state and history are those \
+         before that call: build another one and `resume` from them, or from copies kept before"
+    )]
+    Poisoned,
     /// A callback of the host failed.
     #[error("the host's {callback} failed: {source}")]
     Host {
@@ -509,6 +515,19 @@ struct InStep {
     t: f64,
     h: f64,
     source: Box<dyn std::error::Error + Send + Sync>,
+}
+
+/// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot hold.
+pub(crate) fn step_size<T: crate::real::Real>(h: f64) -> Result<()> {
+    let fits = |x: f64| T::of(x).is_normal();
+    match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {
+        true => Ok(()),
+        false => Err(Error::Parameter {
+            name: "the step size h",
+            value: h,
+            range: "positive and finite, with h² and 1/h² in the range of the scalar; choose another unit of time",
+        }),
+    }
 }
 
 impl Error {

@@ -35,7 +35,26 @@ pub enum Mass<'a, T> {
 
 impl<T: Real> Mass<'_, T> {
     /// `y += c M x`.
-    pub fn product(&self, c: T, x: &[T], y: &mut [T]) {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] unless x and y have one entry a dof, and for a matrix that is not square.
+    pub fn product(&self, c: T, x: &[T], y: &mut [T]) -> Result<()> {
+        let expected = match *self {
+            Self::Lumped(mass) => mass.len(),
+            Self::Consistent(m) => sparse::square("the mass matrix", m)?,
+        };
+        for found in [x.len(), y.len()] {
+            if found != expected {
+                return Err(Error::Dimension { what: "a vector in a product with M", expected, found });
+            }
+        }
+        self.add_product(c, x, y);
+        Ok(())
+    }
+
+    /// `y += c M x` with vectors that are known to fit.
+    pub(crate) fn add_product(&self, c: T, x: &[T], y: &mut [T]) {
         match *self {
             Self::Lumped(mass) => {
                 for ((y, &x), &m) in y.iter_mut().zip(x).zip(mass) {

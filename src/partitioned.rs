@@ -2,6 +2,7 @@
 
 use crate::contact_solver::{ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::real::Real;
 
 /// What a body says of its interface: where it would be without contact, and how it gives way.
@@ -95,7 +96,7 @@ impl<T: Real> Interface<T> {
 /// use contact_dynamics::partitioned::{Frame, Side};
 ///
 /// // Masses 2 and 1 on springs, in units of a step: responses to unit forces ½ and 1. The gap is 0.1.
-/// let mut frame = Frame::<f64>::new(1);
+/// let mut frame = Frame::<f64>::new(1)?;
 /// let first = Side { free: &[0.3], flexibility: &[0.5] };
 /// let second = Side { free: &[-0.1], flexibility: &[1.0] };
 /// let interface = frame.solve([first, second], &[0.1])?;
@@ -126,19 +127,30 @@ pub struct Frame<T: Real> {
 
 impl<T: Real> Frame<T> {
     /// A frame of so many nodes, solved by [`ActiveSet`]. A node of a tie in several directions counts once for each of them.
-    pub fn new(nodes: usize) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfMemory`] if the dense problem of so many nodes does not fit.
+    pub fn new(nodes: usize) -> Result<Self> {
         Self::with_solver(nodes, ActiveSet::default())
     }
 
     /// The same with a solver of the host's choice.
-    pub fn with_solver(nodes: usize, mut solver: impl ContactSolver<T> + 'static) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfMemory`] if the dense problem of so many nodes does not fit.
+    pub fn with_solver(nodes: usize, mut solver: impl ContactSolver<T> + 'static) -> Result<Self> {
+        // Asked for first, with what the solver takes (its `reserve` cannot fail): an absurd number is an error and not an abort.
+        memory::reserve::<T>(nodes, nodes.saturating_mul(8), "a frame")?;
+        let delassus = memory::reserve(nodes, nodes, "a frame")?;
         solver.reserve(nodes);
         let zero = || vec![T::zero(); nodes];
-        Self {
+        Ok(Self {
             solver: Box::new(solver),
             nodes: Vec::with_capacity(nodes),
             multipliers: Vec::with_capacity(nodes),
-            delassus: Vec::with_capacity(nodes * nodes),
+            delassus,
             version: 0,
             offset: Vec::with_capacity(nodes),
             tolerance: Vec::with_capacity(nodes),
@@ -151,7 +163,7 @@ impl<T: Real> Frame<T> {
                 closed: vec![false; nodes],
                 iterations: 0,
             },
-        }
+        })
     }
 
     /// Contact: forces that press, on nodes whose gap would close. `gaps` are those at zero values of both sides, positive

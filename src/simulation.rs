@@ -46,6 +46,7 @@ pub(crate) use operator::Operator;
 use program::Program;
 use scheme::Scheme;
 use stability::StepLimit;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,6 +121,8 @@ pub struct Simulation<'a, T: Real> {
     judge: Option<Judge<T>>,
     adjustment: Option<StartAdjustment<T>>,
     statistics: Statistics,
+    /// Whether a callback of the host has panicked.
+    poisoned: bool,
 }
 
 /// Memory of a step. Nothing in it changes a result.
@@ -282,6 +285,7 @@ impl<'a, T: Real> Simulation<'a, T> {
     ///
     /// [`Error::Dimension`] if the direction has the wrong length.
     pub fn momentum(&self, direction: &[T]) -> Result<T> {
+        self.check_sound()?;
         let dofs = self.system.dofs();
         if direction.len() != dofs {
             return Err(Error::Dimension { what: "the direction", expected: dofs, found: direction.len() });
@@ -289,8 +293,30 @@ impl<'a, T: Real> Simulation<'a, T> {
         let history = &self.history;
         let sum = self.scheme.momentum(&self.state.motion, &history.slots[1..history.known], history.clock.h);
         let mut product = vec![T::zero(); dofs];
-        self.system.mass().product(T::one(), &sum, &mut product);
+        self.system.mass().add_product(T::one(), &sum, &mut product);
         Ok(product.iter().zip(direction).map(|(&p, &d)| p * d).sum())
+    }
+
+    /// Refuses to go on after a panic of the host.
+    fn check_sound(&self) -> Result<()> {
+        if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
+    }
+
+    /// Calls what calls the host and changes the run. Should the host panic, state and history are put back before the panic goes
+    /// on; if somebody catches it, later calls are refused.
+    fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
+        self.check_sound()?;
+        // Nothing half done is seen: what is undone below is all that was swapped, and the rest is refused.
+        match catch_unwind(AssertUnwindSafe(|| call(self))) {
+            Ok(result) => result,
+            Err(panic) => {
+                self.poisoned = true;
+                if self.work.backup.underway {
+                    self.put_back();
+                }
+                resume_unwind(panic)
+            }
+        }
     }
 
     /// Kinetic and elastic energy of the state, and the balance if the builder asked for it.
@@ -304,6 +330,7 @@ impl<'a, T: Real> Simulation<'a, T> {
     ///
     /// The host's own.
     pub fn reactions(&mut self) -> Result<Vec<T>> {
+        self.check_sound()?;
         energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g))
     }
 }

@@ -68,9 +68,12 @@ impl Row {
         Self { z: f(self.z, other.z), u: each(self.u, other.u), v: each(self.v, other.v), a: each(self.a, other.a) }
     }
 
-    /// Coefficients of past state `k`: (u, h v, h² a).
+    /// Coefficients of past state `k`: (u, h v, h² a); zero for states older than any row can read.
     pub fn past(&self, k: usize) -> [f64; 3] {
-        [self.u[k], self.v[k], self.a[k]]
+        match k < MAX_PAST {
+            true => [self.u[k], self.v[k], self.a[k]],
+            false => [0.0; 3],
+        }
     }
 
     /// One more than the oldest past state read, 0 if none is.
@@ -369,7 +372,19 @@ impl Tableau {
     }
 
     /// Which entries of the past are still read after stage `s`: `[k][field]`, k = 0 the state of that stage.
-    pub fn read_after(&self, s: usize) -> Vec<[bool; 3]> {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if there is no such stage.
+    pub fn read_after(&self, s: usize) -> Result<Vec<[bool; 3]>> {
+        match s < self.stages.len() {
+            true => Ok(self.reads_after(s)),
+            false => Err(no_stage(s)),
+        }
+    }
+
+    /// [`read_after`](Self::read_after) of a stage that exists.
+    pub(crate) fn reads_after(&self, s: usize) -> Vec<[bool; 3]> {
         let (stages, depth) = (self.stages.len(), self.depth());
         let mut read = vec![[false; 3]; depth + stages];
         // In increment form: what cancels is not read.
@@ -444,10 +459,15 @@ impl Tableau {
             });
             past.splice(0..0, new);
         }
-        past.drain(3..3 * stages);
+        // (Without a stage a step does nothing: there is no state between to drop.)
+        past.drain(3..3 * stages.max(1));
         past.truncate(size);
         past
     }
+}
+
+fn no_stage(s: usize) -> Error {
+    Error::Parameter { name: "the index of a stage", value: s as f64, range: "below the number of stages" }
 }
 
 /// Weights of motion without stiffness and damping.
@@ -507,8 +527,12 @@ impl Momentum {
     }
 
     /// The covector over the past after stage `s`: `[k][field]`, k = 0 the state of that stage, fields U, V, A.
-    pub fn after_stage(&self, s: usize) -> &[[f64; 3]] {
-        &self.covectors[s]
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if there is no such stage.
+    pub fn after_stage(&self, s: usize) -> Result<&[[f64; 3]]> {
+        self.covectors.get(s).map(Vec::as_slice).ok_or_else(|| no_stage(s))
     }
 
     /// The covector over the kept past after a whole step: `[k][field]`.

@@ -157,10 +157,10 @@ fn weights_of_the_functional_are_those_derived_by_hand() {
 fn past_states_are_counted_from_the_start_of_the_step() {
     assert_eq!([Bathe::default().tableau().depth(), Park.tableau().depth(), Composite.tableau().depth()], [1, 3, 2]);
     // After the first stage of Bathe's scheme the second reads v of that stage and u of t_n, nothing older.
-    let read = Bathe::default().tableau().read_after(0);
+    let read = Bathe::default().tableau().read_after(0).unwrap();
     assert!(read[0][1] && read[1][0] && !read[2..].iter().flatten().any(|&read| read));
     // The composite scheme reads u and v of the last two states, never a.
-    let read = Composite.tableau().read_after(0);
+    let read = Composite.tableau().read_after(0).unwrap();
     assert_eq!(read[..2], [[true, true, false], [true, true, false]]);
 }
 

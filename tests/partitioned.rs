@@ -316,7 +316,7 @@ impl Host {
         let nodes = scene.pairs.len();
         Self {
             bodies: [0, 1].map(|number| Body::new(scene, number)),
-            frames: [0, 1].map(|_| Frame::new(nodes)),
+            frames: [0, 1].map(|_| Frame::new(nodes).unwrap()),
             gaps: scene.gaps.clone(),
             force: vec![0.0; nodes],
             pressed: 0,
@@ -465,7 +465,7 @@ fn check(interface: &Interface<f64>, sides: [Side<'_, f64>; 2], gaps: &[f64], si
 fn frames_meet_the_equations_of_localized_multipliers() {
     let mut random = xorshift(41);
     let n = 7;
-    let (mut frame, mut reference) = (Frame::new(n), Frame::with_solver(n, Pivoting::default()));
+    let (mut frame, mut reference) = (Frame::new(n).unwrap(), Frame::with_solver(n, Pivoting::default()).unwrap());
     let (mut pressed, mut held_open) = (0, 0);
     for case in 0..200 {
         // A rigid obstacle on one side now and then, rank-deficient sides that make up for each other.
@@ -509,7 +509,7 @@ fn bodies_in_a_row_alternate() {
     let first = Side { free: &[v[0], -v[2]], flexibility: &[1.0 / mass[0], 0.0, 0.0, 1.0 / mass[2]] };
     // Seen along the second normal the middle mass moves the other way.
     let second = Side { free: &[v[1], -v[1]], flexibility: &[0.5, -0.5, -0.5, 0.5] };
-    let mut frame = Frame::<f64>::new(2);
+    let mut frame = Frame::<f64>::new(2).unwrap();
     let found = frame.hold([first, second], &[0.0; 2], &[true; 2]).unwrap();
     let common = mass.iter().zip(v).map(|(m, v)| m * v).sum::<f64>() / 7.0;
     assert!((found.positions()[0] - common).abs() < 1e-15 && (found.positions()[1] + common).abs() < 1e-15);
@@ -519,7 +519,7 @@ fn bodies_in_a_row_alternate() {
 
 #[test]
 fn frames_refuse_what_is_no_interface() {
-    let mut frame = Frame::<f64>::new(2);
+    let mut frame = Frame::<f64>::new(2).unwrap();
     let good = Side { free: &[0.0, 0.0], flexibility: &[2.0, 1.0, 1.0, 2.0] };
     let mut refused = |side: Side<'_, f64>, gaps: &[f64]| frame.solve([good, side], gaps).map(|_| ()).unwrap_err();
     let short = Side { free: &[0.0], ..good };
@@ -756,7 +756,7 @@ fn bars_with_reciprocal_masses_collide() {
             Explicit { c, k, u: vec![0.0; n + 1], p, contact: [(n, -1.0), (0, 1.0)][number] }
         });
         let flexibility = bodies.each_ref().map(|body| h * h * body.c[(body.contact.0, body.contact.0)]);
-        let mut frame = Frame::new(1);
+        let mut frame = Frame::new(1).unwrap();
         let energy = |bodies: &[Explicit; 2], before: &[Vec<f64>; 2]| {
             let of = |(body, before): (&Explicit, &Vec<f64>)| {
                 let p: Vec<f64> = body.p.iter().zip(before).map(|(p, q)| 0.5 * (p + q)).collect();

@@ -76,7 +76,7 @@ fn release(tableau: &Tableau, omega: f64, start: StartUp, steps: usize) -> Vec<[
             let new = map.map(|row| row.iter().zip(&flat).map(|(c, x)| c * x).sum());
             past.insert(0, new);
         }
-        past.drain(1..scheme.stages.len());
+        past.drain(1..scheme.stages.len().max(1));
         past.truncate(depth + stages - 1);
         states.push(past[0]);
     }

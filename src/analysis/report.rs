@@ -60,7 +60,7 @@ pub fn report(tableau: &Tableau) -> Result<Report> {
     let critical_omega = critical_omega(tableau, 0.0);
     let range = critical_omega.unwrap_or(100.0);
     let keeps = |fraction: f64| (spectral_radius(tableau, fraction * range, 0.0) - 1.0).abs() < 1e-9;
-    let read = tableau.read_after(tableau.stages.len().saturating_sub(1));
+    let read = tableau.read_after(tableau.stages.len().saturating_sub(1))?;
     let contact = tableau.stages.last().map(|stage| stage.contact);
     let multipliers = tableau.stages.iter().all(|stage| stage.contact_row().z != 0.0);
     Ok(Report {

@@ -110,7 +110,7 @@ pub enum ContactLaw {
     AugmentedLagrangian {
         /// k (force/length).
         stiffness: f64,
-        /// How often λ̂ is replaced within a stage.
+        /// How often λ̂ is replaced within a stage; at most 10 000.
         augmentations: usize,
     },
 }
@@ -156,7 +156,17 @@ impl ContactLaw {
             Self::Restitution { coefficient: e } => {
                 inside("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
             }
-            Self::Penalty { stiffness } | Self::AugmentedLagrangian { stiffness, .. } => stiff(stiffness),
+            Self::Penalty { stiffness } => stiff(stiffness),
+            Self::AugmentedLagrangian { stiffness, augmentations } => {
+                stiff(stiffness)?;
+                let (name, value) = ("the number of augmentations", augmentations as f64);
+                inside(
+                    name,
+                    value,
+                    augmentations <= 10_000,
+                    "at most 10000: each of them solves the contact problem again",
+                )
+            }
             Self::PowerLaw { stiffness, exponent } => {
                 stiff(stiffness)?;
                 let ok = exponent >= 1.0 && exponent.is_finite();
@@ -286,6 +296,7 @@ mod tests {
             ContactLaw::PowerLaw { stiffness: f64::INFINITY, exponent: 1.5 },
             ContactLaw::Bipenalty { stiffness: 1.0, mass: -1.0 },
             ContactLaw::AugmentedLagrangian { stiffness: -1.0, augmentations: 3 },
+            ContactLaw::AugmentedLagrangian { stiffness: 1.0, augmentations: usize::MAX },
         ] {
             assert!(law.check().is_err(), "{law:?}");
         }

@@ -282,7 +282,7 @@ impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
 
 /// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is right.
 fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D]) {
-    let (length, sign) = (dot(r, r).sqrt(), side.sign::<T>());
+    let (length, sign) = (length(r), side.sign::<T>());
     let normal = match length > T::zero() {
         true => r.map(|x| sign * x / length),
         false => std::array::from_fn(|k| if k + 1 == D { sign } else { T::zero() }),
@@ -293,11 +293,36 @@ fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D
 /// wᵀ H w of a round surface: the speed along it squared over the distance from its center or axis.
 fn round_curvature<T: Real, const D: usize>(r: [T; D], w: [T; D], side: Side) -> T {
     let square = dot(r, r);
-    if square == T::zero() {
-        return T::zero();
+    if !is_safe(square) {
+        // In units of the lengths: w can be as far out of range as r is.
+        let (distance, speed) = (length(r), length(w));
+        if distance == T::zero() || speed == T::zero() {
+            return T::zero();
+        }
+        let along = dot(r.map(|x| x / distance), w.map(|x| x / speed));
+        return side.sign::<T>() * speed * (speed / distance) * (T::one() - along * along).max(T::zero());
     }
     let along = dot(r, w);
     side.sign::<T>() * (dot(w, w) - along * along / square) / square.sqrt()
+}
+
+/// Whether a sum of squares has lost nothing to the range of the scalar.
+fn is_safe<T: Real>(square: T) -> bool {
+    square.is_finite() && square > T::min_positive_value() / T::epsilon()
+}
+
+/// |x|, also where its square leaves the range of the scalar.
+fn length<T: Real, const D: usize>(x: [T; D]) -> T {
+    let square = dot(x, x);
+    if is_safe(square) {
+        return square.sqrt();
+    }
+    let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
+    if largest == T::zero() || !largest.is_finite() {
+        return square;
+    }
+    let scaled = x.map(|x| x / largest);
+    largest * dot(scaled, scaled).sqrt()
 }
 
 impl<T: Real, const D: usize, O: Obstacle<T, D> + ?Sized> Obstacle<T, D> for Box<O> {

@@ -104,6 +104,8 @@ impl<T: Real> std::fmt::Debug for Erased<'_, T> {
 /// The past as it was before the step, kept when a corrector first edits it.
 #[derive(Debug)]
 pub(crate) struct Backup<T> {
+    /// Whether state and history are those of a step that has not ended.
+    pub(crate) underway: bool,
     /// Rotations of the history at the present stage.
     pub(crate) rotations: usize,
     /// Rotations at which the copy was made, if there is one.
@@ -114,7 +116,7 @@ pub(crate) struct Backup<T> {
 impl<T: Real> Backup<T> {
     /// Room for `slots` past states.
     pub(crate) fn new(slots: usize, dofs: usize) -> Self {
-        Self { rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
+        Self { underway: false, rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
     }
 
     /// Forgets the copy: the step begins.
@@ -694,7 +696,7 @@ impl<T: Real> Correction<'_, T> {
         }
         self.backup.check()?;
         let rows = std::mem::take(&mut self.buffers.engaged);
-        let mut closing = self.projection.close(self.g, &rows).map_err(|row| self.no_response(row));
+        let mut closing = self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row));
         // States not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
         if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
@@ -753,7 +755,7 @@ impl<T: Real> Correction<'_, T> {
     /// Solves S x + jump for the multipliers x of `rows` under their bounds.
     fn solve(&mut self, rows: &[usize], bounds: &[Bound], x: &mut [T]) -> Result<()> {
         if bounds.iter().all(|&bound| bound == Bound::Free) {
-            self.projection.close(self.g, rows).map_err(|row| self.no_response(row))?;
+            self.projection.close_rows(self.g, rows).map_err(|row| self.no_response(row))?;
             for (x, &jump) in x.iter_mut().zip(&self.buffers.jump) {
                 *x = -jump;
             }

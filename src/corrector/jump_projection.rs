@@ -1,11 +1,13 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
-use crate::contact::ContactJacobian;
+use super::no_response;
+use crate::contact::{ContactId, ContactJacobian};
 use crate::dense::DenseCholesky;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mass::{InverseMass, Mass};
 use crate::memory;
 use crate::real::Real;
+use crate::sparse;
 
 /// The projection behind the λ_v/λ_a correction, usable on a host's own vectors.
 ///
@@ -26,16 +28,16 @@ use crate::real::Real;
 /// let mut g = ContactJacobian::default();
 /// g.push(&[(0, -1.0), (1, 1.0)]);
 /// let mut projection = JumpProjection::new(Mass::Lumped(&mass), &[], g.rows())?;
-/// projection.close(&g, &[0]).expect("independent rows");
+/// projection.close(&g, &[0])?;
 ///
 /// // Approach speed 3 at the contact, accelerations −50 and 100 from the solve with 5/2 z-weight (composite scheme).
 /// let (mut v, mut a, raw_force) = ([1.0_f64, -2.0], [-50.0_f64, 100.0], 100.0_f64);
 /// let mut impulse = [0.0_f64];
-/// projection.remove_jump(&g, &[0.0], &mut v, &mut impulse);
+/// projection.remove_jump(&g, &[0.0], &mut v, &mut impulse)?;
 /// assert!(v[0].abs() < 1e-15 && v[1].abs() < 1e-15); // common velocity (2·1 − 1·2)/3
 /// let lambda_a = h * impulse[0]; // eq. (13): −2e-3 kg m
 /// let mut force = [0.0_f64];
-/// projection.remove_jump(&g, &[0.0], &mut a, &mut force);
+/// projection.remove_jump(&g, &[0.0], &mut a, &mut force)?;
 /// let lambda_v = -(h / 2.5) * force[0]; // eq. (12): −0.04 kg m/s
 /// let corrected_force = raw_force - force[0]; // the impulsive part is gone
 /// assert!((a[0] - a[1]).abs() < 1e-12 && corrected_force.abs() < 1e-12);
@@ -62,12 +64,25 @@ impl<T: Real> JumpProjection<T> {
     /// # Errors
     ///
     /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is negative or
-    /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::MissingDof`] and
+    /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`] for a matrix that is not
+    /// square.
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
-            Mass::Consistent(mass) => mass.nrows(),
+            Mass::Consistent(mass) => sparse::square("the mass matrix", mass)?,
         };
+        let what = "the list of prescribed dofs";
+        if let Some(&dof) = prescribed.iter().find(|&&dof| dof >= dofs) {
+            return Err(Error::MissingDof { what, dof, dofs });
+        }
+        if let Some(pair) = prescribed.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(match pair[0] == pair[1] {
+                true => Error::RepeatedDof { what, dof: pair[0] },
+                false => Error::Incompatible { part: what.into(), reason: "it is not ascending" },
+            });
+        }
+        memory::reserve::<T>(rows, rows, "the matrix S of a jump projection")?;
         Self::with(InverseMass::new(mass, prescribed)?, dofs, rows)
     }
 
@@ -98,8 +113,37 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// # Errors
     ///
-    /// The row of G whose S is not a number.
-    pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> std::result::Result<(), usize> {
+    /// [`Error::Incompatible`] for a row that G does not have, or with a consistent mass one beyond those announced; [`Error::MissingDof`] for a dof of G that the mass does not have; [`Error::ContactNotFinite`] for
+    /// a row whose S is not a number (`feature` is the row of G).
+    pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        self.check_rows(g, rows)?;
+        let contact = |feature| ContactId { constraint: 0, feature, candidate: 0 };
+        self.close_rows(g, rows).map_err(|row| no_response(0.0, contact(row)))
+    }
+
+    fn check_rows(&self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        let refuse = |reason| Err(Error::Incompatible { part: "the list of closed rows".into(), reason });
+        // Of a consistent mass columns of M⁻¹Gᵀ are stored, one for each row announced.
+        let stored = match self.inverse {
+            InverseMass::Lumped(_) => usize::MAX,
+            InverseMass::Consistent { .. } => self.computed.len(),
+        };
+        for &row in rows {
+            if row >= g.rows() {
+                return refuse("it names a row that G does not have");
+            }
+            if row >= stored {
+                return refuse("it names a row beyond those that were announced");
+            }
+            if let Some((dof, _)) = g.row(row).find(|(dof, _)| *dof >= self.dofs) {
+                return Err(Error::MissingDof { what: "a closed row", dof, dofs: self.dofs });
+            }
+        }
+        Ok(())
+    }
+
+    /// [`close`](Self::close) with rows that are known to be sound; `Err` is the row whose S is not a number.
+    pub(crate) fn close_rows(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> std::result::Result<(), usize> {
         if self.factored && self.closed == rows {
             return Ok(());
         }
@@ -118,7 +162,29 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// `target` is γ, the velocity or acceleration of the obstacle along each closed row (zero between bodies). Both
     /// slices have one entry a closed row, in the order given to [`close`](Self::close).
-    pub fn remove_jump(&mut self, g: &ContactJacobian<T>, target: &[T], x: &mut [T], multipliers: &mut [T]) {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] unless x has one entry a dof, and target and multipliers one a closed row; those of
+    /// [`close`](Self::close) for a G that the closed rows do not fit. Nothing is changed then.
+    pub fn remove_jump(
+        &mut self,
+        g: &ContactJacobian<T>,
+        target: &[T],
+        x: &mut [T],
+        multipliers: &mut [T],
+    ) -> Result<()> {
+        let closed = self.closed.len();
+        for (what, expected, found) in [
+            ("the vector with a jump", self.dofs, x.len()),
+            ("the targets of closed rows", closed, target.len()),
+            ("the multipliers of closed rows", closed, multipliers.len()),
+        ] {
+            if expected != found {
+                return Err(Error::Dimension { what, expected, found });
+            }
+        }
+        self.check_rows(g, &self.closed)?;
         for ((multiplier, &row), &target) in multipliers.iter_mut().zip(&self.closed).zip(target) {
             *multiplier = g.product(row, x) - target;
         }
@@ -126,6 +192,7 @@ impl<T: Real> JumpProjection<T> {
         for (&row, &multiplier) in self.closed.iter().zip(multipliers.iter()) {
             self.push(g, row, -multiplier, x);
         }
+        Ok(())
     }
 
     /// Number of degrees of freedom.

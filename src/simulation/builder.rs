@@ -17,7 +17,7 @@ use crate::analysis::{self, LocalError};
 use crate::contact::{ContactConstraint, ContactLaw};
 use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection, PersistencyCorrection};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass::{self, Mass};
@@ -287,7 +287,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// prescribed dofs, initial penetration, a singular effective matrix, parts that do not fit together.
     pub fn build(self) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
-        check_times(h, t, self.overclosure)?;
+        step_size::<T>(h)?;
+        check_times(t, self.overclosure)?;
         match &self.resumed {
             None => Clock::new(t, h).check()?,
             Some((_, history)) => history.clock.check()?,
@@ -398,6 +399,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             ledger,
             judge,
             adjustment,
+            poisoned: false,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
@@ -414,13 +416,12 @@ fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, 
         && constraints.interface().iter().any(has_mass)
 }
 
-/// Refuses a step size and times that are none.
-fn check_times(h: f64, t: f64, overclosure: InitialOverclosure) -> Result<()> {
+/// Refuses times that are none.
+fn check_times(t: f64, overclosure: InitialOverclosure) -> Result<()> {
     let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
         true => Ok(()),
         false => Err(Error::Parameter { name, value, range: "positive and finite" }),
     };
-    positive("the step size h", h)?;
     if let InitialOverclosure::RemovedOver(time) = overclosure {
         positive("the time over which overclosures are removed", time)?;
     }

@@ -159,8 +159,12 @@ impl<'a, T: Real> Constraints<'a, T> {
         for (place, &dof) in interface.iter().enumerate() {
             places[dof] = place;
         }
-        let rows: usize = parts.iter().map(ContactConstraint::max_candidates).sum();
-        let entries = parts.iter().map(ContactConstraint::max_entries).sum();
+        // (A sum that leaves the range is an absurd promise too.)
+        let promised = |count: fn(&Box<dyn ContactConstraint<T> + 'a>) -> usize, what| {
+            parts.iter().map(count).try_fold(0_usize, usize::checked_add).ok_or(Error::OutOfMemory { what })
+        };
+        let rows = promised(ContactConstraint::max_candidates, "the contact problem")?;
+        let entries = promised(ContactConstraint::max_entries, "the contact Jacobian")?;
         // Asked for once, so that an absurd promise is an error and not an abort: the largest blocks that are reserved
         // later.
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;

@@ -225,7 +225,7 @@ pub(crate) fn energy<T: Real>(system: &mut dyn System<T>, state: &State<T>, ledg
             crate::mass::Mass::Lumped(mass) => mass.iter().zip(v).map(|(&m, &v)| m * v * v).sum::<T>(),
             consistent @ crate::mass::Mass::Consistent(_) => {
                 let mut momentum = vec![T::zero(); v.len()];
-                consistent.product(T::one(), v, &mut momentum);
+                consistent.add_product(T::one(), v, &mut momentum);
                 dot(&momentum, v)
             }
         };
@@ -265,7 +265,7 @@ fn balance_residual<T: Real>(
     for r in residual.iter_mut() {
         *r = -*r;
     }
-    system.mass().product(T::one(), a, residual);
+    system.mass().add_product(T::one(), a, residual);
     Ok(())
 }
 

@@ -88,11 +88,12 @@ impl Newton {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for zero.
+    /// [`Error::Parameter`] for zero and for more than a million: what each of them did is kept.
     pub fn iterations(self, iterations: usize) -> Result<Self> {
-        match iterations {
-            0 => Err(Error::Parameter { name: "Newton's number of iterations", value: 0.0, range: "1 or more" }),
-            iterations => Ok(Self { iterations, ..self }),
+        let (name, value) = ("Newton's number of iterations", iterations as f64);
+        match (1..=1_000_000).contains(&iterations) {
+            true => Ok(Self { iterations, ..self }),
+            false => Err(Error::Parameter { name, value, range: "between 1 and a million" }),
         }
     }
 

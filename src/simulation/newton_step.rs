@@ -211,7 +211,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             increment[dof] = T::zero();
         }
         let force = norm(increment);
-        self.system.mass().product(-T::one(), &motion.a, increment);
+        self.system.mass().add_product(-T::one(), &motion.a, increment);
         for &dof in prescribed.iter() {
             increment[dof] = T::zero();
         }

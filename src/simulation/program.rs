@@ -264,20 +264,20 @@ impl<T: Real> Compiler<'_, T> {
     /// Compiles the scheme of a run.
     pub(crate) fn compile(&mut self, tableau: &Tableau) -> Result<Program<T>> {
         let momentum = tableau.momentum();
-        let books = |s: usize| (momentum.after_stage(s).to_vec(), tableau.read_after(s));
+        let books = |s: usize| Ok((momentum.after_stage(s)?.to_vec(), tableau.read_after(s)?));
         self.stages(&tableau.stages, books)
     }
 
     /// Compiles the one-step scheme that starts a multistep one: what it leaves behind is read by `reader`. Its
     /// covectors change from step to step and are not part of the program.
     pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
-        self.stages(&start.stages, |_| (Vec::new(), reader.read_after(reader.stages.len() - 1)))
+        self.stages(&start.stages, |_| Ok((Vec::new(), reader.reads_after(reader.stages.len() - 1))))
     }
 
     fn stages(
         &mut self,
         stages: &[Stage],
-        books: impl Fn(usize) -> (Vec<[f64; 3]>, Vec<[bool; 3]>),
+        books: impl Fn(usize) -> Result<(Vec<[f64; 3]>, Vec<[bool; 3]>)>,
     ) -> Result<Program<T>> {
         let mut program = Program { stages: Vec::new(), operators: Vec::new() };
         for (s, stage) in stages.iter().enumerate() {
@@ -294,7 +294,7 @@ impl<T: Real> Compiler<'_, T> {
                 )?);
             }
             let increment = stage.increment();
-            let (covector, read) = books(s);
+            let (covector, read) = books(s)?;
             program.stages.push(CompiledStage {
                 recovery: ScaledRows::new(&increment.recovery, self.h),
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),

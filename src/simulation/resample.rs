@@ -8,7 +8,7 @@ use super::start::{self, Begun, Start, Violation, taylor};
 use super::{Constraints, Simulation};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
-use crate::error::{Error, Result};
+use crate::error::{Result, step_size};
 use crate::real::Real;
 use crate::state::{History, Motion, Pace, State, Trail};
 
@@ -49,12 +49,11 @@ impl<T: Real> Simulation<'_, T> {
     /// change the time, [`Error::BeyondStability`] if the scheme is not stable with it, [`Error::MatrixNotFinite`] or
     /// [`Error::Singular`] if the effective matrix cannot be factorized. The simulation is then as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
-        if !(h > 0.0 && h.is_finite()) {
-            return Err(Error::Parameter { name: "the step size h", value: h, range: "positive and finite" });
-        }
-        self.change_step_size(h)?;
-        self.history.pace = Pace::new(h);
-        Ok(())
+        self.guarded(|run| {
+            run.change_step_size(h)?;
+            run.history.pace = Pace::new(h);
+            Ok(())
+        })
     }
 
     /// Changes the step size, whatever the nominal one is.
@@ -63,6 +62,7 @@ impl<T: Real> Simulation<'_, T> {
         if h.to_bits() == old.to_bits() {
             return Ok(());
         }
+        step_size::<T>(h)?;
         let clock = self.history.clock.with_step_size(h);
         clock.check()?;
         if let StepLimit::Cleared(cleared) = self.limit
@@ -117,7 +117,7 @@ impl<T: Real> Simulation<'_, T> {
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
-            projection.close(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
+            projection.close_rows(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
                 project(motion, constraints, g, &mut projection, &closed)?;
             }
@@ -148,6 +148,10 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// Those of building a simulation from this state. The simulation is then as it was.
     pub fn restart(&mut self) -> Result<()> {
+        self.guarded(Self::begin_anew)
+    }
+
+    fn begin_anew(&mut self) -> Result<()> {
         let (h, t) = (self.history.clock.h, self.time());
         let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
         let massless = &work.massless[..];
@@ -305,11 +309,10 @@ fn project<T: Real>(
     let mut multipliers = vec![T::zero(); closed.len()];
     constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
     let targets: Vec<T> = closed.iter().map(|&row| g.product(row, &motion.u) - gaps[row]).collect();
-    projection.remove_jump(g, &targets, &mut motion.u, &mut multipliers);
+    projection.remove_jump(g, &targets, &mut motion.u, &mut multipliers)?;
     constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
     let targets: Vec<T> = closed.iter().map(|&row| -rates[row].rate).collect();
-    projection.remove_jump(g, &targets, &mut motion.v, &mut multipliers);
+    projection.remove_jump(g, &targets, &mut motion.v, &mut multipliers)?;
     let targets: Vec<T> = closed.iter().map(|&row| -rates[row].acceleration).collect();
-    projection.remove_jump(g, &targets, &mut motion.a, &mut multipliers);
-    Ok(())
+    projection.remove_jump(g, &targets, &mut motion.a, &mut multipliers)
 }

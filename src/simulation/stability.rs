@@ -260,7 +260,7 @@ impl<T: Real> Lanczos<T> {
             }
         }
         image.fill(T::zero());
-        system.mass().product(T::one(), next, image);
+        system.mass().add_product(T::one(), next, image);
         old.fill(T::zero());
         let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
         let mut found = Highest { at_least: 0.0, at_most: 0.0 };

@@ -168,7 +168,7 @@ impl<T: Real> Start<'_, T> {
         // Accelerations without contact: M a = f − M a_p on free dofs.
         let mut force = vec![T::zero(); dofs];
         system.force(t, &motion.u, &motion.v, &mut force)?;
-        system.mass().product(-T::one(), &motion.a, &mut force);
+        system.mass().add_product(-T::one(), &motion.a, &mut force);
         let unbalanced: Vec<T> = massless.iter().map(|&dof| force[dof]).collect();
         projection.apply_inverse(&mut force);
         for (&dof, support) in prescribed.iter().zip(&supports) {

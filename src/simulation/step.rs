@@ -28,12 +28,12 @@ impl<T: Real> Simulation<'_, T> {
     /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::PassedThrough`],
     /// [`Error::LinearNotConverged`], [`Error::TimeNotAdvancing`], or what the host's own parts return;
     /// [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
-    /// were.
+    /// were. [`Error::Poisoned`] after a panic of the host that was caught.
     pub fn step(&mut self) -> Result<()> {
-        match self.judge {
-            Some(_) => self.controlled_step(),
-            None => self.attempt().map(drop),
-        }
+        self.guarded(|run| match run.judge {
+            Some(_) => run.controlled_step(),
+            None => run.attempt().map(drop),
+        })
     }
 
     /// Tries a step of the present size.
@@ -49,10 +49,13 @@ impl<T: Real> Simulation<'_, T> {
         work.backup.begin();
         work.correction_energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
+        work.backup.underway = true;
         let result = self.stages().and_then(|()| self.inspect()).and_then(|()| self.accept());
         let clock = self.history.clock;
         let result = result.map_err(|error| error.in_step(clock.at(0.0), clock.h));
-        if !matches!(result, Ok(Verdict::Accepted)) {
+        if matches!(result, Ok(Verdict::Accepted)) {
+            self.work.backup.underway = false;
+        } else {
             self.undo();
         }
         result
@@ -60,9 +63,8 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Undoes what an attempt has done to state, history and rows.
     fn undo(&mut self) {
-        let Self { constraints, g, state, history, work, scheme, .. } = self;
-        work.backup.undo(&mut history.slots);
-        std::mem::swap(&mut state.motion, &mut history.slots[0]);
+        self.put_back();
+        let Self { constraints, g, state, history, scheme, .. } = self;
         // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its error.
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
@@ -79,6 +81,14 @@ impl<T: Real> Simulation<'_, T> {
             constraints.check_rates(start, history.clock.h, g)?;
         }
         constraints.inspect([start, new], closed)
+    }
+
+    /// Puts state and history back to where an attempt began.
+    pub(super) fn put_back(&mut self) {
+        let Self { state, history, work, .. } = self;
+        work.backup.undo(&mut history.slots);
+        std::mem::swap(&mut state.motion, &mut history.slots[0]);
+        work.backup.underway = false;
     }
 
     /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
@@ -442,7 +452,7 @@ fn residual<T: Real>(
         for (&dof, support) in prescribed.iter().zip(supports.iter()) {
             motion.a[dof] = support[2];
         }
-        system.mass().product(-T::one(), &motion.a, increment);
+        system.mass().add_product(-T::one(), &motion.a, increment);
     }
     for &dof in prescribed.iter() {
         increment[dof] = T::zero();

@@ -286,7 +286,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         }
         match &self.damping {
             StoredDamping::General(c, symmetry) => symmetry.product(minus, c.as_ref(), v, out),
-            StoredDamping::Rayleigh { mass, .. } if *mass > T::zero() => self.mass.view().product(-*mass, v, out),
+            StoredDamping::Rayleigh { mass, .. } if *mass > T::zero() => self.mass.view().add_product(-*mass, v, out),
             StoredDamping::None | StoredDamping::Rayleigh { .. } => {}
         }
         Ok(())
@@ -323,7 +323,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             StoredDamping::Rayleigh { mass, stiffness } => {
                 out.fill(T::zero());
                 self.symmetry.product(*stiffness, self.stiffness.as_ref(), v, out);
-                self.mass.view().product(*mass, v, out);
+                self.mass.view().add_product(*mass, v, out);
             }
         }
         Damping::Present

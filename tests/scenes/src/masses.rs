@@ -27,7 +27,7 @@ impl MassMatrix {
             Self::Lumped(mass) => mass.clone(),
             Self::Matrix(mass) => {
                 let mut sums = vec![0.0; mass.nrows()];
-                Mass::Consistent(mass.as_ref()).product(1.0, &vec![1.0; mass.ncols()], &mut sums);
+                Mass::Consistent(mass.as_ref()).product(1.0, &vec![1.0; mass.ncols()], &mut sums).unwrap();
                 sums
             }
         }
