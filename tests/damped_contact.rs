@@ -11,9 +11,11 @@ use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Correctors = Vec<Box<dyn Corrector<f64>>>;
+type Make = fn() -> Box<dyn TimeIntegrator>;
+type Named = (&'static str, fn() -> Correctors);
 
 /// Every corrector that changes velocities of bodies with damping.
-const CORRECTIONS: [(&str, fn() -> Correctors); 6] = [
+const CORRECTIONS: [Named; 6] = [
     ("λ_v/λ_a", || vec![Box::new(PersistencyCorrection::new())]),
     ("history", || vec![Box::new(PersistencyCorrection::with_history_projection())]),
     ("release", || vec![Box::new(Release)]),
@@ -136,7 +138,7 @@ fn pair(
 
 #[test]
 fn a_jump_of_velocity_changes_accelerations_as_the_effective_matrix_says() {
-    let schemes: [(fn() -> Box<dyn TimeIntegrator>, bool); 4] = [
+    let schemes: [(Make, bool); 4] = [
         (|| Box::new(Newmark::trapezoidal()), true),
         (|| Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap()), true),
         (|| Box::new(GeneralizedAlpha::hht(0.7).unwrap()), true),
@@ -175,7 +177,7 @@ fn a_jump_of_velocity_changes_accelerations_as_the_effective_matrix_says() {
 #[test]
 fn small_steps_converge_with_damping_as_without() {
     // Contact lasts. Errors of u, v, a and force at one time, against a fine run.
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] = [
+    let schemes: [Make; 3] = [
         || Box::new(Newmark::trapezoidal()),
         || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
         || Box::new(Composite),
@@ -213,7 +215,7 @@ fn small_steps_converge_with_damping_as_without() {
 
 #[test]
 fn internal_damping_keeps_the_momentum() {
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] = [
+    let schemes: [Make; 4] = [
         || Box::new(Newmark::trapezoidal()),
         || Box::new(Newmark::new(0.3025, 0.6).unwrap()),
         || Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap()),

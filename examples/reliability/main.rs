@@ -5,6 +5,7 @@
 //! the code is gone.
 
 mod absolute_time;
+mod bipenalty;
 mod damping;
 mod finite;
 mod release;
@@ -25,11 +26,12 @@ struct Case {
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
 type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
 
-const SUBJECTS: [Subject; 4] = [
+const SUBJECTS: [Subject; 5] = [
     ("absolute time", absolute_time::cases),
     ("NaN from the host", finite::cases),
     ("release", release::cases),
     ("damping and corrections", damping::cases),
+    ("bipenalty", bipenalty::cases),
 ];
 
 fn main() -> Result<(), Anything> {

@@ -1,7 +1,7 @@
 //! What is combined: integrators, corrections, laws and masses, by rules.
 
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, ContactLaw, GeneralizedAlpha, Gssss, MoreauJean, Newmark, Preset,
+    Bathe, CdLagrange, CentralDifference, Composite, ContactLaw, GeneralizedAlpha, Gssss, MoreauJean, Newmark, Preset,
 };
 pub(crate) use contact_dynamics_scenes::combinations::{Combination, Correction};
 use contact_dynamics_scenes::combinations::{Make, plain, preset};
@@ -15,6 +15,7 @@ const BATHE: Make = || Ok(Box::new(Bathe::default()));
 const BATHE_1: Make = || Ok(Box::new(Bathe::with_radius(1.0)?));
 const MIDPOINT: Make = || Ok(Box::new(Gssss::new(1.0, 1.0, 1.0)?));
 const MOREAU_JEAN: Make = || Ok(Box::new(MoreauJean::new(0.5)?));
+const CENTRAL_DIFFERENCE: Make = || Ok(Box::new(CentralDifference));
 const CD_LAGRANGE: Make = || Ok(Box::new(CdLagrange));
 
 /// Those that impose contact on displacements, with one, two or any number of solves a step.
@@ -59,6 +60,9 @@ pub(crate) fn all() -> Vec<Combination> {
     add(&IMPLICIT, &[Correction::None], &[&redistributed[..], &blended[..]].concat());
     rows.push(Combination { law: ContactLaw::RateCondition, ..plain(MIDPOINT) });
     rows.extend([MIDPOINT, COMPOSITE].map(|make| Combination { law: ContactLaw::PersistencySwitch, ..plain(make) }));
+    let springs =
+        |stiffness| [ContactLaw::Bipenalty { stiffness, mass: 0.0 }, ContactLaw::StabilizedBipenalty { stiffness }];
+    rows.extend([1.0, 10.0].into_iter().flat_map(springs).map(|law| Combination { law, ..plain(CENTRAL_DIFFERENCE) }));
     rows
 }
 

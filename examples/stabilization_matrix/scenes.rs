@@ -80,7 +80,7 @@ impl Collision {
         let transit = |bar: usize| bars.element_size(bar) / (bars.young[bar] / bars.density[bar]).sqrt();
         Simulation::builder(bars.system_with(combination.mass(&bars.body(), *h)?), combination.integrator()?, *h)
             .velocity(bars.velocities())
-            .constraint(bars.contact_under(combination.law))
+            .constraint(bars.contact_under(combination.law(&bars.body(), *h)?))
             .correctors(combination.correctors(0.5 * (transit(0) + transit(1)))?)
             .build()
     }
@@ -200,7 +200,7 @@ pub(crate) fn bounces(combination: &Combination, elements: usize) -> Result<Vec<
     let mass = combination.mass(&bar.body(), h)?;
     let masses = mass.row_sums();
     let mut run = Simulation::builder(bar.system_with(mass), combination.integrator()?, h)
-        .constraint(bar.contact_under(combination.law))
+        .constraint(bar.contact_under(combination.law(&bar.body(), h)?))
         .correctors(combination.correctors(transit)?)
         .build()?;
     let bounces = bar.bounces(&masses, &mut run, h, combination.load())?;
@@ -233,7 +233,8 @@ pub(crate) fn disc(combination: &Combination, disc: &SoftDisc, until: f64) -> Re
     let mass = combination.mass(&body, h)?;
     let transit = h / body.courant(h)?;
     let correctors = combination.correctors(transit)?;
-    let mut run = disc.simulation(mass.clone(), combination.integrator()?, correctors, combination.law, h)?;
+    let law = combination.law(&body, h)?;
+    let mut run = disc.simulation(mass.clone(), combination.integrator()?, correctors, law, h)?;
     let figures = disc.run(&mass, &mut run, h, until)?;
     sweep(&[0.0], |_| {
         Ok(vec![

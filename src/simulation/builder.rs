@@ -528,6 +528,13 @@ fn workspace<T: Real>(
 /// The contact laws that a scheme can serve.
 fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
     let mut admitted = Admitted { integrator: integrator.name(), ..Admitted::default() };
+    let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
+    if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
+        admitted.no_prediction = Some(
+            "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty predicts; \
+             choose `CentralDifference`",
+        );
+    }
     for stage in &tableau.stages {
         match stage.contact {
             ContactLevel::POSITION => {}
@@ -676,14 +683,12 @@ fn check_lagged_damping<T: Real>(
 ) -> Result<()> {
     let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
     let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
-    if lags && grows() {
-        if damping(system) == Damping::Present {
-            return Err(Error::Incompatible {
-                part: integrator.name(),
-                reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
-                         size; choose a member with more numerical damping",
-            });
-        }
+    if lags && grows() && damping(system) == Damping::Present {
+        return Err(Error::Incompatible {
+            part: integrator.name(),
+            reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
+                     size; choose a member with more numerical damping",
+        });
     }
     Ok(())
 }

@@ -88,6 +88,8 @@ struct Compared<T> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Admitted {
     pub(crate) integrator: String,
+    /// Why not laws on a predicted gap, if not.
+    pub(crate) no_prediction: Option<&'static str>,
     /// Why not rigid ones, if not.
     pub(crate) no_rigid: Option<&'static str>,
     /// Why not restitution above zero, if not.
@@ -103,9 +105,10 @@ impl Admitted {
             ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
             ContactLaw::RateCondition => self.no_start,
             ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
+            ContactLaw::StabilizedBipenalty { .. } => self.no_prediction,
             _ => None,
         };
-        match self.no_rigid.or(own).filter(|_| !law.is_compliant()) {
+        match self.no_rigid.or(own).filter(|_| !law.is_compliant() || law.is_predictive()) {
             None => Ok(()),
             Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
         }

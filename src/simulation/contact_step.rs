@@ -134,7 +134,8 @@ impl<T: Real> ContactRowsWork<T> {
         let Self { measure, start_gap, start_tolerance, rates, curved, .. } = self;
         curved.forget();
         measure.fill(Measure::AsScheme);
-        let (Some(start), true) = (past.first(), constraints.reads_start()) else { return Ok(()) };
+        let reads = constraints.reads_start() || constraints.laws().iter().any(ContactLaw::is_predictive);
+        let (Some(start), true) = (past.first(), reads) else { return Ok(()) };
         constraints.finite_gaps(start.t, &start.u, start_gap)?;
         constraints.finite_rates(start.t, &start.u, &start.v, rates)?;
         for row in (0..constraints.len()).filter(|&row| constraints.law(row).reads_start()) {
@@ -457,7 +458,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
     fn weigh(&self, rows: &mut ContactRowsWork<T>) {
         let [rigid, balance_u, balance_a] = self.weights();
         for (row, law) in self.constraints.laws().iter().enumerate() {
-            let weight = if law.is_compliant() { balance_u + T::of(law.inertia()) * balance_a } else { rigid };
+            let weight = match (law.is_compliant(), law.is_predictive()) {
+                (false, _) => rigid,
+                (true, false) => balance_u + T::of(law.inertia()) * balance_a,
+                (true, true) => T::of(0.5) * rigid,
+            };
             rows.weight[row] = if self.part.takes(&rows.on_massless, row) { weight } else { T::zero() };
         }
     }
@@ -479,8 +484,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_compliant() {
-                rows.y[row] = rows.balance_gap[row];
-                rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), rows.y[row]);
+                let gap = rows.balance_gap[row];
+                rows.y[row] = match law.is_predictive() {
+                    // The mean gap of the coming step, less that of the last one if it was pressed.
+                    true => {
+                        T::of(0.5) * (rows.y[row] + gap) - (-T::of(0.5) * (gap + rows.start_gap[row])).max(T::zero())
+                    }
+                    false => gap,
+                };
+                rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
                 let depth = (-rows.y[row]).max(rows.tolerance[row]);
                 (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
             } else {

@@ -101,13 +101,16 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 self.add_inertia(new, work)?;
             }
         }
+        let [rigid, ..] = self.weights();
         let Workspace { rows, interface, .. } = work;
         for (tried, &d) in interface.tried.iter_mut().zip(&interface.increment) {
             *tried = d - *tried;
         }
         let forces = rows.curved.forces(self.g);
         for row in 0..self.constraints.len() {
-            rows.y[row] += rows.weight[row] * forces.interface_product(row, &interface.tried);
+            // (A law that predicts reads the gap that the scheme constrains.)
+            let weight = if self.constraints.law(row).is_predictive() { rigid } else { rows.weight[row] };
+            rows.y[row] += weight * forces.interface_product(row, &interface.tried);
         }
         Ok(())
     }

@@ -180,10 +180,12 @@ impl<T: Real> Start<'_, T> {
             return Err(Error::StepNotFinite { t, h, what: "the initial acceleration", dof, value });
         }
 
+        let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
+        let looks_ahead = contact.lead() > 0.0;
         // Springs in compression push from the start.
         for row in 0..constraints.len() {
             let law = constraints.law(row);
-            if law.is_compliant() && law.inertia() == 0.0 {
+            if law.is_compliant() && law.inertia() == 0.0 && !law.is_predictive() {
                 let force = law.force(contacts.gap[row]);
                 if force > T::zero() {
                     projection.prepare(g, &[row]);
@@ -208,8 +210,7 @@ impl<T: Real> Start<'_, T> {
             problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
             problem.press(g, projection, &mut motion, &mut contacts);
         }
-        let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
-        let mut problem = match contact.lead() > 0.0 {
+        let mut problem = match looks_ahead {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
             false => StartProblem::at_rest(constraints, g, &motion, h, &touching)?,
         };
@@ -361,11 +362,24 @@ impl<T: Real> StartProblem<T> {
         };
         let tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
+        // Over a stabilized bipenalty: the body is as it was before the start.
+        if constraints.laws().iter().any(ContactLaw::is_predictive) {
+            let mut gaps = vec![T::zero(); constraints.len()];
+            constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
+            for (row, (y, gap)) in y.iter_mut().zip(gaps).enumerate() {
+                if constraints.law(row).is_predictive() {
+                    *y += gap - T::of(2.0) * (-gap).max(T::zero());
+                }
+            }
+        }
         let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
         let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
-        let rigid = |row: &usize| open[*row] && !constraints.law(*row).is_compliant();
-        let (rows, waiting) = (0..constraints.len()).filter(rigid).partition(takes_part);
-        let compliance = vec![T::zero(); constraints.len()];
+        let aims = |law: ContactLaw| !law.is_compliant() || law.is_predictive();
+        let aimed = |row: &usize| open[*row] && aims(constraints.law(*row));
+        let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
+        // (Half of the response enters a mean gap.)
+        let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(T::one(), T::zero()).0;
+        let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
         Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })
     }
 

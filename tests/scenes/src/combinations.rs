@@ -4,7 +4,7 @@ use crate::masses::{Body, MassMatrix, Treatment};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
-use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Result, TimeIntegrator};
+use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Result, TimeIntegrator, mass};
 
 /// Makes an integrator.
 pub type Make = fn() -> Result<Box<dyn TimeIntegrator>>;
@@ -108,6 +108,22 @@ impl Combination {
         Ok(if explicit { h.min(0.9 * h / body.largest_courant(h)?) } else { h })
     }
 
+    /// The law in a scene: stiffnesses are in units of the softest diagonal entry of K at the contact dofs, and the mass of a
+    /// bipenalty is that of the step.
+    pub fn law(&self, body: &Body, h: f64) -> Result<ContactLaw> {
+        let diagonal = body.contact.iter().map(|&dof| body.stiffness.get(dof, dof).copied().unwrap_or(0.0));
+        let unit = diagonal.fold(f64::INFINITY, f64::min);
+        Ok(match self.law {
+            ContactLaw::Bipenalty { stiffness, .. } => {
+                ContactLaw::Bipenalty { stiffness: stiffness * unit, mass: mass::bipenalty(stiffness * unit, h)? }
+            }
+            ContactLaw::StabilizedBipenalty { stiffness } => {
+                ContactLaw::StabilizedBipenalty { stiffness: stiffness * unit }
+            }
+            law => law,
+        })
+    }
+
     /// The mass of a body for a step.
     pub fn mass(&self, body: &Body, h: f64) -> Result<MassMatrix> {
         let courant = body.courant(h)?;
@@ -143,6 +159,8 @@ impl Combination {
             ContactLaw::RateCondition => "rate condition".into(),
             ContactLaw::PersistencySwitch => "persistency switch".into(),
             ContactLaw::Penalty { .. } => "penalty".into(),
+            ContactLaw::Bipenalty { stiffness, .. } => format!("bipenalty({stiffness})"),
+            ContactLaw::StabilizedBipenalty { stiffness } => format!("stabilized bipenalty({stiffness})"),
             law => format!("{law:?}"),
         }
     }
