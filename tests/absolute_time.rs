@@ -1,4 +1,5 @@
 //! When a run starts changes nothing: spacings enter results, times do not.
+#![allow(clippy::float_cmp)] // the same bits are meant
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{

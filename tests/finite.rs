@@ -17,7 +17,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// A full matrix of sums.
 fn matrix<T: Real>(n: usize, entries: &[(usize, usize, f64)]) -> SparseColMat<usize, T> {
     let mut sums = vec![0.0; n * n];
-    entries.iter().for_each(|&(i, j, x)| sums[j * n + i] += x);
+    for &(i, j, x) in entries {
+        sums[j * n + i] += x;
+    }
     let starts = (0..=n).map(|j| j * n).collect();
     let pattern = SymbolicSparseColMat::new_checked(n, n, starts, None, (0..n * n).map(|k| k % n).collect());
     SparseColMat::new(pattern, sums.into_iter().map(T::of).collect())
@@ -358,7 +360,7 @@ fn random_tableau(draw: &mut impl FnMut() -> f64) -> Tableau {
         _ if draw() < 0.5 => (4.0 * draw() - 2.0).round(),
         _ => (draw() - 0.5) * 10.0_f64.powf(8.0 * draw() - 4.0),
     };
-    let depth = 1 + (3.0 * number(1.0).abs()) as usize % 3;
+    let depth = [1, 2, 3].into_iter().find(|_| number(1.0).abs() < 1.0).unwrap_or(1);
     let mut row =
         |z: Row| (0..depth).fold(z, |row, k| row + number(0.6) * U[k] + number(0.5) * V[k] + number(0.4) * A[k]);
     let mut rows = || Rows { u: row(Z), v: row(Z), a: row(Z) };
@@ -396,13 +398,11 @@ fn survive<T: Real>(builder: SimulationBuilder<'_, T>, case: &str) -> Option<usi
     assert!(is_finite(&run), "{case}: {run:?}");
     for step in 0..60 {
         let before = trace(&run);
-        match run.step() {
-            Ok(()) => assert!(is_finite(&run), "{case}, step {step}: {}", trace(&run)),
-            Err(_) => {
-                assert_eq!(before, trace(&run), "{case}, step {step}");
-                return Some(step);
-            }
+        if run.step().is_err() {
+            assert_eq!(before, trace(&run), "{case}, step {step}");
+            return Some(step);
         }
+        assert!(is_finite(&run), "{case}, step {step}: {}", trace(&run));
     }
     Some(60)
 }
@@ -419,7 +419,7 @@ fn random_scene<T: Real>(tableau: &Tableau, seed: u64) -> SimulationBuilder<'sta
     let damping = 1e-3;
     let c: Vec<_> = entries.iter().map(|&(i, j, k)| (i, j, damping * k)).collect();
     let mut system = LinearSystem::lumped(mass, matrix(4, &entries)).unwrap();
-    if seed % 2 == 0 {
+    if seed.is_multiple_of(2) {
         system = system.damping(matrix(4, &c)).unwrap();
     }
     let one = T::one();

@@ -326,14 +326,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
         self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
         let recovery = &self.stage.recovery;
         let accumulate = if recovery.reads_past(2) { Accumulate::Add } else { Accumulate::Replace };
-        match T::recover(recovery.weights(), &work.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
-            true => Ok(()),
-            // (What has been written is undone with the step.)
-            false => {
-                self.refuse_nan(&work.increment, "the increment")?;
-                check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
-            }
+        if T::recover(recovery.weights(), &work.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
+            return Ok(());
         }
+        // (What has been written is undone with the step.)
+        self.refuse_nan(&work.increment, "the increment")?;
+        check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
     }
 
     /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already. Says whether
