@@ -5,8 +5,8 @@ use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
-    CentralDifference, Cholesky, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem, Newmark,
-    PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
+    CentralDifference, Cholesky, ChungLee, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem,
+    Newmark, PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
 };
 use contact_dynamics_scenes::{Bars, MassKind};
 
@@ -123,8 +123,9 @@ fn masses_must_be_positive() {
     // No mass is needed where the motion is given, nor where a scheme finds displacements without it.
     let massless = || LinearSystem::lumped(vec![0.0, 1.0], spring()).unwrap();
     assert!(Simulation::builder(massless(), Composite, 0.01).build().is_ok());
+    assert!(Simulation::builder(massless(), CentralDifference, 0.01).build().is_ok());
     refused!(
-        Simulation::builder(massless(), CentralDifference, 0.01).build(),
+        Simulation::builder(massless(), ChungLee::new(1.0).unwrap(), 0.01).build(),
         Error::Incompatible { .. },
         "dof 0",
         "does not determine"

@@ -7,8 +7,11 @@
 mod absolute_time;
 mod bipenalty;
 mod damping;
+mod explicit_contact;
 mod finite;
 mod release;
+mod stability;
+mod start;
 
 use contact_dynamics_scenes::output::Output;
 
@@ -26,7 +29,10 @@ struct Case {
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
 type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
 
-const SUBJECTS: [Subject; 5] = [
+const SUBJECTS: [Subject; 8] = [
+    ("schemes and steps that cannot work", stability::cases),
+    ("explicit impacts", explicit_contact::cases),
+    ("starts", start::cases),
     ("absolute time", absolute_time::cases),
     ("NaN from the host", finite::cases),
     ("release", release::cases),

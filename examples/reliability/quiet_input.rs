@@ -28,7 +28,7 @@ fn force(rows: LinearRows<'static, f64>, speed: f64) -> Result<String, Anything>
     }
 }
 
-pub fn cases(_: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_: bool) -> Result<Vec<Case>, Anything> {
     let twice = LinearRows::new().pair(ContactLaw::Rigid, [0], [1], [2.0], 0.0)?;
     let silent = LinearRows::new().unilateral(&[(1, 1.0)], GapOffset::moving(|t| [-3.0 * t, 0.0, 0.0]));
     Ok(vec![
