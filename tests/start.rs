@@ -98,6 +98,34 @@ fn contact_takes_part_in_the_balance() {
 }
 
 #[test]
+fn many_contacts_are_balanced_far_from_the_origin() {
+    // A plate in its own weight on a floor whose height is large beside what it moves.
+    for height in [0.0, 1.0, 1e3] {
+        let solid = Solid::rectangle([1.0, 1.0], [20, 20], RUBBER).lifted(height);
+        let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < height + 1e-9).collect();
+        let massless: Vec<usize> = bottom.iter().map(|n| 2 * n + 1).collect();
+        let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 2).collect();
+        let stiffness = solid.stiffness::<f64>();
+        let by = Redistribution::Neighbors(stiffness.symbolic());
+        let mass = redistribute(&solid.lumped_mass(), &massless, &groups, by).unwrap();
+        let weight: Vec<f64> = solid
+            .lumped_mass::<f64>()
+            .iter()
+            .enumerate()
+            .map(|(dof, m)| if dof % 2 == 1 { -1e-2 * m } else { 0.0 })
+            .collect();
+        let carried: f64 = bottom.iter().map(|n| -weight[2 * n + 1]).sum();
+        let floor = Plane::new([0.0, height], [0.0, 1.0]).unwrap();
+        let rows = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let system =
+            LinearSystem::lumped(mass, solid.stiffness()).unwrap().load(move |_, f| f.copy_from_slice(&weight));
+        let run = Simulation::builder(system, CdLagrange, 1e-3).constraint(rows).uncorrected().build().unwrap();
+        let forces: f64 = run.state().contacts().forces().iter().sum();
+        assert!((forces / carried - 1.0).abs() < 1e-6, "{height}: {forces} {carried}");
+    }
+}
+
+#[test]
 fn what_is_in_balance_or_damped_is_left_alone() {
     let n = 8;
     let mut u: Vec<f64> = (0..=n).map(|i| 1e-3 * ((n - i) as f64).sin()).collect();

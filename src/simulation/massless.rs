@@ -336,7 +336,14 @@ pub(super) fn balance_start<T: Real>(
         };
         let mut operator = Operator::of_part(Box::new(factor), constraints.capacity(), &interface)?;
         operator.begin(&mut residual, &mut on_interface)?;
-        press_start(solver, (&mut *constraints, &*g), &mut operator, motion, dofs, [&mut on_interface, &mut forces])?;
+        let sliver = press_start(
+            solver,
+            (&mut *constraints, &*g),
+            &mut operator,
+            motion,
+            dofs,
+            [&mut on_interface, &mut forces],
+        )?;
         operator.finish(&mut residual, &on_interface, &forces)?;
         let size = dofs.iter().fold(T::zero(), |size, &dof| {
             let d = residual[dof].abs();
@@ -347,7 +354,8 @@ pub(super) fn balance_start<T: Real>(
             return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
         }
         let scale = largest(&motion.u).max(largest(&given));
-        let settled = size <= T::of(1e3) * T::epsilon() * scale;
+        // (Gaps are met within their own rounding, which coordinates may make larger than that of displacements.)
+        let settled = size <= T::of(1e3) * T::epsilon() * scale + T::of(4.0) * sliver;
         if iteration == 0 {
             if settled {
                 return Ok(None);
@@ -372,7 +380,8 @@ pub(super) fn balance_start<T: Real>(
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: dofs[0] })
 }
 
-/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there.
+/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns the
+/// largest way by which gaps may be missed, as a displacement.
 fn press_start<T: Real>(
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -380,7 +389,7 @@ fn press_start<T: Real>(
     motion: &Motion<T>,
     dofs: &[usize],
     [on_interface, forces]: [&mut Vec<T>; 2],
-) -> Result<()> {
+) -> Result<T> {
     let (t, rows) = (motion.t, constraints.len());
     let (mut gaps, mut versions) = (vec![T::zero(); rows], 0);
     constraints.finite_gaps(t, &motion.u, &mut gaps)?;
@@ -429,7 +438,8 @@ fn press_start<T: Real>(
         }
     }
     T::axpy(T::one(), &response, on_interface);
-    Ok(())
+    // (A row of unit weights moves a dof no further than its gap.)
+    Ok(problem.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
 }
 
 /// Whether damping forces depend on the velocities of some dofs.
