@@ -1,4 +1,5 @@
 //! Fast nodes against obstacles and facets: a step stops them where they meet the surface, or is refused; nothing passes.
+#![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Cylinder, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

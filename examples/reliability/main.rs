@@ -9,6 +9,8 @@ mod bipenalty;
 mod damping;
 mod explicit_contact;
 mod finite;
+mod passing_through;
+mod quiet_input;
 mod release;
 mod stability;
 mod start;
@@ -29,14 +31,16 @@ struct Case {
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
 type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
 
-const SUBJECTS: [Subject; 8] = [
+const SUBJECTS: [Subject; 10] = [
+    ("passing through", passing_through::cases),
+    ("damping and corrections", damping::cases),
+    ("NaN from the host", finite::cases),
+    ("absolute time", absolute_time::cases),
+    ("starts", start::cases),
     ("schemes and steps that cannot work", stability::cases),
     ("explicit impacts", explicit_contact::cases),
-    ("starts", start::cases),
-    ("absolute time", absolute_time::cases),
-    ("NaN from the host", finite::cases),
+    ("input", quiet_input::cases),
     ("release", release::cases),
-    ("damping and corrections", damping::cases),
     ("bipenalty", bipenalty::cases),
 ];
 
