@@ -17,9 +17,10 @@ use crate::tableau::{Rows, Tableau};
 /// which is the step of the scheme itself with λ_K = 2 β λ, a ← a − M⁻¹ Gᵀ λ and v ← v + h (2β − γ) M⁻¹ Gᵀ λ: nothing else is
 /// solved. Any one-step scheme of one stage takes it, with its own response in place of 1, γ, β.
 ///
-/// Linear momentum is conserved. For β = ¼, γ = ½ the energy never rises. With damping it needs γ = 2β, where v is left as it
-/// is; otherwise building a simulation is refused, for the impulse that v gets has not been felt by the damping of the step. Known failure: contact force and velocity of the
-/// contact nodes oscillate, and the gap rate does not vanish in persistent contact; [`ContactStabilized`] mends the first.
+/// Linear momentum is conserved. For β = ¼, γ = ½ the energy never rises. With damping it needs γ = 2β, where v is left
+/// as it is; otherwise building a simulation is refused, for the impulse that v gets has not been felt by the damping of
+/// the step. Known failure: contact force and velocity of the contact nodes oscillate, and the gap rate does not vanish
+/// in persistent contact; [`ContactStabilized`] mends the first.
 ///
 /// ```
 /// use contact_dynamics::Corrector;

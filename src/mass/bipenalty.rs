@@ -8,9 +8,9 @@ use crate::error::{Result, positive};
 ///
 /// k in force/length, h in time. A contact row G adds k to the stiffness and m to the mass of the same motion Gᵀ, and a
 /// quotient of sums is no larger than the larger quotient: ω² ≤ max(ω²_max, k/m), with k/m = (2/h)². More mass does no harm
-/// to the step, but contact switches it on at speed, which changes the energy at impact
-/// ([`ContactLaw::StabilizedBipenalty`](crate::ContactLaw::StabilizedBipenalty) does not, with the same mass in itself). Schemes with another limit than
-/// ωh = 2 need m = k (h/limit)².
+/// to the step, but contact switches it on at speed, which changes the energy at impact;
+/// [`ContactLaw::StabilizedBipenalty`](crate::ContactLaw::StabilizedBipenalty), which has this mass in itself, mends that.
+/// Schemes with another limit than ωh = 2 need m = k (h/limit)².
 ///
 /// # Errors
 ///
