@@ -1,6 +1,6 @@
 //! Runs that start late: the same as those that start at zero.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{Bdf2, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation, StepControl};
 
@@ -55,8 +55,8 @@ fn stalled() -> Result<String, Anything> {
     Ok(format!("{still} of 2000"))
 }
 
-pub(crate) fn cases(_quick: bool) -> Result<Vec<Case>, Anything> {
-    let case = |case: &str, before, now: String| Case { case: case.into(), before, now };
+pub(crate) fn cases(_quick: bool) -> Result<Vec<Row>, Anything> {
+    let case = |case: &str, before, now: String| Row { case: case.into(), before, now };
     Ok(vec![
         case(
             "BDF2, h = 1e-6 and 1.5e-6 in turn, t₀ = 1e9: error against t₀ = 0",

@@ -1,6 +1,6 @@
 //! Bipenalty over many impacts: the plain form, and the stabilized one.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::{CentralDifference, ContactLaw, Simulation, mass};
 use contact_dynamics_scenes::wall_bar::WallBar;
 
@@ -16,10 +16,10 @@ fn kept(law: impl Fn(f64, f64) -> Result<ContactLaw, Anything>) -> Result<f64, A
     Ok(bar.bounces(&bar.mass(), &mut run, h, 1.0)?.energy[5])
 }
 
-pub(crate) fn cases(_: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_: bool) -> Result<Vec<Row>, Anything> {
     let stabilized = |stiffness, _| Ok(ContactLaw::StabilizedBipenalty { stiffness });
     let plain = |stiffness, h| Ok(ContactLaw::Bipenalty { stiffness, mass: mass::bipenalty(stiffness, h)? });
-    Ok(vec![Case {
+    Ok(vec![Row {
         case: "bouncing bar, k = 10 EA/h_e, Courant number ½: energy left after 12 impacts".into(),
         before: "1.49 (the plain form)",
         now: format!("{:.2} stabilized, {:.2} in the plain form", kept(stabilized)?, kept(plain)?),

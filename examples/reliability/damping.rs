@@ -1,6 +1,6 @@
 //! Corrections of velocity in bodies with damping, at steps that are long beside its times of decay.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::corrector::ContactStabilized;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
@@ -45,23 +45,23 @@ fn highest(
     Ok(highest)
 }
 
-pub(crate) fn cases(_: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_: bool) -> Result<Vec<Row>, Anything> {
     let case = |what: &str, x: f64| format!("{what}, h β ω² = {x:e}: highest energy over that of the start");
     let correction = PersistencyCorrection::with_history_projection;
     let alpha = || GeneralizedAlpha::chung_hulbert(0.5);
     let now = |energy: f64| if energy < 1e4 { format!("{energy:.2}") } else { format!("{energy:.0e}") };
     Ok(vec![
-        Case {
+        Row {
             case: case("Chung–Hulbert(0.5), λ_v/λ_a + history", 1e3),
             before: "2.31",
             now: now(highest(alpha()?, correction(), 1e3)?),
         },
-        Case {
+        Row {
             case: case("Chung–Hulbert(0.5), λ_v/λ_a + history", 1e6),
             before: "2e6",
             now: now(highest(alpha()?, correction(), 1e6)?),
         },
-        Case {
+        Row {
             case: case("trapezoidal rule, contact-stabilized", 1e3),
             before: "1584.18",
             now: match highest(Newmark::trapezoidal(), ContactStabilized::new(), 1e3) {

@@ -1,6 +1,6 @@
 //! Impacts by explicit steps.
 
-use crate::{Anything, Case};
+use crate::{Anything, Row};
 use contact_dynamics::{Preset, Simulation};
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::masses::MassMatrix;
@@ -28,13 +28,13 @@ fn impact(n: usize, courant: f64, phases: u32) -> Result<String, Anything> {
     Ok(format!("{largest:.2} F₀, {:.3} %", 100.0 * loss))
 }
 
-pub(crate) fn cases(quick: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(quick: bool) -> Result<Vec<Row>, Anything> {
     let phases = if quick { 2 } else { 10 };
     let scenes = [(20, 0.1, "5.00 F₀, 2.493 %"), (100, 0.2, "2.50 F₀, 0.495 %"), (400, 0.9, "1.07 F₀, 0.088 %")];
     let case = |(n, courant, before)| {
         let case =
             format!("`Preset::explicit()`, bars of {n} elements, Courant number {courant}: largest force, energy lost");
-        Ok(Case { case, before, now: impact(n, courant, phases)? })
+        Ok(Row { case, before, now: impact(n, courant, phases)? })
     };
     scenes.into_iter().map(case).collect()
 }

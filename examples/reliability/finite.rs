@@ -1,6 +1,6 @@
 //! NaN from a host at one of its calls: a step that fails, and nothing else.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::Simulation;
 use contact_dynamics::contact::{ContactLaw, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -91,8 +91,8 @@ fn beyond(stiffness: f64) -> Result<String, Anything> {
     Ok(format!("Ok, u = {:.3}, force {:.1e}", run.state().displacement()[0], run.state().contacts().forces()[0]))
 }
 
-pub(crate) fn cases(_quick: bool) -> Result<Vec<Case>, Anything> {
-    let case = |case: &str, before, now: String| Case { case: case.into(), before, now };
+pub(crate) fn cases(_quick: bool) -> Result<Vec<Row>, Anything> {
+    let case = |case: &str, before, now: String| Row { case: case.into(), before, now };
     Ok(vec![
         case("rate of a moving wall NaN at its k-th call, every k: trapezoidal rule, λ_v/λ_a", BEFORE[0], swept(1)?),
         case("acceleration of it", BEFORE[1], swept(2)?),

@@ -16,11 +16,12 @@ mod stability;
 mod start;
 
 use contact_dynamics_scenes::output::Output;
+use std::fmt::Write;
 
 type Anything = Box<dyn std::error::Error>;
 
 /// A line of the table.
-struct Case {
+struct Row {
     /// What is run, in which scene.
     case: String,
     /// What came out at commit 9fcb7b6, and what comes out now.
@@ -29,7 +30,7 @@ struct Case {
 }
 
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
-type Subject = (&'static str, fn(bool) -> Result<Vec<Case>, Anything>);
+type Subject = (&'static str, fn(bool) -> Result<Vec<Row>, Anything>);
 
 const SUBJECTS: [Subject; 10] = [
     ("passing through", passing_through::cases),
@@ -48,8 +49,8 @@ fn main() -> Result<(), Anything> {
     let output = Output::from_command_line("reliability")?;
     let mut page = String::from("| subject | case | before | now |\n| --- | --- | --- | --- |\n");
     for (subject, cases) in SUBJECTS {
-        for Case { case, before, now } in cases(output.quick)? {
-            page += &format!("| {subject} | {case} | {before} | {now} |\n");
+        for Row { case, before, now } in cases(output.quick)? {
+            writeln!(page, "| {subject} | {case} | {before} | {now} |")?;
         }
     }
     println!("{page}");

@@ -1,6 +1,6 @@
 //! Fast nodes at a ball and at a square of facets: how many runs end Ok and wrong.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::contact::{Facet, NodeToFacet, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
@@ -120,11 +120,11 @@ fn at_square(controlled: bool) -> Result<[usize; 3], Anything> {
     }))
 }
 
-pub(crate) fn cases(_: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_: bool) -> Result<Vec<Row>, Anything> {
     let case = |what: &str, before, run: fn(bool) -> Result<[usize; 3], Anything>| {
         let ([right, wrong, refused], [_, still, given_up]) = (run(false)?, run(true)?);
         let runs = right + wrong + refused;
-        Ok::<_, Anything>(Case {
+        Ok::<_, Anything>(Row {
             case: format!("{what}, {runs} runs: Ok and wrong, refused; the same under step control"),
             before,
             now: format!("{wrong}, {refused}; {still}, {given_up}"),

@@ -1,6 +1,6 @@
 //! Input that was quietly read differently: normals of any length, walls that move without rates.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{ContactLaw, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
@@ -30,16 +30,16 @@ fn force_and_speed(rows: LinearRows<'static, f64>, speed: f64) -> Result<String,
     }
 }
 
-pub(crate) fn cases(_: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_: bool) -> Result<Vec<Row>, Anything> {
     let twice = LinearRows::new().pair(ContactLaw::Rigid, [0], [1], [2.0], 0.0)?;
     let silent = LinearRows::new().unilateral(&[(1, 1.0)], GapOffset::moving(|t| [-3.0 * t, 0.0, 0.0]));
     Ok(vec![
-        Case {
+        Row {
             case: "`LinearRows::pair` with a normal of length 2: force on a weight of 10 and its speed".into(),
             before: TWICE_BEFORE,
             now: force_and_speed(twice, 0.0)?,
         },
-        Case {
+        Row {
             case: "A floor that rises with speed 3 and gives no rates: force on a weight of 10 that it carries and its speed".into(),
             before: SILENT_BEFORE,
             now: force_and_speed(silent, 3.0)?,

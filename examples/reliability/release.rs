@@ -1,6 +1,6 @@
 //! Energy after an impact with `Release`, whatever the phase.
 
-use super::{Anything, Case};
+use super::{Anything, Row};
 use contact_dynamics::corrector::Release;
 use contact_dynamics::{Bathe, Bdf2, Newmark, Park, PersistencyCorrection, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
@@ -31,7 +31,7 @@ fn energies(make: Make, n: u32, phases: u32) -> Result<String, Anything> {
     Ok(format!("{:+.2} to {:+.2} %, at most {highest:.4} E₀", 100.0 * least, 100.0 * most))
 }
 
-pub(crate) fn cases(quick: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(quick: bool) -> Result<Vec<Row>, Anything> {
     let phases = if quick { 4 } else { 10 };
     let schemes: [(Make, &str); 4] = [
         (|| Ok(Box::new(Bathe::with_radius(1.0)?)), BEFORE[0]),
@@ -43,7 +43,7 @@ pub(crate) fn cases(quick: bool) -> Result<Vec<Case>, Anything> {
         .into_iter()
         .map(|(make, before)| {
             let case = format!("two bars, n = 20, {}: what release adds to the energy", make()?.name());
-            Ok(Case { case, before, now: energies(make, 20, phases)? })
+            Ok(Row { case, before, now: energies(make, 20, phases)? })
         })
         .collect()
 }

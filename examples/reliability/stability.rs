@@ -1,6 +1,6 @@
 //! Schemes and steps that cannot work.
 
-use crate::{Anything, Case};
+use crate::{Anything, Row};
 use contact_dynamics::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{CdLagrange, Error, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
@@ -37,13 +37,13 @@ fn fate(scheme: impl TimeIntegrator + 'static, courant: f64) -> Result<String, A
     Ok(format!("energy × {:.1e}", run.energy().total() / before))
 }
 
-pub(crate) fn cases(_quick: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_quick: bool) -> Result<Vec<Row>, Anything> {
     Ok(vec![
-        Case {
+        Row {
             case: "CD-Lagrange at Courant number 1.02, 400 steps".into(),
             before: "energy × 1.8e138",
             now: fate(CdLagrange, 1.02)?,
         },
-        Case { case: "a tableau of order 0, 400 steps".into(), before: "energy × 8.5e-1", now: fate(Slow, 0.5)? },
+        Row { case: "a tableau of order 0, 400 steps".into(), before: "energy × 8.5e-1", now: fate(Slow, 0.5)? },
     ])
 }

@@ -1,6 +1,6 @@
 //! The first step.
 
-use crate::{Anything, Case};
+use crate::{Anything, Row};
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation};
@@ -42,15 +42,15 @@ fn sliver() -> Result<String, Anything> {
     })
 }
 
-pub(crate) fn cases(_quick: bool) -> Result<Vec<Case>, Anything> {
+pub(crate) fn cases(_quick: bool) -> Result<Vec<Row>, Anything> {
     Ok(vec![
-        Case {
+        Row {
             case: "a stretched string of 50 elements, its massless end let go: energy at the start, after a step"
                 .into(),
             before: "1.0000, 0.9799",
             now: string(50)?,
         },
-        Case {
+        Row {
             case: "nodes 5e−13 deep in a floor at height 1".into(),
             before: "refused: gap -5.0e-13, tolerance 1.4e-14",
             now: sliver()?,
