@@ -14,6 +14,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
+use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::{Bars, MassKind};
@@ -21,6 +22,7 @@ use contact_dynamics_scenes::{Bars, MassKind};
 #[test]
 fn steps_do_not_allocate() {
     bars();
+    explicit_massless();
     correctors();
     solids();
     large_motion();
@@ -160,6 +162,24 @@ fn bars() {
             run.step().unwrap();
             assert_steps_allocate_nothing(&mut run, 400, 2, &format!("{}, {mass:?}", scheme.name()));
         }
+    }
+}
+
+/// Explicit bars with contact nodes without mass, which follow statically.
+fn explicit_massless() {
+    for scheme in all().into_iter().filter(|scheme| ["CD-Lagrange", "Noh–Bathe(0.5400)"].contains(&&*scheme.name())) {
+        let bars = Bars::paper(50).delayed(0.3, 1e-3);
+        let tableau = (scheme.make)().tableau();
+        let mass = Treatment::Redistributed(Takers::Tapered).mass(&bars.body(), &tableau, 0.5).unwrap();
+        let mut run = Simulation::builder(bars.system_with(mass), (scheme.make)(), 1e-3)
+            .velocity(bars.velocities())
+            .constraint(bars.contact())
+            .uncorrected()
+            .energy_balance()
+            .build()
+            .unwrap();
+        run.step().unwrap();
+        assert_steps_allocate_nothing(&mut run, 400, 2, &scheme.name());
     }
 }
 
