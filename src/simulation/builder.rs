@@ -241,7 +241,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///         .initial_overclosure(overclosure)
     ///         .build()?;
     ///     run.run_until(1.0, &mut ())?;
-    ///     Ok::<f64, contact_dynamics::Error>(run.state().displacement()[0])
+    ///     Ok::<f64, Box<dyn std::error::Error>>(run.state().displacement()[0])
     /// };
     /// assert!(start(InitialOverclosure::Refused).is_err());
     /// assert_eq!(start(InitialOverclosure::AdjustedGaps)?, 0.0); // it stays where it is
