@@ -6,12 +6,15 @@
 
 mod absolute_time;
 mod bipenalty;
+mod curved;
 mod damping;
+mod default_correction;
 mod explicit_contact;
 mod finite;
 mod passing_through;
 mod quiet_input;
 mod release;
+mod squeezes;
 mod stability;
 mod start;
 
@@ -32,11 +35,14 @@ struct Row {
 /// A subject, and the cases that tell about it: all, or with `true` (quick) shorter ones.
 type Subject = (&'static str, fn(bool) -> Result<Vec<Row>, Anything>);
 
-const SUBJECTS: [Subject; 10] = [
-    ("passing through", passing_through::cases),
+const SUBJECTS: [Subject; 13] = [
+    ("contradictory and redundant rows", squeezes::cases),
+    ("curved gaps", curved::cases),
     ("damping and corrections", damping::cases),
     ("NaN from the host", finite::cases),
     ("absolute time", absolute_time::cases),
+    ("passing through", passing_through::cases),
+    ("nothing said of corrections", default_correction::cases),
     ("starts", start::cases),
     ("schemes and steps that cannot work", stability::cases),
     ("explicit impacts", explicit_contact::cases),
