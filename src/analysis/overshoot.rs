@@ -55,7 +55,7 @@ pub fn overshoot_growth(tableau: &Tableau, start: StartUp) -> [f64; 2] {
 /// (U, V, A) in units of the step after each of `steps` steps from (1, 0, −Ω²).
 fn release(tableau: &Tableau, omega: f64, start: StartUp, steps: usize) -> Vec<[f64; 3]> {
     let weights = [omega * omega, 0.0, 1.0];
-    let (depth, stages) = (tableau.depth(), tableau.stages.len());
+    let (depth, stages) = (tableau.depth(), tableau.stages.len().max(1));
     let order = order(tableau);
     let [u, a] = [1.0, -omega * omega];
     // Stored values of schemes that keep them elsewhere.
