@@ -196,7 +196,12 @@ impl Fingerprint {
         if found != self.dofs {
             return Err(Error::Dimension { what, expected: self.dofs, found });
         }
-        match Self::of(a.symbolic()) == *self {
+        let own = Self::of(a.symbolic());
+        if own.entries != self.entries {
+            let what = "the entries of the effective matrix";
+            return Err(Error::Dimension { what, expected: self.entries, found: own.entries });
+        }
+        match own == *self {
             true => Ok(()),
             false => Err(Error::Incompatible {
                 part: "the effective matrix".into(),

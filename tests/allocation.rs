@@ -273,7 +273,7 @@ fn frames() {
         .map(|k| (if k / n == k % n { 2.0 } else { 0.0 }) + 1.0 / (1 + (k / n).abs_diff(k % n)) as f64)
         .collect();
     let (mut free, gaps, mut held) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
-    let mut frame = Frame::new(n);
+    let mut frame = Frame::new(n).unwrap();
     let counted = allocation_counter::measure(|| {
         for closed in 0..=n {
             for node in 0..n {
