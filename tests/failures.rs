@@ -77,7 +77,8 @@ fn not_finite_input_is_located() {
 fn wrong_sizes_are_refused() {
     refused!(
         LinearSystem::lumped(vec![1.0; 3], spring()),
-        Error::Dimension { what: "stiffness matrix", expected: 3, found: 2 },
+        Error::Dimension { expected: 2, found: 3, .. },
+        "mass",
         "3",
         "2"
     );

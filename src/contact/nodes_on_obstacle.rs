@@ -274,7 +274,8 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         let [shift, ..] = self.motion(t);
         let mut moved = Candidates::Unchanged;
         for row in &mut self.rows {
-            row.place = minus(self.nodes[row.node].at(u), shift);
+            let x = self.nodes[row.node].at(u);
+            (row.place, row.size) = (minus(x, shift), x.iter().fold(T::zero(), |size, x| size.max(x.abs())));
             let (distance, normal) = self.obstacle.distance(row.place);
             row.distance = distance;
             if let Some(x) = normal.iter().find(|x| !x.is_finite()) {
