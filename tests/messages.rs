@@ -8,7 +8,6 @@ use contact_dynamics::{
     Composite, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Result, Simulation, StepControl,
     System, TangentWeights, TimeIntegrator,
 };
-use std::error::Error as _;
 
 #[derive(Debug)]
 struct Torn(f64);

@@ -29,7 +29,7 @@ impl Flight {
         let n = 2 + held;
         let none: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
         let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &none)?;
-        let system = (2..n).try_fold(LinearSystem::lumped(vec![1.0; n], k)?, |system, dof| system.fix(dof))?;
+        let system = (2..n).try_fold(LinearSystem::lumped(vec![1.0; n], k)?, LinearSystem::fix)?;
         let mut velocity = vec![0.0; n];
         velocity[..2].copy_from_slice(&self.v);
         let mut builder = Simulation::builder(system, Newmark::trapezoidal(), 1.0)
