@@ -28,7 +28,7 @@ fn collide(scheme: Box<dyn TimeIntegrator>, n: usize, courant: f64, phase: f64) 
     let before = run.energy().total();
     let record = record_run(&bars, &mut run, 0.4);
     let mut inertia = vec![0.0; bars.dofs()];
-    run.system().mass().product(1.0, run.state().acceleration(), &mut inertia);
+    run.system().mass().product(1.0, run.state().acceleration(), &mut inertia).unwrap();
     let shift: f64 = inertia.iter().zip(run.state().acceleration()).map(|(f, a)| h * h / 8.0 * f * a).sum();
     (figures(&bars, &record, h), 1.0 - (run.energy().total() - shift) / before)
 }

@@ -685,6 +685,7 @@ fn contact_with_an_unsymmetric_matrix_is_that_of_a_dense_reference() {
             .linear_solver(Lu)
             .contact_solver(solver)
             .constraint(stop_rows())
+            .uncorrected()
             .build()
             .unwrap()
     };

@@ -93,9 +93,12 @@ fn fly<const D: usize>(
         // Still in flight.
         assert!(dot(along(w, -1.0, v), along(w, -1.0, v)).sqrt() < 1e-9 * speed, "{what}: {w:?} instead of {v:?}");
         if let Some((time, normal)) = meeting {
-            // Grazing impacts may be missed: a sixteenth of the energy.
+            // Grazing impacts may be missed: a sixteenth of the energy. So may edges that a step cuts.
             let steep = dot(normal, v).abs() / speed;
-            assert!(t <= time + 1.01 * h || steep < 0.26, "{what}: missed at {time} (it is {t}), {steep}");
+            assert!(
+                t <= time + 1.01 * h || steep < 0.26 || edge < speed * h,
+                "{what}: missed at {time} (it is {t}), {steep}"
+            );
         }
     }
     Ok(())
@@ -112,7 +115,8 @@ impl Tally {
     fn count(&mut self, what: &str, result: Result<(), Error>) {
         match result {
             Ok(()) => self.right += 1,
-            Err(error @ (Error::PassedThrough { .. } | Error::ContactLost { .. })) => {
+            // (A row that turns from one side of a body to the other and back does not stand still.)
+            Err(error @ (Error::PassedThrough { .. } | Error::ContactLost { .. } | Error::Contact { .. })) => {
                 assert!(error.is_recoverable());
                 self.refused += 1;
             }

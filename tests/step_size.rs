@@ -330,7 +330,7 @@ fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
         assert!(matches!(run.set_step_size(h), Err(Error::Parameter { .. })));
     }
     // It would not change the time.
-    assert!(matches!(run.set_step_size(1e-200), Err(Error::TimeNotAdvancing { .. })));
+    assert!(matches!(run.set_step_size(1e-20), Err(Error::TimeNotAdvancing { .. })));
     assert_eq!((run.state(), run.statistics(), run.step_size()), (&before.0, &before.1, 0.01));
     let mut other = oscillator(Box::new(Composite), 0.01);
     other.run_until(0.1, &mut ()).unwrap();
@@ -339,7 +339,7 @@ fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
     assert_eq!(run.state(), other.state());
     // M/h² is not finite.
     let mut fresh = oscillator(Box::new(Composite), 0.01);
-    assert!(matches!(fresh.set_step_size(1e-200), Err(Error::MatrixNotFinite { .. })));
+    assert!(matches!(fresh.set_step_size(1e-200), Err(Error::Parameter { .. })));
 }
 
 /// A spring so negative that a long step has no positive definite matrix: refused, and the short step goes on as before.

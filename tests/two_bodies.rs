@@ -237,8 +237,9 @@ fn rings_at_large_strains_collide_in_few_iterations() {
                 if after.refused_steps == before.refused_steps {
                     most = most.max(after.newton_iterations - before.newton_iterations);
                 }
-                assert!(run.energy().total() < energy * (1.0 + 1e-9), "{name}");
-                assert!(run.gaps().iter().all(|&gap| gap > -1e-12 * 40.0), "{name}");
+                assert!(run.energy().total() < energy * (1.0 + 1e-9), "{name} {}", run.energy().total() / energy);
+                let deepest = run.gaps().iter().fold(0.0_f64, |deepest, &gap| deepest.min(gap));
+                assert!(deepest > -1e-12 * 40.0, "{name}: {deepest:e}");
                 if passes == 1 {
                     // Pressed gaps are closed for good: their rates vanish, by the rows where the step has ended.
                     let (state, mut g) = (run.state(), ContactJacobian::default());
@@ -255,7 +256,8 @@ fn rings_at_large_strains_collide_in_few_iterations() {
                     }
                 }
             }
-            assert!(most <= 8 && run.statistics().refused_steps < 10, "{name}: {most} iterations");
+            let refused = run.statistics().refused_steps;
+            assert!(most <= 8 && refused < 10, "{name}: {most} iterations, {refused} steps refused");
             assert!(run.momentum(&along).unwrap().abs() < 1e-11 * momentum, "{name}");
             // They part again.
             assert!(run.momentum(&left).unwrap() < 0.0 && run.statistics().contact_changes >= 8, "{name}");

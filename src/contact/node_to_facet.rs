@@ -177,7 +177,7 @@ impl Pass {
 /// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
 /// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
 /// reach where it was last linearized, it is open, and the row stays as it was. A row whose normal has jumped more than
-/// sixteen times since the search, between two facets or around an edge that its node touches, stays as it was too: there is
+/// eight times since the search at one time, between two facets or around an edge that its node touches, stays as it was too: there is
 /// no normal that an iteration could converge to.
 ///
 /// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and
@@ -582,11 +582,10 @@ impl<T: Real> NodeToFacet<T> {
                 Some((stand, ground.surface.facets()[stand.facet].nodes()))
             });
             match stand {
-                Some((stand, vertices)) => match old.followed_by(stand) {
+                Some((stand, vertices)) => match old.followed_by(stand, t) {
                     Some(stand) => {
                         found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
                     }
-                    // Until the next search it stays where it was linearized last.
                     None => found.keep(rows, row),
                 },
                 // There is nothing near that it could press on.

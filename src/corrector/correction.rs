@@ -76,6 +76,10 @@ enum Jump {
 /// The gaps of all rows, as a correction evaluates them: those that are NaN or infinite are refused.
 pub(crate) trait Gaps<T: Real> {
     fn law(&self, row: usize) -> ContactLaw;
+
+    /// What of a gap is rounding, if the terms of G u have this magnitude.
+    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T;
+
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
 
     /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized there;
@@ -332,13 +336,24 @@ impl<T: Real> Correction<'_, T> {
         let read = self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
         jumps.clear();
         tolerance.clear();
+        // Gaps are met to some of their rounding, more where rows depend on one another; what that is in v or a by the rows of
+        // the scheme is no jump.
+        const ROUNDINGS: f64 = 32.0;
+        let [by_u, by_v, by_a] = self.scheme.response;
+        let per_gap = T::of(ROUNDINGS)
+            * T::of(match jump {
+                Jump::Velocity => (by_v / by_u).abs() / self.h,
+                Jump::Acceleration => (by_a / by_u).abs() / (self.h * self.h),
+            });
         for &row in rows {
             let (values, own) = match jump {
                 Jump::Velocity => (&self.new.v, rates[row].rate),
                 Jump::Acceleration => (&self.new.a, rates[row].acceleration),
             };
             jumps.push(self.g.product(row, values) + own);
-            tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()));
+            let magnitude = self.g.magnitude(row, &self.new.u);
+            let gap = per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]);
+            tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()) + gap);
         }
         x.clear();
         x.resize(rows.len(), T::zero());

@@ -367,11 +367,6 @@ impl<'a, T: Real> Constraints<'a, T> {
         &self.laws
     }
 
-    /// What of a gap is rounding, if the terms of G u have this magnitude.
-    pub(crate) fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
-        rounding(magnitude + gap.abs() + self.magnitudes[row])
-    }
-
     /// Whether the condition of any row depends on the gap at the start of the stage.
     pub(crate) fn reads_start(&self) -> bool {
         self.laws.iter().any(ContactLaw::reads_start)
@@ -528,6 +523,10 @@ impl<'a, T: Real> Constraints<'a, T> {
 impl<T: Real> Gaps<T> for Constraints<'_, T> {
     fn law(&self, row: usize) -> ContactLaw {
         self.laws[row]
+    }
+
+    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
+        rounding(magnitude + gap.abs() + self.magnitudes[row])
     }
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {

@@ -1,6 +1,6 @@
 //! The contact problem of a stage: which rows take part, their multipliers, and which contacts are closed afterwards.
 
-use super::curved_rows::{CurvedRowsWork, FIT, FOLLOWED, NEAR};
+use super::curved_rows::{CurvedRowsWork, FOLLOWED, Miss};
 use super::operator::Operator;
 use super::program::{CompiledStage, ContactTarget};
 use super::step::finite_supports;
@@ -267,6 +267,8 @@ pub(super) struct InterfaceWork<T> {
     /// d without contact, and with that of the last linearization of curved rows.
     pub(super) free: Vec<T>,
     pub(super) tried: Vec<T>,
+    /// Displacements where the gaps of curved rows were linearized last.
+    pub(super) followed: Vec<T>,
     /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
     pub(super) response: Vec<T>,
 }
@@ -282,6 +284,7 @@ impl<T: Real> InterfaceWork<T> {
             target: zero(),
             free: zero(),
             tried: zero(),
+            followed: zero(),
             response: zero(),
         }
     }
@@ -389,7 +392,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         past: &[Motion<T>],
         work: &mut Workspace<T>,
     ) -> Result<bool> {
-        let mut miss = f64::INFINITY;
+        let mut miss = Miss::ALL;
         for pass in 0..FOLLOWED {
             match pass {
                 0 => self.observe(operator, new, past, work)?,
@@ -407,12 +410,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             operator.follow(work.rows.curved.version(self.constraints));
             let before = std::mem::replace(&mut miss, self.miss(new, work)?);
-            work.rows.curved.miss = miss;
-            if miss <= FIT || miss <= NEAR && miss > 0.25 * before {
+            work.rows.curved.miss = miss.largest();
+            if miss.is_settled(pass + 1, before) {
                 return Ok(true);
             }
         }
-        Ok(miss <= NEAR)
+        Ok(false)
     }
 
     /// Opens every row that d could press.
@@ -451,6 +454,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
         }
         self.evaluate(new, work)?;
+        self.extrapolate(new, work);
         self.restitution(past, &mut work.rows)
     }
 

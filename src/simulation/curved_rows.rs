@@ -6,20 +6,52 @@
 
 use super::Workspace;
 use super::constraints::Constraints;
-use super::contact_step::{ContactRowsWork, ContactStep, Level};
+use super::contact_step::{ContactRowsWork, ContactStep, Level, keep};
 use super::operator::Operator;
 use crate::contact::{Candidates, ContactJacobian};
-use crate::corrector::Gaps;
+use crate::corrector::{Gaps, rounding};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
 
-/// Linearizations of curved rows in a contact problem, at most.
+/// Linearizations of curved rows in a contact problem, at most, and those after which forces that go to and fro are borne with.
 pub(super) const FOLLOWED: usize = 40;
+const LONG: usize = 12;
 
 /// The relative miss of gaps and forces at which rows fit, and that which is accepted where it falls no more.
-pub(super) const FIT: f64 = 1e-14;
-pub(super) const NEAR: f64 = 1e-8;
+const FIT: f64 = 1e-14;
+const NEAR: f64 = 1e-8;
+
+/// Tolerances of a gap that it may miss, where nothing gets better.
+const NOISE: f64 = 8.0;
+
+/// Share of the forces that may go to and fro: a node on an edge has the normal of either side.
+const EDGE: f64 = 1e-5;
+
+/// By how much rows miss what was solved with them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Miss {
+    /// Of gaps, relative to what d moves them.
+    pub(super) gap: f64,
+    /// Of forces, relative to these.
+    pub(super) force: f64,
+}
+
+impl Miss {
+    /// Before anything was solved.
+    pub(super) const ALL: Self = Self { gap: f64::INFINITY, force: f64::INFINITY };
+
+    pub(super) fn largest(self) -> f64 {
+        self.gap.max(self.force)
+    }
+
+    /// Whether rows fit, or nothing gets better and they nearly do, after so many passes and with this miss before.
+    pub(super) fn is_settled(self, passes: usize, before: Self) -> bool {
+        let force = if passes > LONG { EDGE } else { NEAR };
+        let near = self.gap <= NEAR && self.force <= force;
+        self.largest() <= FIT || near && (self.largest() > 0.25 * before.largest() || passes == FOLLOWED)
+    }
+}
 
 /// Memory for curved rows.
 pub(super) struct CurvedRowsWork<T> {
@@ -82,6 +114,25 @@ impl<T: Real> CurvedRowsWork<T> {
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
+    /// Makes gaps at d without contact those by the force rows, along which contact will answer, from where the last iteration of
+    /// Newton's method has left them; else each iteration would begin again with what G and F differ by.
+    pub(super) fn extrapolate(&self, new: &Motion<T>, work: &mut Workspace<T>) {
+        let Workspace { rows, interface, .. } = work;
+        if !rows.curved.apart {
+            return;
+        }
+        let level = Level { target: self.stage.contact.as_ref(), clock: self.clock };
+        let (_, values) = level.place(new, &rows.target);
+        let way = self.constraints.interface().iter().zip(&interface.followed);
+        for ((&dof, &from), way) in way.zip(&mut interface.tried) {
+            *way = values[dof] - from;
+        }
+        for row in 0..self.constraints.len() {
+            let along = |g: &ContactJacobian<T>| g.interface_product(row, &interface.tried);
+            rows.y[row] += along(&rows.curved.rows) - along(self.g);
+        }
+    }
+
     /// Goes back to d without contact: what rows constrain there, from where the last linearization was made.
     pub(super) fn step_back(
         &mut self,
@@ -111,6 +162,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             // (A law that predicts reads the gap that the scheme constrains.)
             let weight = if self.constraints.law(row).is_predictive() { rigid } else { rows.weight[row] };
             rows.y[row] += weight * forces.interface_product(row, &interface.tried);
+            rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
         }
         Ok(())
     }
@@ -165,6 +217,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         let (at, values) = level.place(new, &work.rows.target);
         self.constraints.follow(at, values, self.g)?;
+        keep(self.constraints.interface(), values, &mut work.interface.followed);
         let curved = &mut work.rows.curved;
         if compliant && !elsewhere {
             self.constraints.finite_gaps(t, &new.u, &mut curved.gaps)?;
@@ -178,9 +231,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
         })
     }
 
-    /// How much gaps and forces by the rows that follow d differ from those that were solved with: of gaps relative to what d
-    /// moves them, of forces relative to themselves. Leaves y of the rows where d is placed.
-    pub(super) fn miss(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<f64> {
+    /// How much gaps and forces by the rows that follow d differ from those that were solved with. Leaves y of the rows where d
+    /// is placed.
+    pub(super) fn miss(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<Miss> {
         self.evaluate(new, work)?;
         let Self { constraints, g, part, .. } = self;
         let Workspace { rows, trial, interface, .. } = work;
@@ -205,7 +258,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             };
             let beyond = miss - tolerance;
             if beyond > T::zero() {
-                largest = largest.max((beyond / scale).value());
+                // (Where nothing moves what is missed is noise, beside a share of tolerances.)
+                largest = largest.max((beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value());
             }
             if miss > worst.1 {
                 worst = (row, miss);
@@ -213,10 +267,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         let moved = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| (new - old).value().powi(2));
         let size = interface.forces.iter().map(|force| force.value().powi(2)).sum::<f64>();
-        if size > 0.0 {
-            largest = largest.max((moved.sum::<f64>() / size).sqrt());
-        }
+        let force = if size > 0.0 { (moved.sum::<f64>() / size).sqrt() } else { 0.0 };
         rows.curved.worst = worst;
-        Ok(largest)
+        Ok(Miss { gap: largest, force })
     }
 }

@@ -13,6 +13,14 @@ const SAME_SIDE_OF_LAST: f64 = 0.75;
 /// How far, in shares of the facet, the surface goes on beyond its rim for a node that leaves it within a step.
 const RIM_OF_LAST: f64 = 0.25;
 
+/// Where a node stood at some time.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    t: f64,
+    normal: Point,
+    facet: usize,
+}
+
 /// A node on a facet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stand {
@@ -25,8 +33,10 @@ pub(super) struct Stand {
     pub(super) weights: [f64; 4],
     pub(super) normal: Point,
     pub(super) gap: f64,
-    /// How often the normal has jumped since the search.
-    pub(super) jumps: u8,
+    /// How often the node has jumped since the search, and where it stood last at the two times that rows are followed to, the
+    /// newest first.
+    jumps: u8,
+    seen: [Option<Seen>; 2],
 }
 
 /// The nodes of a pass and what they may stand on, at the positions now.
@@ -109,7 +119,7 @@ impl Ground<'_> {
         }
         let p = self.positions[self.nodes[place]];
         let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
-        Some(Stand { place, facet, location, weights, normal, gap, jumps: 0 })
+        Some(Stand { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] })
     }
 }
 
@@ -125,15 +135,31 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
-    /// Where the node stands now, as the stand that follows this one; nothing if its normal has jumped too often: between
-    /// two facets, or around an edge that it touches, a node has no normal to converge to.
-    pub(super) fn followed_by(&self, next: Self) -> Option<Self> {
-        /// Cosine of the angle that is a jump, and jumps that are followed: where forces act elsewhere than gaps are met a row
-        /// goes from one place to the other and back.
+    /// Where the node stands at t, as the stand that follows this one; nothing if it is to stay as it is. Between two facets, or
+    /// around an edge that it touches, a node has no normal to converge to: one that has jumped too often stays. Rows are followed
+    /// to where the balance holds and to where the gap is met, later in the step, in turns; where a kink lies between the two,
+    /// the row of the later place serves both.
+    pub(super) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
+        /// Cosines of the angles that are a jump and a kink (18°), and jumps that are followed.
         const TURN: f64 = 1.0 - 1e-5;
-        const PATIENCE: u8 = 16;
-        let jumps = self.jumps + u8::from(dot(self.normal, next.normal) < TURN);
-        (jumps <= PATIENCE).then_some(Self { jumps, ..next })
+        const KINK: f64 = 0.95;
+        const PATIENCE: u8 = 8;
+        let later = self.seen.iter().flatten().find(|seen| seen.t > t);
+        let tired = self.jumps > PATIENCE;
+        let stays = match later {
+            Some(seen) => tired || dot(seen.normal, next.normal) < KINK,
+            None => tired && self.seen[0].is_some_and(|seen| seen.t.to_bits() == t.to_bits()),
+        };
+        if stays {
+            return None;
+        }
+        let same = |seen: &Option<Seen>| seen.is_some_and(|seen| seen.t.to_bits() == t.to_bits());
+        let before = self.seen.iter().copied().find(same).flatten();
+        let (normal, facet) = before.map_or((self.normal, self.facet), |seen| (seen.normal, seen.facet));
+        let jumped = facet != next.facet || dot(normal, next.normal) < TURN;
+        let other = self.seen.iter().copied().find(|seen| !same(seen)).flatten();
+        let now = Seen { t, normal: next.normal, facet: next.facet };
+        Some(Self { jumps: self.jumps.saturating_add(u8::from(jumped)), seen: [Some(now), other], ..next })
     }
 
     /// d²g/ds² along x + s v, with the node at x of velocity v, and the facet and its vertices' velocities as shapes.
