@@ -174,11 +174,8 @@ fn a_linear_system_is_solved_as_by_the_direct_solve() {
             .unwrap()
         };
         let mut direct = build(false, None);
-        let mut others = [
-            build(true, None),
-            build(true, Some(Newton::modified().line_search())),
-            build(false, Some(Newton::full())),
-        ];
+        let variants = [(true, None), (true, Some(Newton::modified().line_search())), (false, Some(Newton::full()))];
+        let mut others: Vec<_> = variants.into_iter().map(|(nonlinear, newton)| build(nonlinear, newton)).collect();
         for step in 0..160 {
             direct.step().unwrap();
             for (which, run) in others.iter_mut().enumerate() {
@@ -192,7 +189,7 @@ fn a_linear_system_is_solved_as_by_the_direct_solve() {
             }
         }
         // A linear force converges at once: a residual of rounding after the first iteration.
-        let [nonlinear, _, linear] = &others;
+        let [nonlinear, _, linear] = &others[..] else { unreachable!() };
         let stages = (scheme.make)().tableau().stages.len() as u64;
         assert!(nonlinear.statistics().newton_iterations <= 2 * 161 * stages, "{}", scheme.name());
         assert_eq!(linear.statistics().factorizations, direct.statistics().factorizations);

@@ -326,6 +326,8 @@ impl<T: Real> Correction<'_, T> {
 
     /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
     fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
+        /// Roundings of a gap that it may miss; where rows depend on one another they are several.
+        const ROUNDINGS: f64 = 32.0;
         let mut bounds = std::mem::take(&mut self.buffers.bounds);
         bounds.clear();
         bounds.extend(rows.iter().map(|&row| match self.is_pressed(row) {
@@ -336,9 +338,7 @@ impl<T: Real> Correction<'_, T> {
         let read = self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
         jumps.clear();
         tolerance.clear();
-        // Gaps are met to some of their rounding, more where rows depend on one another; what that is in v or a by the rows of
-        // the scheme is no jump.
-        const ROUNDINGS: f64 = 32.0;
+        // Gaps are met to some of their rounding; what that is in v or a by the rows of the scheme is no jump.
         let [by_u, by_v, by_a] = self.scheme.response;
         let per_gap = T::of(ROUNDINGS)
             * T::of(match jump {

@@ -289,10 +289,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         step_size::<T>(h)?;
         check_times(t, self.overclosure)?;
-        match &self.resumed {
-            None => Clock::new(t, h).check()?,
-            Some((_, history)) => history.clock.check()?,
-        }
+        self.resumed.as_ref().map_or_else(|| Clock::new(t, h), |(_, history)| history.clock).check()?;
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
@@ -354,14 +351,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let h = history.clock.h;
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, contact };
         let program = compiler.compile(&scheme.tableau)?;
-        let startup = match history.known < scheme.depth {
-            true => Some(compiler.start(&scheme.starter, &scheme.tableau)?),
-            false => None,
-        };
+        let is_known = history.known == scheme.depth;
+        let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
-        let interface = constraints.interface().len();
-        let contact = ([rows, constraints.entries()], interface);
+        let contact = ([rows, constraints.entries()], constraints.interface().len());
         let mut work = workspace(&mut *system, &program, &correctors, projection, contact, slots);
         if follows {
             let (name, contact) = (scheme.integrator.name(), (rows, constraints.interface()));
@@ -371,17 +365,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.massless = massless;
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
-        let ledger = match self.balance {
-            EnergyBalance::Off => None,
-            EnergyBalance::On => Some(Ledger::new(&mut *system, &state, (&constraints, &g))?),
-        };
-        let judge = match self.control {
-            None => None,
-            Some(control) => {
-                let local = if control.estimates() { Some(local_error(&scheme, rows)?) } else { None };
-                Some(Judge::new(control, local, dofs))
-            }
-        };
+        let is_balanced = self.balance == EnergyBalance::On;
+        let ledger = is_balanced.then(|| Ledger::new(&mut *system, &state, (&constraints, &g))).transpose()?;
+        let judge = self.control.map(|control| judge(control, &scheme, rows, dofs)).transpose()?;
         Ok(Simulation {
             system,
             constraints,
@@ -642,6 +628,12 @@ fn check_corrections<T: Real>(
 fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
     let still = vec![T::zero(); system.dofs()];
     system.damping_force(&still, &still, &mut still.clone())
+}
+
+/// The judge of the steps of a run that controls them.
+fn judge<T: Real>(control: StepControl, scheme: &Scheme<'_>, rows: usize, dofs: usize) -> Result<Judge<T>> {
+    let local = control.estimates().then(|| local_error(scheme, rows)).transpose()?;
+    Ok(Judge::new(control, local, dofs))
 }
 
 /// What the local error of a scheme follows from; refused where contact would not show in it.

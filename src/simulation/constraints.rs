@@ -547,18 +547,17 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
             let part = &mut parts[constraint];
             let count = part.candidates();
             let out = &mut out[first..first + count];
-            match field {
-                0 => part.gap(t, u, out),
-                _ => {
-                    scratch.clear();
-                    part.jacobian(scratch);
-                    part.rates(t, u, v, &mut rates[..count]);
-                    for (row, (out, own)) in out.iter_mut().zip(&*rates).enumerate() {
-                        *out = match field {
-                            1 => scratch.product(row, v) + own.rate,
-                            _ => scratch.product(row, a) + own.acceleration,
-                        };
-                    }
+            if field == 0 {
+                part.gap(t, u, out);
+            } else {
+                scratch.clear();
+                part.jacobian(scratch);
+                part.rates(t, u, v, &mut rates[..count]);
+                for (row, (out, own)) in out.iter_mut().zip(&*rates).enumerate() {
+                    *out = match field {
+                        1 => scratch.product(row, v) + own.rate,
+                        _ => scratch.product(row, a) + own.acceleration,
+                    };
                 }
             }
             // Back in any case, and to the same rows: G need not be read again.

@@ -809,15 +809,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Workspace { trial, rows, buffers, was_closed, closed_at_start, massless, .. } = work;
         let level = Level { target: stage.contact.as_ref(), clock: *clock };
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
-        match level.target {
-            None => trial.gap.copy_from_slice(&rows.y[..constraints.len()]),
-            Some(_) => {
-                // The gaps of a state are those of its own surroundings.
-                rows.curved.hold(g, constraints);
-                constraints.follow(new.t, &new.u, g)?;
-                rows.curved.release(constraints);
-                constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
-            }
+        if level.target.is_none() {
+            trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
+        } else {
+            // The gaps of a state are those of its own surroundings.
+            rows.curved.hold(g, constraints);
+            constraints.follow(new.t, &new.u, g)?;
+            rows.curved.release(constraints);
+            constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
         }
         rows.measure(stage, clock.h, constraints, g, new, None)?;
         if self.part != Part::All && level.target.is_some() {

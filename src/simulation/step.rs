@@ -181,9 +181,7 @@ impl<T: Real> Simulation<'_, T> {
             let covector = start_covector.unwrap_or(&stage.covector);
             history.slots.rotate_right(1);
             work.backup.rotations += 1;
-            let Some((new, past)) = history.slots.split_first_mut() else {
-                continue;
-            };
+            let Some((new, past)) = history.slots.split_first_mut() else { continue };
             new.t = clock.at(stage.end);
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());

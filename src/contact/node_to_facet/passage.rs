@@ -16,6 +16,9 @@ const FINE: f64 = 0.125;
 /// stopped: below, rows let nodes in over an edge only, and there the normal is anyone's.
 const COARSE: f64 = 0.6;
 
+/// Share of a way that may go in over a convex corner and out again.
+const SHALLOW: f64 = 0.05;
+
 /// Share of the smallest facet below which a depth is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -198,7 +201,7 @@ fn pierces(
     };
     let (Some((before, normal)), Some((after, _))) = (height(0.0), height(1.0)) else { return false };
     // What goes in so little, as over a convex corner, has not gone through. (A way is not shorter than its share in height.)
-    if !(before >= 0.0 && after < -STEEP * length.min(before - after) && meets(normal)) {
+    if !(before >= 0.0 && after < -SHALLOW * length.min(before - after) && meets(normal)) {
         return false;
     }
     let (mut front, mut back) = (0.0, 1.0);
