@@ -48,9 +48,9 @@ pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Incompatible`](crate::Error::Incompatible) for a
-    /// pattern the solver cannot handle, and of the solvers of this crate [`Error::MissingDof`](crate::Error::MissingDof),
-    /// [`Error::RepeatedDof`](crate::Error::RepeatedDof) and [`Error::Incompatible`](crate::Error::Incompatible) for a list `last`
+    /// [`Error::OutOfMemory`], [`Error::Incompatible`] for a
+    /// pattern the solver cannot handle, and of the solvers of this crate [`Error::MissingDof`],
+    /// [`Error::RepeatedDof`] and [`Error::Incompatible`] for a list `last`
     /// that names no dofs, a dof twice, or is not ascending.
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize])
     -> Result<Box<dyn Factorization<T>>>;
@@ -72,8 +72,8 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::Singular`](crate::Error::Singular) with the failing dof, and of the solvers of this crate
-    /// [`Error::Dimension`](crate::Error::Dimension) and [`Error::Incompatible`](crate::Error::Incompatible) for a matrix of another
+    /// [`Error::Singular`] with the failing dof, and of the solvers of this crate
+    /// [`Error::Dimension`] and [`Error::Incompatible`] for a matrix of another
     /// size or pattern; the factorization is then unusable until the next success.
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()>;
 
@@ -84,9 +84,9 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     ///
     /// # Errors
     ///
-    /// [`Error::LinearNotConverged`](crate::Error::LinearNotConverged) or
-    /// [`Error::Indefinite`](crate::Error::Indefinite) of an iteration, [`Error::Host`](crate::Error::Host) or, if a smaller
-    /// step may help, [`Error::Inadmissible`](crate::Error::Inadmissible) of a host's own solver. `rhs` then holds nothing of
+    /// [`Error::LinearNotConverged`] or
+    /// [`Error::Indefinite`] of an iteration, [`Error::Host`] or, if a smaller
+    /// step may help, [`Error::Inadmissible`] of a host's own solver. `rhs` then holds nothing of
     /// use, and the step is undone. Direct factorizations do not fail here.
     fn solve(&mut self, rhs: &mut [T]) -> Result<()>;
 

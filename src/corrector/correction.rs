@@ -324,10 +324,25 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
+    /// Takes for no jump what the rows of the scheme make of gaps that are met to some of their rounding: rows that depend on one
+    /// another contradict each other by that.
+    fn allow_rounding_of_gaps(&mut self, rows: &[usize], jump: Jump) {
+        /// Roundings of a gap that it may miss.
+        const ROUNDINGS: f64 = 32.0;
+        let [by_u, by_v, by_a] = self.scheme.response;
+        let per_gap = T::of(ROUNDINGS)
+            * T::of(match jump {
+                Jump::Velocity => (by_v / by_u).abs() / self.h,
+                Jump::Acceleration => (by_a / by_u).abs() / (self.h * self.h),
+            });
+        for (&row, tolerance) in rows.iter().zip(&mut self.buffers.tolerance) {
+            let magnitude = self.g.magnitude(row, &self.new.u);
+            *tolerance += per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]);
+        }
+    }
+
     /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
     fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
-        /// Roundings of a gap that it may miss; where rows depend on one another they are several.
-        const ROUNDINGS: f64 = 32.0;
         let mut bounds = std::mem::take(&mut self.buffers.bounds);
         bounds.clear();
         bounds.extend(rows.iter().map(|&row| match self.is_pressed(row) {
@@ -338,26 +353,22 @@ impl<T: Real> Correction<'_, T> {
         let read = self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
         jumps.clear();
         tolerance.clear();
-        // Gaps are met to some of their rounding; what that is in v or a by the rows of the scheme is no jump.
-        let [by_u, by_v, by_a] = self.scheme.response;
-        let per_gap = T::of(ROUNDINGS)
-            * T::of(match jump {
-                Jump::Velocity => (by_v / by_u).abs() / self.h,
-                Jump::Acceleration => (by_a / by_u).abs() / (self.h * self.h),
-            });
         for &row in rows {
             let (values, own) = match jump {
                 Jump::Velocity => (&self.new.v, rates[row].rate),
                 Jump::Acceleration => (&self.new.a, rates[row].acceleration),
             };
             jumps.push(self.g.product(row, values) + own);
-            let magnitude = self.g.magnitude(row, &self.new.u);
-            let gap = per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]);
-            tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()) + gap);
+            tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()));
         }
         x.clear();
         x.resize(rows.len(), T::zero());
-        let result = read.and_then(|()| self.solve(rows, &bounds, x));
+        let mut result = read.and_then(|()| self.solve(rows, &bounds, x));
+        if matches!(result, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
+            self.allow_rounding_of_gaps(rows, jump);
+            x.fill(T::zero());
+            result = self.solve(rows, &bounds, x);
+        }
         self.buffers.bounds = bounds;
         result
     }

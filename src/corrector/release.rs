@@ -12,12 +12,12 @@ use crate::real::Real;
 /// impulse that restores [`dissipated`](crate::ContactState::dissipated) to the kinetic energy,
 ///
 /// ```text
-/// v ← v + M⁻¹ G_rowᵀ j,      ½ S j² + j [[v]] = dissipated,      [[v]] = G_row v + ∂g/∂t
+/// v ← v + M⁻¹ G_rowᵀ j,      ½ S j² + j ⟦v⟧ = dissipated,      ⟦v⟧ = G_row v + ∂g/∂t
 /// ```
 ///
 /// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also the
 /// velocity that the exact solution jumps to. Accelerations need no correction: those of the first open step hold no contact
-/// force. Linear momentum is conserved. [[v]] and what was taken are relative, so that a velocity common to all changes nothing. Kinetic
+/// force. Linear momentum is conserved. ⟦v⟧ and what was taken are relative, so that a velocity common to all changes nothing. Kinetic
 /// energy never exceeds what it was before the impact by more than the scheme makes of it, and without numerical damping the
 /// run keeps what is given back (`docs/theory.md`, section 16).
 ///
@@ -68,7 +68,7 @@ impl<T: Real> Corrector<T> for Release {
 /// [`new`](Self::new) says it with τ alone, j = ½ τ λ. Where they differ, the papers' velocities of the two sides would not
 /// conserve momentum on the nodes; here each side has its share of the relative velocity by its mass.
 ///
-/// Energy changes at release by ½ S j² + j [[v]], which may be a rise.
+/// Energy changes at release by ½ S j² + j ⟦v⟧, which may be a rise.
 ///
 /// Known failure: where the force falls to zero over several steps, as waves on a mesh make it, there is hardly any left to be
 /// released, and the condition does next to nothing.

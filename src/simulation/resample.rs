@@ -45,9 +45,9 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless h is positive and finite, [`Error::TimeNotAdvancing`] if a step of that size would not
-    /// change the time, [`Error::BeyondStability`] if the scheme is not stable with it, [`Error::MatrixNotFinite`] or
-    /// [`Error::Singular`] if the effective matrix cannot be factorized. The simulation is then as it was.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless h is positive and finite, [`Error::TimeNotAdvancing`](crate::Error::TimeNotAdvancing) if a step of that size would not
+    /// change the time, [`Error::BeyondStability`](crate::Error::BeyondStability) if the scheme is not stable with it, [`Error::MatrixNotFinite`](crate::Error::MatrixNotFinite) or
+    /// [`Error::Singular`](crate::Error::Singular) if the effective matrix cannot be factorized. The simulation is then as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         self.guarded(|run| {
             run.change_step_size(h)?;

@@ -37,7 +37,7 @@ pub enum InitialOverclosure {
     #[default]
     Refused,
     /// The gap of such a contact is measured from where it starts, for good: nothing is strained. The depth is that of the
-    /// whole feature ([`ContactId::feature`](crate::ContactId)): a node that slides on keeps it.
+    /// whole feature ([`ContactId::feature`](crate::contact::ContactId::feature)): a node that slides on keeps it.
     AdjustedGaps,
     /// The overlap is removed over a time from the start, along 1 − 3 τ² + 2 τ³ with τ from 0 to 1, as an interference fit is
     /// mounted: what is strained then is strained by it.
