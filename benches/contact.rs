@@ -207,6 +207,10 @@ fn build(
         }
     });
     let builder = Simulation::builder(system, Composite, h).constraint(contact);
-    let builder = if corrected { builder.corrector(PersistencyCorrection::with_history_projection()) } else { builder };
+    let builder = if corrected {
+        builder.corrector(PersistencyCorrection::with_history_projection())
+    } else {
+        builder.uncorrected()
+    };
     builder.build().expect("a well-posed scene")
 }

@@ -77,7 +77,7 @@ fn simulation<T: Real>(
         .fold(LinearRows::new(), |rows, &dof| rows.unilateral(&[(dof, T::one())], T::of(1e-3 * h * 1.5)));
     let mut made = None;
     let built = allocation_counter::measure(|| {
-        let builder = Simulation::builder(system, scheme, h).velocity(velocity);
+        let builder = Simulation::builder(system, scheme, h).velocity(velocity).uncorrected();
         let builder = if candidates.is_empty() { builder } else { builder.constraint(rows) };
         made = Some(builder.build().expect("a well-posed scene"));
     });

@@ -102,7 +102,7 @@ fn simulation<T: Real, const D: usize>(
             f.iter_mut().zip(&weight).skip(D - 1).step_by(D).for_each(|(f, &w)| *f = w);
         }
     });
-    let builder = Simulation::builder(system, scheme, h);
+    let builder = Simulation::builder(system, scheme, h).uncorrected();
     let builder = match pressed {
         None => builder,
         Some(pressed) => {

@@ -196,7 +196,7 @@ fn pressed<T: Real>(
         );
     let builder = match correction {
         true => builder.corrector(PersistencyCorrection::with_history_projection()),
-        false => builder,
+        false => builder.uncorrected(),
     };
     builder.build().expect("the scene is well posed")
 }

@@ -310,7 +310,7 @@ fn a_rigid_face_on_four_supports_shares_its_force() {
         // An impact, or rest from the start.
         let speed = if corrected { -1.0 } else { 0.0 };
         let builder = Simulation::builder(system, Composite, 0.01).velocity(vec![speed, 0.0, 0.0]).constraint(rows);
-        let builder = if corrected { builder.corrector(PersistencyCorrection::new()) } else { builder };
+        let builder = if corrected { builder.corrector(PersistencyCorrection::new()) } else { builder.uncorrected() };
         let mut run = builder.build().unwrap();
         for _ in 0..8 {
             println!(

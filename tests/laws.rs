@@ -392,8 +392,11 @@ fn corrections_leave_compliant_contacts_alone() {
         let builder = Simulation::builder(chain(&[1.0, 2.0], &[0.0; 2], 50.0), Composite, 0.01)
             .velocity(vec![-1.0; 2])
             .constraint(contact(law, 0.1));
-        let builder =
-            if corrected { builder.corrector(PersistencyCorrection::with_history_projection()) } else { builder };
+        let builder = if corrected {
+            builder.corrector(PersistencyCorrection::with_history_projection())
+        } else {
+            builder.uncorrected()
+        };
         let mut run = builder.build().unwrap();
         run.run_until(1.0, &mut ()).unwrap();
         run.state().displacement().to_vec()

@@ -190,7 +190,7 @@ impl Experiment {
             .constraint(self.bars.contact());
         match correction.corrector() {
             Some(corrector) => builder.corrector(corrector).build(),
-            None => builder.build(),
+            None => builder.uncorrected().build(),
         }
     }
 
