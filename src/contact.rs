@@ -139,6 +139,12 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Candidates::Unchanged)
     }
 
+    /// Whether [`follow`](Self::follow) never moves anything, because gaps are affine in u between two searches: a run in which
+    /// all are saves the looking. Default: not known to be.
+    fn is_affine(&self) -> bool {
+        false
+    }
+
     /// Number of candidates now.
     fn candidates(&self) -> usize;
 
@@ -191,6 +197,9 @@ impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for Box<C> 
     }
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         (**self).follow(t, u)
+    }
+    fn is_affine(&self) -> bool {
+        (**self).is_affine()
     }
     fn candidates(&self) -> usize {
         (**self).candidates()

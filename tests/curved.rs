@@ -1,7 +1,11 @@
 //! Motion along curved gaps without friction: energy, place and work of contact to the order of the scheme, raw and corrected.
 
+use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::ContactLevel;
-use contact_dynamics::{Corrector, EnergyMomentum, Newmark, PersistencyCorrection, TimeIntegrator};
+use contact_dynamics::{
+    Corrector, EnergyMomentum, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator,
+};
 use contact_dynamics_scenes::curved::{Drift, SCENES, Scene};
 use contact_dynamics_scenes::schemes::{self, Listed};
 
@@ -70,5 +74,26 @@ fn schemes_that_conserve_energy_conserve_it_on_curves() {
             let raw = scene.run(Newmark::trapezoidal(), Vec::new(), h).unwrap();
             assert!(raw.energy < 1e-8, "{scene:?}: {raw:?}");
         }
+    }
+}
+
+/// In `f32` rows stand still where its rounding is met, after as few linearizations.
+#[test]
+fn single_precision_follows_to_its_own_rounding() {
+    let bowl = Sphere::new([0.0_f32, 0.0], 1.0, Side::Inside).unwrap();
+    let none = SparseColMat::<usize, f32>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    for make in [|| Box::new(Newmark::trapezoidal()) as Box<dyn TimeIntegrator>, || Box::new(EnergyMomentum)] {
+        let system = LinearSystem::lumped(vec![1.0_f32; 2], none.clone()).unwrap();
+        let contact = NodesOnObstacle::new(bowl, &[[0.0, -1.0]], &[[0, 1]], &[0]).unwrap();
+        let mut run = Simulation::builder(system, make(), 0.01)
+            .velocity(vec![1.0, 0.0])
+            .constraint(contact)
+            .uncorrected()
+            .build()
+            .unwrap();
+        run.run_until(3.0, &mut ()).unwrap();
+        assert!((run.energy().total() - 0.5).abs() < 1e-3, "{}: {}", make().name(), run.energy().total());
+        let counts = *run.statistics();
+        assert!(counts.contact_solves <= 8 * counts.steps, "{}: {counts:?}", make().name());
     }
 }

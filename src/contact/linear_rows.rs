@@ -189,6 +189,10 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
         Ok(())
     }
 
+    fn is_affine(&self) -> bool {
+        true
+    }
+
     fn candidates(&self) -> usize {
         self.laws.len()
     }

@@ -315,6 +315,10 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         Ok(())
     }
 
+    fn is_affine(&self) -> bool {
+        self.obstacle.fixed_normal().is_some()
+    }
+
     fn candidates(&self) -> usize {
         self.rows.len()
     }

@@ -266,6 +266,11 @@ impl<'a, T: Real> Constraints<'a, T> {
         })
     }
 
+    /// Whether rows never move within a step.
+    pub(crate) fn is_affine(&self) -> bool {
+        self.parts.iter().all(ContactConstraint::is_affine)
+    }
+
     /// The version of the rows: responses to those of another one are not theirs.
     pub(crate) fn version(&self) -> u64 {
         self.version

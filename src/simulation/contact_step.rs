@@ -403,6 +403,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 true => self.press(operator, new.t, work)?,
                 false => self.release(work),
             }
+            if self.constraints.is_affine() {
+                return Ok(true);
+            }
             self.foresee(needed, work);
             if self.follow(new, work)? == Candidates::Unchanged {
                 work.rows.curved.miss = 0.0;
@@ -411,7 +414,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             operator.follow(work.rows.curved.version(self.constraints));
             let before = std::mem::replace(&mut miss, self.miss(new, work)?);
             work.rows.curved.miss = miss.largest();
-            if miss.is_settled(pass + 1, before) {
+            if miss.is_settled::<T>(pass + 1, before) {
                 return Ok(true);
             }
         }

@@ -18,8 +18,8 @@ use crate::state::Motion;
 pub(super) const FOLLOWED: usize = 40;
 const LONG: usize = 12;
 
-/// The relative miss of gaps and forces at which rows fit, and that which is accepted where it falls no more.
-const FIT: f64 = 1e-14;
+/// The relative miss of gaps and forces at which rows fit, in roundings, and that which is accepted where it falls no more.
+const FIT: f64 = 64.0;
 const NEAR: f64 = 1e-8;
 
 /// Tolerances of a gap that it may miss, where nothing gets better.
@@ -46,10 +46,11 @@ impl Miss {
     }
 
     /// Whether rows fit, or nothing gets better and they nearly do, after so many passes and with this miss before.
-    pub(super) fn is_settled(self, passes: usize, before: Self) -> bool {
+    pub(super) fn is_settled<T: Real>(self, passes: usize, before: Self) -> bool {
+        let fit = FIT * T::epsilon().value();
         let force = if passes > LONG { EDGE } else { NEAR };
-        let near = self.gap <= NEAR && self.force <= force;
-        self.largest() <= FIT || near && (self.largest() > 0.25 * before.largest() || passes == FOLLOWED)
+        let near = self.gap <= NEAR.max(fit) && self.force <= force.max(fit);
+        self.largest() <= fit || near && (self.largest() > 0.25 * before.largest() || passes == FOLLOWED)
     }
 }
 
