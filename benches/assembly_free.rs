@@ -1,8 +1,8 @@
-//! Cost of an explicit step of a host that computes its force element by element, without any assembled K, beside its limit: one
-//! evaluation of the force and one pass over the vectors.
+//! Cost of an explicit step of a host that computes its force element by element, without any assembled K, beside its
+//! limit: one evaluation of the force and one pass over the vectors.
 //!
-//! `cargo bench --bench assembly_free -- [elements a side]…` (default 10, 20 and 40; chains of 100 to a million elements a bar
-//! come first, a plate of 300 × 300 after them)
+//! `cargo bench --bench assembly_free -- [elements a side]…` (default 10, 20 and 40; chains of 100 to a million
+//! elements a bar come first, a plate of 300 × 300 after them)
 
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{

@@ -1,5 +1,5 @@
-//! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the work on
-//! the interface alone: condensation, responses, the contact solver.
+//! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the
+//! work on the interface alone: condensation, responses, the contact solver.
 //!
 //! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20)
 
@@ -71,8 +71,8 @@ fn closed(run: &Simulation<'_, f64>) -> usize {
     run.state().contacts().closed().iter().filter(|&&closed| closed).count()
 }
 
-/// Adds the solves with the composite scheme's effective matrix; returns the number of scalars in the first factor, and the
-/// second one once more.
+/// Adds the solves with the composite scheme's effective matrix; returns the number of scalars in the first factor, and
+/// the second one once more.
 fn bare(table: &mut Table<'_>, solid: &Solid<3>, last: &[usize], h: f64) -> (usize, Box<dyn Factorization<f64>>) {
     let a = timing::effective(&solid.stiffness::<f64>(), &solid.lumped_mass(), &Composite, h);
     let [free, behind] = [&[][..], last].map(|last| timing::factor(&a, last));

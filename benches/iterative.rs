@@ -37,8 +37,8 @@ fn main() {
     books(if arguments.iter().any(|argument| argument == "--test") { 3 } else { 6 });
 }
 
-/// What a tolerance does to a run: a block bounces off a tilted floor, by the trapezoidal rule. Energy and momentum along the
-/// floor are over those of the start, u over the largest.
+/// What a tolerance does to a run: a block bounces off a tilted floor, by the trapezoidal rule. Energy and momentum
+/// along the floor are over those of the start, u over the largest.
 fn books(cells: usize) {
     let block = Solid::block([1.0; 3], [cells; 3], MATERIAL);
     let h = 1.0 / cells as f64 / MATERIAL.wave_speed();

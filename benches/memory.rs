@@ -1,7 +1,8 @@
-//! Memory that a simulation takes, relative to what it cannot do without: one factor, and the matrices as the host gave them.
+//! Memory that a simulation takes, relative to what it cannot do without: one factor, and the matrices as the host gave
+//! them.
 //!
-//! `cargo bench --bench memory -- [elements a side]…` (default 10, 20 and 30). Counted are the bytes asked for, not pages
-//! touched; a vector that grows counts twice while it does.
+//! `cargo bench --bench memory -- [elements a side]…` (default 10, 20 and 30). Counted are the bytes asked for, not
+//! pages touched; a vector that grows counts twice while it does.
 
 use contact_dynamics::{
     Automatic, CentralDifference, Composite, Factorization, LinearRows, LinearSolver, LinearSystem, Newmark, Real,

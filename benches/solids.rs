@@ -1,8 +1,8 @@
-//! Cost of a step on a plate of quad4 and blocks of hex8 elements, without contact and with 1, 100 and all candidates pressed,
-//! beside the bare solve and the bare K product, in one run.
+//! Cost of a step on a plate of quad4 and blocks of hex8 elements, without contact and with 1, 100 and all candidates
+//! pressed, beside the bare solve and the bare K product, in one run.
 //!
-//! `cargo bench --bench solids -- [elements a side]…` (default blocks of 10 and 20 after the plate of 300 × 300; 30 takes
-//! four minutes, 40 a quarter of an hour and 8 GB)
+//! `cargo bench --bench solids -- [elements a side]…` (default blocks of 10 and 20 after the plate of 300 × 300; 30
+//! takes four minutes, 40 a quarter of an hour and 8 GB)
 
 use contact_dynamics::{Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -85,7 +85,8 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     println!("memory is read at {rate:.1} GB/s\n");
 }
 
-/// A body that its weight presses on so many nodes of the floor (`None`: without candidates); the others are far above it.
+/// A body that its weight presses on so many nodes of the floor (`None`: without candidates); the others are far above
+/// it.
 fn simulation<T: Real, const D: usize>(
     solid: &Solid<D>,
     scheme: Box<dyn TimeIntegrator>,

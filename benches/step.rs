@@ -1,8 +1,8 @@
 //! Cost of a step of the two-bar scene beside the bare triangular solve and the bare K product, in one run.
 //!
-//! `cargo bench --bench step -- [elements a bar]…` (default 100 to a million: about two minutes) prints medians and ratios for
-//! `f64` and `f32`. The machine may be shared: the samples of all rows are interleaved, and only ratios within one run mean
-//! something elsewhere.
+//! `cargo bench --bench step -- [elements a bar]…` (default 100 to a million: about two minutes) prints medians and
+//! ratios for `f64` and `f32`. The machine may be shared: the samples of all rows are interleaved, and only ratios
+//! within one run mean something elsewhere.
 
 use contact_dynamics::faer::dyn_stack::{MemBuffer, MemStack};
 use contact_dynamics::faer::linalg::cholesky::ldlt::factor::LdltRegularization;
@@ -108,8 +108,8 @@ fn faer_solve(a: &SparseColMat<usize, f64>) -> impl FnMut() + 'static {
     }
 }
 
-/// The composite scheme's step of chains in a straight program: what a host would write for this scene alone. Prediction,
-/// product with K and forward sweep are one loop, backward sweep and recovery another one.
+/// The composite scheme's step of chains in a straight program: what a host would write for this scene alone.
+/// Prediction, product with K and forward sweep are one loop, backward sweep and recovery another one.
 fn by_hand<T: Real>(bars: &Bars, h: f64) -> impl FnMut() + 'static {
     let dofs = bars.dofs();
     let (stiffness, mass) = (bars.stiffness::<T>(), bars.lumped_mass::<T>());

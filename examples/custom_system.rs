@@ -1,7 +1,8 @@
 //! A model of one's own: a truss at large displacements, thrown at a floor.
 //!
-//! `cargo run --release --example custom_system` prints what `verify::tangent` says of the model, a table over time, what
-//! must hold of the run, and what `verify::tangent` says of a mistake; with `--quick` it stops after the first impact.
+//! `cargo run --release --example custom_system` prints what `verify::tangent` says of the model, a table over time,
+//! what must hold of the run, and what `verify::tangent` says of a mistake; with `--quick` it stops after the first
+//! impact.
 //!
 //! First comes the model, which knows nothing of time steps and contact, then its input, then the run.
 
@@ -55,7 +56,8 @@ impl System<f64> for Truss {
         Mass::Lumped(&self.mass)
     }
 
-    /// External minus internal force. The internal force of a bar is ∂/∂u of ½ EA L e², N x/L on its ends with N = EA e.
+    /// External minus internal force. The internal force of a bar is ∂/∂u of ½ EA L e², N x/L on its ends with N = EA
+    /// e.
     fn force(&mut self, _t: f64, u: &[f64], _v: &[f64], out: &mut [f64]) -> Result<()> {
         out.copy_from_slice(&self.weight);
         for &[i, j] in &self.bars {
@@ -161,8 +163,8 @@ fn main() -> Result<()> {
     // Thrown to the right, turning with 1 rad/s about the first node.
     let velocity = nodes.iter().flat_map(|[x, y]| [3.0 - (y - nodes[0][1]), x - nodes[0][0]]).collect();
     let h = 0.01;
-    // This scheme keeps energy at any step size: what is lost, contact has taken. `Composite` or `Newmark` fit here as well;
-    // they change it a little in every step, and the last assertion below does not hold for them.
+    // This scheme keeps energy at any step size: what is lost, contact has taken. `Composite` or `Newmark` fit here as
+    // well; they change it a little in every step, and the last assertion below does not hold for them.
     let mut run = Simulation::builder(&mut truss, EnergyMomentum, h)
         .velocity(velocity)
         .constraint(NodesOnObstacle::new(floor, &nodes, &node_dofs, &(0..count).collect::<Vec<_>>())?)
@@ -191,7 +193,8 @@ fn main() -> Result<()> {
         // Persistent contact is a plastic impact of the mass that lands: that much energy, and no more, is lost.
         landings += landed.iter().map(|node| 0.5 * MASS * v[2 * node + 1].powi(2)).sum::<f64>();
         impulse += contacts.impulses().iter().sum::<f64>();
-        // Where a node has just landed this may be a pull: it is what keeps the contact closed; raw forces decide release.
+        // Where a node has just landed this may be a pull: it is what keeps the contact closed; raw forces decide
+        // release.
         let force: f64 = contacts.forces().iter().sum();
         let height = height(run.state().displacement());
         let before = std::mem::replace(&mut energy, run.energy().total() + weight * height);

@@ -76,8 +76,8 @@ struct Ball {
     energy: f64,
 }
 
-/// An elastic ball that falls on a plane at the speed for which Hertz' contact radius is `contact`, with so many elements
-/// across that radius; a quarter of it, with symmetry on two planes.
+/// An elastic ball that falls on a plane at the speed for which Hertz' contact radius is `contact`, with so many
+/// elements across that radius; a quarter of it, with symmetry on two planes.
 fn ball(contact: f64, across: usize, cells: [usize; 3]) -> Result<Ball, Box<dyn Error>> {
     let radius = 1.0;
     let finest = contact / across as f64;

@@ -1,7 +1,7 @@
 //! A host's own linear solver: the sparse Cholesky factorization of another crate behind `LinearSolver`.
 //!
-//! `cargo run --release --example host_solver` drops a block on a floor with it, with the solver of this crate, and with conjugate
-//! gradients, and prints how far the runs are apart; with `--quick` the block is smaller.
+//! `cargo run --release --example host_solver` drops a block on a floor with it, with the solver of this crate, and
+//! with conjugate gradients, and prints how far the runs are apart; with `--quick` the block is smaller.
 //!
 //! What a host has to write is the first half: memory for a pattern, a factorization, a solve, and what errors mean.
 
@@ -33,8 +33,8 @@ impl std::fmt::Debug for Factor {
 }
 
 impl LinearSolver<f64> for Theirs {
-    /// `_last` are the dofs of contact: a solver that eliminates them last could offer a `Condensation`. This one does not,
-    /// and contact is solved with full solves.
+    /// `_last` are the dofs of contact: a solver that eliminates them last could offer a `Condensation`. This one does
+    /// not, and contact is solved with full solves.
     fn analyze(
         &self,
         pattern: SymbolicSparseColMatRef<'_, usize>,
@@ -73,8 +73,8 @@ impl Factorization<f64> for Factor {
     }
 }
 
-/// Errors of the other crate. `Error::Host` ends a run; what a smaller step may mend would be `Error::Inadmissible`, for which
-/// `StepControl` halves the step. In both the step is undone.
+/// Errors of the other crate. `Error::Host` ends a run; what a smaller step may mend would be `Error::Inadmissible`,
+/// for which `StepControl` halves the step. In both the step is undone.
 fn refused(source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
     Error::Host { callback: "linear solver", source: source.into() }
 }

@@ -1,5 +1,5 @@
-//! A host that keeps its own time loop, Newton iteration and solver, and takes three parts from the crate: the table of a
-//! scheme, the solver of contact problems, and the correction of velocity and acceleration.
+//! A host that keeps its own time loop, Newton iteration and solver, and takes three parts from the crate: the table of
+//! a scheme, the solver of contact problems, and the correction of velocity and acceleration.
 //!
 //! Two chains of masses with hardening springs fly at a wall, the second one at the first.
 //! `cargo run --release --example own_loop` runs this loop with three schemes, and compares it with `Simulation`.
@@ -22,8 +22,8 @@ const ROWS: [(&[(usize, f64)], f64); 2] = [(&[(0, 1.0)], 0.05), (&[(5, -1.0), (6
 /// What of a gap is rounding, where displacements are of order 1.
 const ROUNDING: f64 = 1e-14;
 
-/// f(u), external minus internal force, of springs with the force 400 (e + 20 e³), and K = −∂f/∂u. K is tridiagonal; its
-/// columns one after another are K_00, K_10, K_01, K_11, K_21, K_12, K_22 …
+/// f(u), external minus internal force, of springs with the force 400 (e + 20 e³), and K = −∂f/∂u. K is tridiagonal;
+/// its columns one after another are K_00, K_10, K_01, K_11, K_21, K_12, K_22 …
 fn springs(u: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let (mut f, mut k) = (vec![0.0; NODES], vec![0.0; 3 * NODES - 2]);
     for i in (0..NODES - 1).filter(|&i| i != 5) {
@@ -159,13 +159,13 @@ impl Loop {
         Err("Newton's method does not converge".into())
     }
 
-    /// Makes velocity and acceleration agree with the contact, in this order: damping forces, if there were any, would follow
-    /// the new velocity first. S = G M⁻¹ Gᵀ is diagonal here, so one-sided conditions need no contact solver.
+    /// Makes velocity and acceleration agree with the contact, in this order: damping forces, if there were any, would
+    /// follow the new velocity first. S = G M⁻¹ Gᵀ is diagonal here, so one-sided conditions need no contact solver.
     ///
     /// (Where a contact closes, multistep schemes want what `Tableau::read_after` names of the past projected as well.)
     fn correct(&mut self, [u, v, a]: &mut Motion) {
-        // Closed is what is pressed, and what touches: within rounding and a sliver of one step's approach. Of the latter,
-        // what separates is left alone.
+        // Closed is what is pressed, and what touches: within rounding and a sliver of one step's approach. Of the
+        // latter, what separates is left alone.
         let Self { h, stage, g, projection, raw, force, .. } = self;
         let touches = |row| g.product(row, u) + ROWS[row].1 <= ROUNDING + 1e-10 * *h * g.product(row, v).abs();
         let closed: Vec<_> = (0..ROWS.len()).filter(|&row| raw[row] > 0.0 || touches(row)).collect();
@@ -179,7 +179,8 @@ impl Loop {
         // v ← v − M⁻¹Gᵀ S⁻¹ G v, and then a ← a − M⁻¹Gᵀ y with y = S⁻¹ G a.
         let (engaged, _) = project(closed, v);
         let (engaged, y) = project(engaged, a);
-        // With that the balance holds for the force p′ = p − w_ā/w_a y, which is reported; p decides when a contact opens.
+        // With that the balance holds for the force p′ = p − w_ā/w_a y, which is reported; p decides when a contact
+        // opens.
         *force = *raw;
         for (row, y) in engaged.into_iter().zip(y) {
             force[row] -= stage.balance.a.z / stage.recovery.a.z * y;

@@ -19,7 +19,8 @@ pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
-/// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not have.
+/// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not
+/// have.
 fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D]], nodes: &[usize]) -> Result<()> {
     let count = coordinates.len();
     if dofs.len() != count {
@@ -70,9 +71,10 @@ pub struct GapRates<T> {
 
 /// A constraint `g(t, u) ≥ 0` (or = 0) on the displacements, with as many rows as it has candidates.
 ///
-/// Between two calls of [`search`](Self::search) or [`follow`](Self::follow) gaps are affine in u, `g = G u + g0(t)`. They are
-/// linearized by the search where a step begins, and followed to where it imposes contact and where its balance holds. Evaluations are pure. Signs: g > 0 is open; the contact force on the system is
-/// Gᵀ λ, λ > 0 in compression.
+/// Between two calls of [`search`](Self::search) or [`follow`](Self::follow) gaps are affine in u, `g = G u + g0(t)`.
+/// They are linearized by the search where a step begins, and followed to where it imposes contact and where its
+/// balance holds. Evaluations are pure. Signs: g > 0 is open; the contact force on the system is Gᵀ λ, λ > 0 in
+/// compression.
 pub trait ContactConstraint<T: Real>: Send {
     /// The largest number of candidates there can ever be: memory is reserved for it.
     fn max_candidates(&self) -> usize;
@@ -87,9 +89,9 @@ pub trait ContactConstraint<T: Real>: Send {
     /// Whatever is wrong with it, for instance [`Error::MissingDof`].
     fn check(&self, dofs: usize) -> Result<()>;
 
-    /// Appends every dof that a row may ever act on or a gap depend on (repetitions allowed), whatever later searches find:
-    /// the solver eliminates these last, so that contact works on them alone. Asked once, after a search where the run
-    /// starts. Default: the dofs of the rows which that has found.
+    /// Appends every dof that a row may ever act on or a gap depend on (repetitions allowed), whatever later searches
+    /// find: the solver eliminates these last, so that contact works on them alone. Asked once, after a search where
+    /// the run starts. Default: the dofs of the rows which that has found.
     fn dofs(&self, out: &mut Vec<usize>) {
         let mut g = ContactJacobian::default();
         self.jacobian(&mut g);
@@ -98,9 +100,9 @@ pub trait ContactConstraint<T: Real>: Send {
 
     /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change.
     ///
-    /// `ahead` (time) is how far from t on contact is looked at before the next search: the step that begins, and what the
-    /// scheme looks ahead beyond it; zero where no step does. A constraint that takes only what is near takes at least
-    /// what v brings near in that time. Returns whether candidates or G changed since the last call.
+    /// `ahead` (time) is how far from t on contact is looked at before the next search: the step that begins, and what
+    /// the scheme looks ahead beyond it; zero where no step does. A constraint that takes only what is near takes at
+    /// least what v brings near in that time. Returns whether candidates or G changed since the last call.
     ///
     /// # Errors
     ///
@@ -110,37 +112,37 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Candidates::Unchanged)
     }
 
-    /// Looks at a step before it is accepted: bodies that have gone through each other are refused here, or contacts found
-    /// along a normal that is not that of the place where they happen. Candidates are those of the search at the start of
-    /// the step. Default: nothing is refused.
+    /// Looks at a step before it is accepted: bodies that have gone through each other are refused here, or contacts
+    /// found along a normal that is not that of the place where they happen. Candidates are those of the search at the
+    /// start of the step. Default: nothing is refused.
     ///
     /// # Errors
     ///
-    /// [`Error::PassedThrough`], which a smaller step mends (the constraint's index in the contact's name is filled in by the
-    /// caller), or the host's own.
+    /// [`Error::PassedThrough`], which a smaller step mends (the constraint's index in the contact's name is filled in
+    /// by the caller), or the host's own.
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let _ = step;
         Ok(())
     }
 
-    /// Moves the linearization of the candidates there are to u: G, gaps and rates are then those of the gap functions at
-    /// u. Called within a step, between two searches, any number of times and for several u; candidates and their order stay as they are.
-    /// Default: gaps are affine, nothing moves.
+    /// Moves the linearization of the candidates there are to u: G, gaps and rates are then those of the gap functions
+    /// at u. Called within a step, between two searches, any number of times and for several u; candidates and their
+    /// order stay as they are. Default: gaps are affine, nothing moves.
     ///
     /// Returns whether G changed.
     ///
     /// # Errors
     ///
     /// [`Error::ContactLost`] if a candidate has left what the last search knows of its surroundings,
-    /// [`Error::ContactNotFinite`] if it has no normal there (the constraint's index in the contact's name is filled in by the
-    /// caller), or the host's own.
+    /// [`Error::ContactNotFinite`] if it has no normal there (the constraint's index in the contact's name is filled in
+    /// by the caller), or the host's own.
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         let _ = (t, u);
         Ok(Candidates::Unchanged)
     }
 
-    /// Whether [`follow`](Self::follow) never moves anything, because gaps are affine in u between two searches: a run in which
-    /// all are saves the looking. Default: not known to be.
+    /// Whether [`follow`](Self::follow) never moves anything, because gaps are affine in u between two searches: a run
+    /// in which all are saves the looking. Default: not known to be.
     fn is_affine(&self) -> bool {
         false
     }
@@ -154,22 +156,22 @@ pub trait ContactConstraint<T: Real>: Send {
     /// The law of a row.
     fn law(&self, row: usize) -> ContactLaw;
 
-    /// The size of what is summed to the gap of a row besides G u and the gap itself, for instance coordinates (length):
-    /// contact takes gaps for zero within the rounding of it. Default: nothing.
+    /// The size of what is summed to the gap of a row besides G u and the gap itself, for instance coordinates
+    /// (length): contact takes gaps for zero within the rounding of it. Default: nothing.
     fn magnitude(&self, row: usize) -> T {
         let _ = row;
         T::zero()
     }
 
-    /// Appends the rows of G, one [`ContactJacobian::push`] a candidate: those that the last search has found. It is not
-    /// called before the first one.
+    /// Appends the rows of G, one [`ContactJacobian::push`] a candidate: those that the last search has found. It is
+    /// not called before the first one.
     fn jacobian(&self, out: &mut ContactJacobian<T>);
 
     /// The gaps at t and u, one a candidate (length).
     fn gap(&mut self, t: f64, u: &[T], out: &mut [T]);
 
-    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: none, for gaps that nothing moves but u;
-    /// a gap that changes in time while its rates are zero is refused ([`Error::SilentMotion`]).
+    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: none, for gaps that nothing moves
+    /// but u; a gap that changes in time while its rates are zero is refused ([`Error::SilentMotion`]).
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
         let _ = (t, u, v);
         out.fill(GapRates::default());
@@ -251,14 +253,14 @@ impl<'a, T> Stride<'a, T> {
     }
 }
 
-/// Whether the direction in which a body comes presses on two normals so differently that the impact along one is not that
-/// along the other: the shares of its kinetic energy that a plastic impact takes differ by more than a tenth.
+/// Whether the direction in which a body comes presses on two normals so differently that the impact along one is not
+/// that along the other: the shares of its kinetic energy that a plastic impact takes differ by more than a tenth.
 pub(crate) fn press_differently(directions: [f64; 2]) -> bool {
     (directions[0] * directions[0] - directions[1] * directions[1]).abs() > 0.1
 }
 
-/// Share of the way that must lead into a body for a contact to be missed if it comes out again: the cosine of the angle
-/// to the inward normal where it enters. An impact below it would have taken a sixteenth of the energy.
+/// Share of the way that must lead into a body for a contact to be missed if it comes out again: the cosine of the
+/// angle to the inward normal where it enters. An impact below it would have taken a sixteenth of the energy.
 pub(crate) const STEEP: f64 = 0.25;
 
 /// Cosine of the largest turn of a normal in a step in which its contact presses: 30 degrees.

@@ -35,9 +35,9 @@ impl From<ContactLaw> for Bound {
 
 /// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
 ///
-/// W is the Delassus operator (positive semidefinite; definite on independent rows), with the compliances of the laws on its
-/// diagonal. It is as symmetric as the effective matrix A: W = G A⁻¹ Gᵀ. y has the unit of a gap, and so have the tolerances: a residual compares y_i with W_ii λ_i,
-/// never meters with newtons.
+/// W is the Delassus operator (positive semidefinite; definite on independent rows), with the compliances of the laws
+/// on its diagonal. It is as symmetric as the effective matrix A: W = G A⁻¹ Gᵀ. y has the unit of a gap, and so have
+/// the tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactProblem<'a, T> {
     /// W row by row, size × size: entry (i, j), what λ_j adds to y_i, is at `i · size + j`.

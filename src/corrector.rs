@@ -64,8 +64,8 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
-    /// Whether it can act with a scheme where bodies have damping, or why not; asked once, at build, of such systems. Default:
-    /// it can.
+    /// Whether it can act with a scheme where bodies have damping, or why not; asked once, at build, of such systems.
+    /// Default: it can.
     ///
     /// # Errors
     ///

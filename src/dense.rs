@@ -2,8 +2,8 @@
 //! S = G M⁻¹ Gᵀ. LU for Delassus operators that are not symmetric.
 //!
 //! The size is the number of closed contacts. Rows that share no body leave zeros, and these are skipped, so that the
-//! diagonal S of a lumped mass costs next to nothing; large full matrices go to faer's blocked kernel. Redundant contacts
-//! make the matrix semidefinite: of all solutions the one of least norm is then returned.
+//! diagonal S of a lumped mass costs next to nothing; large full matrices go to faer's blocked kernel. Redundant
+//! contacts make the matrix semidefinite: of all solutions the one of least norm is then returned.
 
 use crate::memory::Scratch;
 use crate::real::{Real, kernels::Kernels};
@@ -12,7 +12,8 @@ use crate::real::{Real, kernels::Kernels};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DenseCholesky<T> {
     size: usize,
-    /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; of an LU both triangles row by row.
+    /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; of an LU both triangles
+    /// row by row.
     l: Vec<T>,
     /// First nonzero column of each row of L (its skyline); of an LU the row that each pivot was exchanged with.
     first: Vec<usize>,
@@ -57,8 +58,8 @@ impl<T: Real> DenseCholesky<T> {
 
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
-    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row, and so does one that is no
-    /// more than the rounding of the combination of rows that it measures. `Err(row)` if the
+    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row, and so does one
+    /// that is no more than the rounding of the combination of rows that it measures. `Err(row)` if the
     /// matrix is not finite or not semidefinite there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let Self { l, first, diagonal, independent, kind, reduced, scratch, .. } = self;
@@ -116,8 +117,8 @@ impl<T: Real> DenseCholesky<T> {
                 };
             }
             let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
-            // What is left may be more than the rounding of the row's own diagonal entry, and rounding all the same: that of the
-            // rows before it, divided by the roots of their pivots.
+            // What is left may be more than the rounding of the row's own diagonal entry, and rounding all the same:
+            // that of the rows before it, divided by the roots of their pivots.
             let sound = pivot > dependent * diagonal[i]
                 && (pivot > suspect * diagonal[i] || {
                     let length =
@@ -137,10 +138,11 @@ impl<T: Real> DenseCholesky<T> {
         Ok(())
     }
 
-    /// Factorizes a matrix that need not be symmetric, with entries `entry(i, j)` and a diagonal that is not negative, by LU with
-    /// partial pivoting. Rows and columns are measured by the roots of the diagonal.
+    /// Factorizes a matrix that need not be symmetric, with entries `entry(i, j)` and a diagonal that is not negative,
+    /// by LU with partial pivoting. Rows and columns are measured by the roots of the diagonal.
     ///
-    /// Where a pivot is lost in rounding the factorization is singular, and ends: it cannot be solved with. `Err(row)` as from
+    /// Where a pivot is lost in rounding the factorization is singular, and ends: it cannot be solved with. `Err(row)`
+    /// as from
     /// [`factorize`](Self::factorize).
     pub(crate) fn factorize_general(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let Self { l, first: exchanges, diagonal, independent, kind, .. } = self;
@@ -284,8 +286,9 @@ impl<T: Real> DenseCholesky<T> {
     }
 }
 
-/// Length of the combination r of independent rows that is nearest to a row, from its entries of L: r = L⁻ᵀ l, measured as
-/// Σ |r_j| √A_jj. The pivot is what A leaves of the difference, and the rounding of A enters it times the square of its length.
+/// Length of the combination r of independent rows that is nearest to a row, from its entries of L: r = L⁻ᵀ l, measured
+/// as Σ |r_j| √A_jj. The pivot is what A leaves of the difference, and the rounding of A enters it times the square of
+/// its length.
 fn combination<T: Real>(l: &[T], row: &[T], size: usize, independent: &[usize], diagonal: &[T], r: &mut Vec<T>) -> T {
     r.clear();
     r.extend(independent.iter().map(|&j| row[j]));

@@ -259,8 +259,8 @@ pub enum Error {
         /// The violation, in units of the gap.
         violation: f64,
     },
-    /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver is for
-    /// symmetric problems.
+    /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver
+    /// is for symmetric problems.
     #[error(
         "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is not \
          symmetric; solve contact by ActiveSet or GaussSeidel"
@@ -291,7 +291,7 @@ pub enum Error {
     /// A gap moves in time by itself, and its rates do not say so.
     #[error(
         "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its rates \
-         are zero; give \u{2202}g/\u{2202}t (`ContactConstraint::rates`, or the second entry of a moving offset or gap function), and check \
+         are zero; give ∂g/∂t (`ContactConstraint::rates`, or the second entry of a moving offset or gap function), and check \
          it with `verify::gap_jacobian`",
         .gap[0], .gap[1], .t[0], .t[1]
     )]
@@ -517,7 +517,8 @@ struct InStep {
     source: Box<dyn std::error::Error + Send + Sync>,
 }
 
-/// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot hold.
+/// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot
+/// hold.
 pub(crate) fn step_size<T: crate::real::Real>(h: f64) -> Result<()> {
     let fits = |x: f64| T::of(x).is_normal();
     match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {

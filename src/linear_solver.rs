@@ -43,8 +43,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     /// Analyzes a pattern (both triangles) and allocates everything a factorization needs.
     ///
-    /// `last` (ascending) are the dofs that contact may act on. A solver that eliminates them last, in this order or any
-    /// other, can offer [`Factorization::condensation`]; others ignore them.
+    /// `last` (ascending) are the dofs that contact may act on. A solver that eliminates them last, in this order or
+    /// any other, can offer [`Factorization::condensation`]; others ignore them.
     ///
     /// # Errors
     ///
@@ -138,13 +138,13 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Condensation<T: Real> {
-    /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the solution
-    /// on the interface. Does not allocate.
+    /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the
+    /// solution on the interface. Does not allocate.
     ///
     /// # Errors
     ///
-    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for the bodies that contact does not
-    /// touch by whatever solver they have).
+    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for the bodies that contact does
+    /// not touch by whatever solver they have).
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()>;
 
     /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
@@ -168,7 +168,8 @@ fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -
     }
 }
 
-/// What a matrix must share with the pattern that was analyzed: a fingerprint, for the pattern itself can be as large as a factor.
+/// What a matrix must share with the pattern that was analyzed: a fingerprint, for the pattern itself can be as large
+/// as a factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Fingerprint {
     dofs: usize,
@@ -214,11 +215,11 @@ impl Fingerprint {
 /// Columns of forces on the interface that are solved for at once without allocating.
 pub(crate) const COLUMNS: usize = 16;
 
-/// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, [`Tridiagonal`] for strings with contact
-/// at one end each, else [`Cholesky`].
+/// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, [`Tridiagonal`] for strings with
+/// contact at one end each, else [`Cholesky`].
 ///
-/// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many contacts
-/// press, which a pattern does not tell, and a factorization is exact to rounding at any step.
+/// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many
+/// contacts press, which a pattern does not tell, and a factorization is exact to rounding at any step.
 /// Nor [`Lu`]: whether values are symmetric a pattern does not say.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Automatic;

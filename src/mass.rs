@@ -1,5 +1,5 @@
-//! Mass matrices: lumping, blending, redistribution, singular ones, the Courant numbers of a mesh, and M⁻¹ on the degrees of
-//! freedom that are free to move and have a mass.
+//! Mass matrices: lumping, blending, redistribution, singular ones, the Courant numbers of a mesh, and M⁻¹ on the
+//! degrees of freedom that are free to move and have a mass.
 
 mod bipenalty;
 mod blend;

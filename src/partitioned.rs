@@ -1,4 +1,5 @@
-//! Contact between bodies that live in codes of their own: a frame between two sides, with localized Lagrange multipliers.
+//! Contact between bodies that live in codes of their own: a frame between two sides, with localized Lagrange
+//! multipliers.
 
 use crate::contact_solver::{ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
@@ -13,9 +14,9 @@ use crate::real::Real;
 pub struct Side<'a, T> {
     /// Values along the normals without contact.
     pub free: &'a [T],
-    /// Entry i + j n: what a unit force along the normal on node j adds to the value of node i (n nodes, symmetric, positive
-    /// semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix A of the body, for velocities
-    /// and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid obstacle.
+    /// Entry i + j n: what a unit force along the normal on node j adds to the value of node i (n nodes, symmetric,
+    /// positive semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix A of the
+    /// body, for velocities and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid obstacle.
     pub flexibility: &'a [T],
 }
 
@@ -31,8 +32,9 @@ pub struct Interface<T> {
 }
 
 impl<T: Real> Interface<T> {
-    /// The force l on each node, positive in compression (of either sign where [`Frame::hold`] holds): the second side gets +l
-    /// along the normal, the first −l. One vector for both multipliers: the frame has no mass, and balances them.
+    /// The force l on each node, positive in compression (of either sign where [`Frame::hold`] holds): the second side
+    /// gets +l along the normal, the first −l. One vector for both multipliers: the frame has no mass, and balances
+    /// them.
     pub fn forces(&self) -> &[T] {
         &self.forces
     }
@@ -53,8 +55,8 @@ impl<T: Real> Interface<T> {
         &self.gaps
     }
 
-    /// Where the sides touch: a force, or a gap that is rounding of the numbers it was computed from. (Of [`Frame::hold`]: the
-    /// nodes held.)
+    /// Where the sides touch: a force, or a gap that is rounding of the numbers it was computed from. (Of
+    /// [`Frame::hold`]: the nodes held.)
     pub fn closed(&self) -> &[bool] {
         &self.closed
     }
@@ -68,29 +70,30 @@ impl<T: Real> Interface<T> {
 /// A frame between two bodies whose contact nodes match: the interface problem of localized Lagrange multipliers (Park,
 /// Felippa, Gumaste, Comput. Mech. 24, 2000; with contact Rebel, Park, Felippa, Int. J. Numer. Methods Eng. 54, 2002).
 ///
-/// Each side s is tied to the frame by multipliers of its own, l_s, the frame has displacements x and no mass. With d_s the
-/// values of the sides under their forces, and all of the gap between the frame and the second side:
+/// Each side s is tied to the frame by multipliers of its own, l_s, the frame has displacements x and no mass. With d_s
+/// the values of the sides under their forces, and all of the gap between the frame and the second side:
 ///
 /// ```text
 /// d_1 = free_1 − F_1 l_1,   d_2 = free_2 + F_2 l_2
 /// 0 ≤ x − d_1 ⊥ l_1 ≥ 0,    0 ≤ d_2 + gap − x ⊥ l_2 ≥ 0,    l_1 − l_2 = 0 (equilibrium of the frame)
 /// ```
 ///
-/// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes. A
-/// body needs to know neither the other one nor its code: a step goes on with the forces found. Results are those of
+/// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes.
+/// A body needs to know neither the other one nor its code: a step goes on with the forces found. Results are those of
 /// the monolithic form up to rounding (`tests/partitioned.rs`).
 ///
-/// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one belongs
-/// to the first side. Three bodies that touch each other do not fit.
+/// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one
+/// belongs to the first side. Three bodies that touch each other do not fit.
 ///
 /// An explicit or implicit step of the host:
 ///
-/// 1. each body advances without contact, `free`, and solves for unit forces on its interface (once while its matrix stays);
+/// 1. each body advances without contact, `free`, and solves for unit forces on its interface (once while its matrix
+///    stays);
 /// 2. [`solve`](Self::solve);
 /// 3. each body adds the response to its forces;
 /// 4. if velocities (then accelerations) are to agree with the contact, as of
-///    [`PersistencyCorrection`](crate::PersistencyCorrection): [`hold`](Self::hold) on the closed nodes. A second frame for that
-///    keeps the factors of both.
+///    [`PersistencyCorrection`](crate::PersistencyCorrection): [`hold`](Self::hold) on the closed nodes. A second frame
+///    for that keeps the factors of both.
 ///
 /// ```
 /// use contact_dynamics::partitioned::{Frame, Side};
@@ -126,7 +129,8 @@ pub struct Frame<T: Real> {
 }
 
 impl<T: Real> Frame<T> {
-    /// A frame of so many nodes, solved by [`ActiveSet`]. A node of a tie in several directions counts once for each of them.
+    /// A frame of so many nodes, solved by [`ActiveSet`]. A node of a tie in several directions counts once for each of
+    /// them.
     ///
     /// # Errors
     ///
@@ -141,7 +145,8 @@ impl<T: Real> Frame<T> {
     ///
     /// [`Error::OutOfMemory`] if the dense problem of so many nodes does not fit.
     pub fn with_solver(nodes: usize, mut solver: impl ContactSolver<T> + 'static) -> Result<Self> {
-        // Asked for first, with what the solver takes (its `reserve` cannot fail): an absurd number is an error and not an abort.
+        // Asked for first, with what the solver takes (its `reserve` cannot fail): an absurd number is an error and not
+        // an abort.
         memory::reserve::<T>(nodes, nodes.saturating_mul(8), "a frame")?;
         let delassus = memory::reserve(nodes, nodes, "a frame")?;
         solver.reserve(nodes);
@@ -166,21 +171,21 @@ impl<T: Real> Frame<T> {
         })
     }
 
-    /// Contact: forces that press, on nodes whose gap would close. `gaps` are those at zero values of both sides, positive
-    /// when open.
+    /// Contact: forces that press, on nodes whose gap would close. `gaps` are those at zero values of both sides,
+    /// positive when open.
     ///
     /// Forces of the call before are the first guess; they may change the work, not the result. Does not allocate.
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`], [`Error::NotFinite`], [`Error::Asymmetric`] and [`Error::Singular`] (`dof` is the frame node) for
-    /// what the sides say, [`Error::Frame`] if no forces were found. The frame can be used again.
+    /// [`Error::Dimension`], [`Error::NotFinite`], [`Error::Asymmetric`] and [`Error::Singular`] (`dof` is the frame
+    /// node) for what the sides say, [`Error::Frame`] if no forces were found. The frame can be used again.
     pub fn solve(&mut self, sides: [Side<'_, T>; 2], gaps: &[T]) -> Result<&Interface<T>> {
         self.run(sides, gaps, None)
     }
 
-    /// Both sides together on the nodes of which `held` is true, whatever force that takes, and no force on the others: ties, and
-    /// jumps of velocity or acceleration (`gaps` zero), whose forces are then impulses or forces.
+    /// Both sides together on the nodes of which `held` is true, whatever force that takes, and no force on the others:
+    /// ties, and jumps of velocity or acceleration (`gaps` zero), whose forces are then impulses or forces.
     ///
     /// With flexibilities G M⁻¹Gᵀ this is the projection of [`JumpProjection`](crate::JumpProjection), S = F_1 + F_2:
     /// momentum is conserved, kinetic energy falls.

@@ -55,22 +55,23 @@ const TAPER: f64 = 0.15;
 const RADIUS: f64 = 0.9;
 
 impl Preset {
-    /// A smooth force at one solve a step: generalized-α of Chung and Hulbert with ρ∞ = 0.9, massless contact dofs, the blend of
-    /// masses whose dispersion makes up for the scheme's.
+    /// A smooth force at one solve a step: generalized-α of Chung and Hulbert with ρ∞ = 0.9, massless contact dofs, the
+    /// blend of masses whose dispersion makes up for the scheme's.
     pub fn smooth() -> Self {
         Self(Kind::Smooth)
     }
 
-    /// The best energy over many bounces, with a force as smooth: Bathe's scheme without dissipation (ρ∞ = 1, two solves a
-    /// step) on the same mass.
+    /// The best energy over many bounces, with a force as smooth: Bathe's scheme without dissipation (ρ∞ = 1, two
+    /// solves a step) on the same mass.
     pub fn conservative() -> Self {
         Self(Kind::Conservative)
     }
 
-    /// The cheapest step: central differences on a lumped mass, whose contact dofs have none: they follow the others statically,
-    /// so that nothing is stopped at first touch and impact costs no energy, at any Courant number up to 1. Nothing is factorized
-    /// but the stiffness of the contact dofs among themselves, once. For linear systems whose damping does not act on the contact
-    /// dofs (proportional to mass); contact dofs with mass take [`CdLagrange`] on [`mass::lump`] alone.
+    /// The cheapest step: central differences on a lumped mass, whose contact dofs have none: they follow the others
+    /// statically, so that nothing is stopped at first touch and impact costs no energy, at any Courant number up to 1.
+    /// Nothing is factorized but the stiffness of the contact dofs among themselves, once. For linear systems whose
+    /// damping does not act on the contact dofs (proportional to mass); contact dofs with mass take [`CdLagrange`] on
+    /// [`mass::lump`] alone.
     pub fn explicit() -> Self {
         Self(Kind::Explicit)
     }
@@ -91,17 +92,18 @@ impl Preset {
 
     /// The mass matrix, from the consistent one.
     ///
-    /// `contact` lists the dofs that become massless: those of the contact nodes, in the normal direction if it is along an
-    /// axis, otherwise in all. `groups` are those of [`mass::redistribute`]: one number a body and direction. `neighbors` is
-    /// the pattern of the stiffness matrix. `courant` is that of the elements at the contact, c h/h_e
+    /// `contact` lists the dofs that become massless: those of the contact nodes, in the normal direction if it is
+    /// along an axis, otherwise in all. `groups` are those of [`mass::redistribute`]: one number a body and direction.
+    /// `neighbors` is the pattern of the stiffness matrix. `courant` is that of the elements at the contact, c h/h_e
     /// ([`mass::courant`] estimates it); the blend follows from it, up to the consistent mass.
     ///
-    /// For [`explicit`](Self::explicit) the mass is lumped, and a matrix with a diagonal pattern; the Courant number is compared
-    /// with 1 only.
+    /// For [`explicit`](Self::explicit) the mass is lumped, and a matrix with a diagonal pattern; the Courant number is
+    /// compared with 1 only.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for a Courant number that is negative or not finite, or above 1 for an explicit scheme; those of
+    /// [`Error::Parameter`] for a Courant number that is negative or not finite, or above 1 for an explicit scheme;
+    /// those of
     /// [`mass::lump`], [`mass::blend`] and [`mass::redistribute_consistent`].
     pub fn mass<T: Real>(
         &self,

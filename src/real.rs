@@ -212,8 +212,8 @@ pub(crate) mod kernels {
         fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
         /// The backward sweep over `columns`; entries behind them hold the solution.
         fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
-        /// The forward sweep over the interior for one right-hand side `b`, of which each column finds its own entry through
-        /// `order`; `w` are the work vectors of the forest.
+        /// The forward sweep over the interior for one right-hand side `b`, of which each column finds its own entry
+        /// through `order`; `w` are the work vectors of the forest.
         fn forest_forward(
             factor: Supernodal<'_, Self>,
             forest: &Forest,
@@ -223,23 +223,23 @@ pub(crate) mod kernels {
         );
         /// The backward sweep over the interior.
         fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]);
-        /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots were
-        /// positive.
+        /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots
+        /// were positive.
         fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool;
         /// Scratch for [`dense_cholesky`](Self::dense_cholesky).
         fn dense_cholesky_scratch(size: usize) -> faer::dyn_stack::StackReq;
         /// Solves L Lᵀ x = b in place.
         fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]);
-        /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which become their inverses;
-        /// `Err` is the dof of a pivot that is not positive.
+        /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which become their
+        /// inverses; `Err` is the dof of a pivot that is not positive.
         fn scale_blocks(
             size: usize,
             pattern: (&[usize], &[u32]),
             values: &mut [Self],
             diagonal: &mut [Self],
         ) -> Result<(), usize>;
-        /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; says whether all pivots
-        /// were positive.
+        /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; says whether all
+        /// pivots were positive.
         fn incomplete_cholesky(
             size: usize,
             lower: &Blocks<'_, Self>,

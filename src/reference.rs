@@ -2,8 +2,8 @@
 //!
 //! [`CollidingBars`] solves the central impact of two linear elastic bars, or of a bar and a rigid wall, by the
 //! method of characteristics; [`single_oscillator`] and [`forced_oscillator`] are the textbook responses of one degree
-//! of freedom; [`PowerLawImpact`] is Hertz' impact, [`BouncingBar`] an elastic bar that falls on a wall again and again.
-//! Units are the caller's and need only be consistent.
+//! of freedom; [`PowerLawImpact`] is Hertz' impact, [`BouncingBar`] an elastic bar that falls on a wall again and
+//! again. Units are the caller's and need only be consistent.
 //!
 //! # Method of characteristics
 //!

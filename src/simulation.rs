@@ -185,13 +185,13 @@ impl<'a, T: Real> Simulation<'a, T> {
         SimulationBuilder::new(Box::new(system), Box::new(integrator), h)
     }
 
-    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time that rounds
-    /// to the number before `t` is `t`.
+    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time
+    /// that rounds to the number before `t` is `t`.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step), and [`Error::EnergyNotFinite`] if an observer
-    /// that asks for the energy would be shown one that is no number; the step before it is taken.
+    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step), and [`Error::EnergyNotFinite`] if an
+    /// observer that asks for the energy would be shown one that is no number; the step before it is taken.
     pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
@@ -244,8 +244,9 @@ impl<'a, T: Real> Simulation<'a, T> {
         &self.statistics
     }
 
-    /// What was moved when the simulation was built: dofs without mass that were not in static balance with the others, the load
-    /// and contact. Left there they would jump in the first step, and take their energy with them unseen. None if nothing was.
+    /// What was moved when the simulation was built: dofs without mass that were not in static balance with the others,
+    /// the load and contact. Left there they would jump in the first step, and take their energy with them unseen. None
+    /// if nothing was.
     pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
         self.adjustment
     }
@@ -260,8 +261,8 @@ impl<'a, T: Real> Simulation<'a, T> {
         &*self.system
     }
 
-    /// The iterations of Newton's method in the stage that was solved last, also if it failed; empty for linear systems and
-    /// for stages that are linear in their unknown.
+    /// The iterations of Newton's method in the stage that was solved last, also if it failed; empty for linear systems
+    /// and for stages that are linear in their unknown.
     ///
     /// ```
     /// # use contact_dynamics::{LinearSystem, Newmark, Simulation};
@@ -302,8 +303,8 @@ impl<'a, T: Real> Simulation<'a, T> {
         if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
     }
 
-    /// Calls what calls the host and changes the run. Should the host panic, state and history are put back before the panic goes
-    /// on; if somebody catches it, later calls are refused.
+    /// Calls what calls the host and changes the run. Should the host panic, state and history are put back before the
+    /// panic goes on; if somebody catches it, later calls are refused.
     fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
         self.check_sound()?;
         // Nothing half done is seen: what is undone below is all that was swapped, and the rest is refused.

@@ -27,7 +27,8 @@ pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatR
     }
 }
 
-/// Refuses patterns of effective matrices that are not square, and those that [`check_pattern`] does; gives the number of dofs.
+/// Refuses patterns of effective matrices that are not square, and those that [`check_pattern`] does; gives the number
+/// of dofs.
 pub(crate) fn check_effective_pattern(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<usize> {
     let (rows, columns) = (pattern.nrows(), pattern.ncols());
     if rows != columns {
@@ -49,8 +50,8 @@ pub(crate) enum Symmetry {
     General,
 }
 
-/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries. One with entries on one side
-/// of the diagonal alone is taken for half of a symmetric one, and refused.
+/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries. One with entries
+/// on one side of the diagonal alone is taken for half of a symmetric one, and refused.
 pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<Symmetry> {
     let stored = |side: fn(&usize, &usize) -> bool| {
         (0..a.ncols()).any(|column| a.row_idx_of_col_raw(column).iter().any(|row| side(row, &column)))
@@ -161,8 +162,8 @@ fn kept_as_it_is(source: SymbolicSparseColMatRef<'_, usize>, pointers: &[usize],
 #[derive(Debug)]
 pub(crate) struct Combination {
     pattern: SymbolicSparseColMat<usize>,
-    /// For each source, the slot of each of its entries, `DROPPED` on the rows and columns left out; none where a source has
-    /// this pattern itself, as a stiffness matrix without supports does.
+    /// For each source, the slot of each of its entries, `DROPPED` on the rows and columns left out; none where a
+    /// source has this pattern itself, as a stiffness matrix without supports does.
     slots: Vec<Option<Vec<usize>>>,
     diagonal: Vec<usize>,
     identity: Vec<usize>,

@@ -192,11 +192,12 @@ impl<T: Real> ContactState<T> {
         &self.gap
     }
 
-    /// Contact forces, compression positive: those of the instant of the state, after correction, so that M a = f + Gᵀ λ there.
+    /// Contact forces, compression positive: those of the instant of the state, after correction, so that M a = f + Gᵀ
+    /// λ there.
     ///
-    /// They are values, not means over the step: summed over the steps, times h, they are not the change of momentum. The
-    /// force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a coarse
-    /// block). [`impulses`](Self::impulses) close to rounding.
+    /// They are values, not means over the step: summed over the steps, times h, they are not the change of momentum.
+    /// The force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a
+    /// coarse block). [`impulses`](Self::impulses) close to rounding.
     pub fn forces(&self) -> &[T] {
         &self.lambda
     }
@@ -211,8 +212,8 @@ impl<T: Real> ContactState<T> {
         &self.closed
     }
 
-    /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change of the
-    /// momentum that the scheme conserves ([`Simulation::momentum`](crate::Simulation::momentum)), to rounding.
+    /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change
+    /// of the momentum that the scheme conserves ([`Simulation::momentum`](crate::Simulation::momentum)), to rounding.
     pub fn impulses(&self) -> &[T] {
         &self.impulse
     }
@@ -228,8 +229,8 @@ impl<T: Real> ContactState<T> {
         &self.lambda_a
     }
 
-    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in the
-    /// frame of the obstacle, where there is one that moves.
+    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in
+    /// the frame of the obstacle, where there is one that moves.
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
     }
@@ -346,8 +347,8 @@ impl<T: Real> History<T> {
     }
 }
 
-/// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin does
-/// not round: runs are the same whenever they start.
+/// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin
+/// does not round: runs are the same whenever they start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clock {
     /// Time at the start of the run.
@@ -388,7 +389,8 @@ impl Clock {
         t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
     }
 
-    /// Refuses a step size that does not change the time: host functions of time would stand still while the motion goes on.
+    /// Refuses a step size that does not change the time: host functions of time would stand still while the motion
+    /// goes on.
     pub(crate) fn check(&self) -> Result<()> {
         let (t, h) = (self.at(0.0), self.h);
         match h >= resolution(t) {

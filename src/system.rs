@@ -61,17 +61,18 @@ pub enum Linearity {
 ///
 /// Vectors have full length, supports included; the solver reads prescribed dofs from [`prescribed`](Self::prescribed)
 /// and never solves for them. Evaluations are pure: they may use scratch, but two calls with the same arguments give
-/// the same result; only [`commit`](Self::commit) moves history. M is constant and symmetric. A tangent that is not symmetric takes
+/// the same result; only [`commit`](Self::commit) moves history. M is constant and symmetric. A tangent that is not
+/// symmetric takes
 /// [`Lu`](crate::Lu) as the linear solver; the default one refuses it.
 ///
 /// A host writes five methods: [`dofs`](Self::dofs), [`mass`](Self::mass), [`force`](Self::force),
 /// [`pattern`](Self::pattern) and [`tangent`](Self::tangent) (compared with differences of the force by
-/// [`verify::tangent`](crate::verify::tangent)); the others have defaults. `&mut S` is a system too, so a host lends its
-/// model. Hosts with constant matrices take [`LinearSystem`].
+/// [`verify::tangent`](crate::verify::tangent)); the others have defaults. `&mut S` is a system too, so a host lends
+/// its model. Hosts with constant matrices take [`LinearSystem`].
 ///
 /// A force that cannot be evaluated at a trial state, because an element is turned inside out for instance, is
-/// [`Error::Inadmissible`](crate::Error::Inadmissible) with the name of the method as its `callback`: the step is undone, and
-/// may be taken again with a smaller h.
+/// [`Error::Inadmissible`](crate::Error::Inadmissible) with the name of the method as its `callback`: the step is
+/// undone, and may be taken again with a smaller h.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -123,8 +124,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// The mass matrix (constant), not negative. Prescribed dofs may have none, other dofs with schemes that take it
-    /// ([`massless_factor`](crate::analysis::massless_factor); of the explicit ones central differences and Noh–Bathe's, for linear
-    /// systems).
+    /// ([`massless_factor`](crate::analysis::massless_factor); of the explicit ones central differences and
+    /// Noh–Bathe's, for linear systems).
     fn mass(&self) -> Mass<'_, T>;
 
     /// `out = f(t, u, v)`: external minus internal force, `out` holding anything on entry.
@@ -135,7 +136,8 @@ pub trait System<T: Real>: Send {
     /// [`Error::Host`](crate::Error::Host); the `callback` of either is the name of the method, here `"force"`.
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()>;
 
-    /// Pattern of K and C together, both triangles (not necessarily of one shape, for [`Lu`](crate::Lu)), rows sorted in each column; it never changes.
+    /// Pattern of K and C together, both triangles (not necessarily of one shape, for [`Lu`](crate::Lu)), rows sorted
+    /// in each column; it never changes.
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize>;
 
     /// `out = weights.stiffness K + weights.damping C` at (t, u, v), with K = −∂f/∂u and C = −∂f/∂v: the values of the
@@ -147,9 +149,9 @@ pub trait System<T: Real>: Send {
     fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()>;
 
     /// `out = f` of a step along a path whose internal work is the change of the potential,
-    /// f_int · (to − from) = V(to) − V(from), for [`EnergyMomentum`](crate::EnergyMomentum); t and v are those of the middle.
-    /// As in [`force`](Self::force) the whole force is asked for: the external load at t, minus that internal force, minus the
-    /// damping force at the mean v.
+    /// f_int · (to − from) = V(to) − V(from), for [`EnergyMomentum`](crate::EnergyMomentum); t and v are those of the
+    /// middle. As in [`force`](Self::force) the whole force is asked for: the external load at t, minus that internal
+    /// force, minus the damping force at the mean v.
     /// For St. Venant–Kirchhoff materials it is the force of the mean stress ½ (S(from) + S(to)) on the mean
     /// configuration, which conserves angular momentum too. Default: none; the forces at start, middle and end are then
     /// averaged by the potential.
@@ -163,8 +165,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
-    /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The exact one is not
-    /// symmetric and takes [`Lu`](crate::Lu); without it K must be symmetric.
+    /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The
+    /// exact one is not symmetric and takes [`Lu`](crate::Lu); without it K must be symmetric.
     /// C is −∂f/∂v, as in [`tangent`](Self::tangent). Default: the tangent at the mean.
     /// Without `force_along` it is not asked for: the tangent is then that of Simpson's rule.
     ///
@@ -190,27 +192,27 @@ pub trait System<T: Real>: Send {
     }
 
     /// Elastic energy (½ uᵀ K u if it is linear), if the system has one; none by default. The potential of loads is not
-    /// part of it. Internal forces whose K is not symmetric have none: say none, and the balance does not take their work for
-    /// energy.
+    /// part of it. Internal forces whose K is not symmetric have none: say none, and the balance does not take their
+    /// work for energy.
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let _ = u;
         None
     }
 
     /// `out =` the part of the force that depends on t alone, for the energy balance and for
-    /// [`EnergyMomentum`](crate::EnergyMomentum) without [`force_along`](Self::force_along); [`force`](Self::force) contains
-    /// it. The default is no load. Loads that follow u have no place here, and no line in the energy balance: what they
-    /// do is in its remainder. `EnergyMomentum` would take them for internal forces; with such loads give
+    /// [`EnergyMomentum`](crate::EnergyMomentum) without [`force_along`](Self::force_along); [`force`](Self::force)
+    /// contains it. The default is no load. Loads that follow u have no place here, and no line in the energy balance:
+    /// what they do is in its remainder. `EnergyMomentum` would take them for internal forces; with such loads give
     /// [`force_along`](Self::force_along).
     fn external_load(&mut self, t: f64, out: &mut [T]) {
         let _ = t;
         out.fill(T::zero());
     }
 
-    /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or a bound above it, if the host knows one; none by
-    /// default. Explicit schemes are refused beyond the step that it allows. Without it the frequency is estimated when a
-    /// simulation is built: from the tangent, or for an empty [`pattern`](Self::pattern) by differences of the force, some
-    /// evaluations of which this saves.
+    /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or a bound above it, if the host knows one;
+    /// none by default. Explicit schemes are refused beyond the step that it allows. Without it the frequency is
+    /// estimated when a simulation is built: from the tangent, or for an empty [`pattern`](Self::pattern) by
+    /// differences of the force, some evaluations of which this saves.
     fn highest_frequency(&mut self) -> Option<f64> {
         None
     }

@@ -196,8 +196,8 @@ pub enum StageForce {
     /// f(t̄, ū, v̄).
     #[default]
     AtBalance,
-    /// The force whose internal work from the last state to that of the stage is the change of the potential; ū must be the
-    /// mean of the two.
+    /// The force whose internal work from the last state to that of the stage is the change of the potential; ū must be
+    /// the mean of the two.
     AlongPath,
 }
 
@@ -277,8 +277,8 @@ impl Stage {
         self.balance == self.recovery
     }
 
-    /// Change of (U, V, A) of the stage by a unit multiplier on a unit mass, in units of h². The balance asks for w_ā of the
-    /// unknown, so a multiplier moves the rows by their weights over that of the balance's acceleration.
+    /// Change of (U, V, A) of the stage by a unit multiplier on a unit mass, in units of h². The balance asks for w_ā
+    /// of the unknown, so a multiplier moves the rows by their weights over that of the balance's acceleration.
     pub(crate) fn response(&self) -> [f64; 3] {
         self.recovery.each().map(|row| row.z / self.balance.a.z)
     }
@@ -561,8 +561,8 @@ impl Momentum {
     }
 }
 
-/// β of a stage with this [`response`](Stage::response), and with this covector when it is done: a raw multiplier λ changes the
-/// momentum by h β λ.
+/// β of a stage with this [`response`](Stage::response), and with this covector when it is done: a raw multiplier λ
+/// changes the momentum by h β λ.
 pub(crate) fn impulse_weight(response: [f64; 3], covector: &[[f64; 3]]) -> f64 {
     response.iter().zip(covector[0]).map(|(change, psi)| change * psi).sum()
 }

@@ -5,8 +5,8 @@ use faer::Par;
 /// Scalars of a factor from which on a thread of its own is worth waking: a tenth of a millisecond of reading.
 pub(crate) const GRAIN: usize = 1 << 18;
 
-/// How faer is to compute a factor of so many scalars: with all threads of the present pool with the feature `rayon` if it
-/// is large, else with one.
+/// How faer is to compute a factor of so many scalars: with all threads of the present pool with the feature `rayon` if
+/// it is large, else with one.
 #[cfg(feature = "rayon")]
 pub(crate) fn parallelism(scalars: usize) -> Par {
     /// Below, threads wait for each other longer than they work.

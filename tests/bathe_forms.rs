@@ -54,9 +54,10 @@ fn run(scheme: Box<dyn TimeIntegrator>, phase: f64, correction: Option<Persisten
     found.unwrap()
 }
 
-/// Nothing edited between the stages, or the past with it: one scheme in two forms. Edited by a correction alone, the forms part
-/// in the step of impact, if that is in the first stage: the second one of `Bathe` holds, by its raw multiplier, the
-/// approach that the velocity before the step still has, and the correction takes that out of the force.
+/// Nothing edited between the stages, or the past with it: one scheme in two forms. Edited by a correction alone, the
+/// forms part in the step of impact, if that is in the first stage: the second one of `Bathe` holds, by its raw
+/// multiplier, the approach that the velocity before the step still has, and the correction takes that out of the
+/// force.
 #[test]
 fn the_forms_of_the_second_stage_part_where_a_correction_edits_the_first() {
     for gamma in [2.0 - std::f64::consts::SQRT_2, 0.5] {

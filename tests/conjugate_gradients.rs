@@ -485,7 +485,8 @@ fn a_step_is_undone_whichever_of_its_solves_fails() {
         let before = run.state().clone();
         let mut refused = 0;
         loop {
-            // Responses that have been solved for are kept: the count of solves is not that of a step that succeeds at once.
+            // Responses that have been solved for are kept: the count of solves is not that of a step that succeeds at
+            // once.
             refusing.0.store(refused, Ordering::Relaxed);
             match run.step() {
                 Ok(()) => break,

@@ -453,8 +453,8 @@ fn problems_without_a_solution_are_refused() {
     }
 }
 
-/// The last row is a negative combination of the others, and cannot be met by a share of the offsets: however small this is beside
-/// the condition of W, in whatever unit each row is, nobody accepts it. Without the share all is well.
+/// The last row is a negative combination of the others, and cannot be met by a share of the offsets: however small
+/// this is beside the condition of W, in whatever unit each row is, nobody accepts it. Without the share all is well.
 #[test]
 fn small_contradictions_among_nearly_dependent_rows_are_no_rounding() {
     let (mut numbers, mut active, mut pivoting) = (Random(13), ActiveSet::default(), Pivoting::default());

@@ -262,8 +262,8 @@ fn wave_release_is_the_impulse_of_the_last_force() {
     assert!((jump - 0.5 * 0.04 * 7.0 / 2.0).abs() < 1e-12, "{jump}");
 }
 
-/// Two masses pressed together by loads that turn around: the gap opens at the rate that the impedances say, and the momentum
-/// of both together is that of the loads.
+/// Two masses pressed together by loads that turn around: the gap opens at the rate that the impedances say, and the
+/// momentum of both together is that of the loads.
 #[test]
 fn impedances_give_the_rate_of_opening_and_take_no_momentum() {
     let masses = [2.0, 0.3];

@@ -61,7 +61,8 @@ fn chain(damped: Damped, x: f64, h: f64) -> LinearSystem<'static, f64> {
     system.load(move |_, f| f.iter_mut().zip(&weights).for_each(|(f, m)| *f = -GRAVITY * m))
 }
 
-/// The highest energy, over that of the start, of a chain that falls on a floor and bounces; none if the corrections are refused.
+/// The highest energy, over that of the start, of a chain that falls on a floor and bounces; none if the corrections
+/// are refused.
 fn highest(listed: &Listed, correctors: Correctors, damped: Damped, x: f64, h: f64, phase: f64) -> Option<f64> {
     let height = 0.3 + phase * h;
     let run = Simulation::builder(chain(damped, x, h), (listed.make)(), h)

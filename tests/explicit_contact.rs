@@ -197,8 +197,8 @@ fn mass_above_stop(scheme: Box<dyn TimeIntegrator>, gap: f64, velocity: f64) -> 
         .unwrap()
 }
 
-/// A wall that pushes a mass: as a driven dof, and as an offset of the gap. The mass takes the speed of the wall, and the
-/// force that its acceleration needs.
+/// A wall that pushes a mass: as a driven dof, and as an offset of the gap. The mass takes the speed of the wall, and
+/// the force that its acceleration needs.
 #[test]
 fn a_moving_wall_takes_a_mass_along() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
@@ -234,8 +234,8 @@ fn a_moving_wall_takes_a_mass_along() {
     }
 }
 
-/// Noh and Bathe's two stages differ in length, so a gap that is closed at the end of either leaves some velocity: up to
-/// 6 % of the approach of a rigid mass, by the phase of the impact.
+/// Noh and Bathe's two stages differ in length, so a gap that is closed at the end of either leaves some velocity: up
+/// to 6 % of the approach of a rigid mass, by the phase of the impact.
 #[test]
 fn a_rigid_mass_leaves_noh_and_bathes_contact_slowly() {
     let mut fastest = 0.0_f64;
@@ -247,8 +247,8 @@ fn a_rigid_mass_leaves_noh_and_bathes_contact_slowly() {
     assert!((0.15..0.19).contains(&fastest), "{fastest}");
 }
 
-/// A mass pressed on a table that shakes: forward increments know where the table will be, whether it is a driven dof or
-/// an offset of the gap.
+/// A mass pressed on a table that shakes: forward increments know where the table will be, whether it is a driven dof
+/// or an offset of the gap.
 #[test]
 fn forward_increments_follow_a_shaking_table_exactly() {
     let table = |t: f64| {
@@ -278,8 +278,8 @@ fn forward_increments_follow_a_shaking_table_exactly() {
     }
 }
 
-/// At velocity level a pressed mass has the table's velocity, at the time where the scheme asks for it. (It is not pressed
-/// in every step: gaps are not controlled, and one that has opened a little must close again.)
+/// At velocity level a pressed mass has the table's velocity, at the time where the scheme asks for it. (It is not
+/// pressed in every step: gaps are not controlled, and one that has opened a little must close again.)
 #[test]
 fn velocity_conditions_follow_a_shaking_table_exactly() {
     let h = 1e-3;

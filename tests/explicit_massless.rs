@@ -1,5 +1,5 @@
-//! Explicit schemes with massless contact dofs, which follow statically: impacts without the impulse of the contact nodes and
-//! without its energy.
+//! Explicit schemes with massless contact dofs, which follow statically: impacts without the impulse of the contact
+//! nodes and without its energy.
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -13,8 +13,8 @@ use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::measure::{Figures, figures, record_run};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
-/// The paper's bars with tapered massless contact dofs: figures, and the loss of the energy that central differences conserve,
-/// ½ v·M v + ½ u·K u − h²/8 a·M a.
+/// The paper's bars with tapered massless contact dofs: figures, and the loss of the energy that central differences
+/// conserve, ½ v·M v + ½ u·K u − h²/8 a·M a.
 fn collide(scheme: Box<dyn TimeIntegrator>, n: usize, courant: f64, phase: f64) -> (Figures, f64) {
     let h = courant * 10.0 / n as f64 / 100.0;
     let bars = Bars::paper(n).delayed(phase, h);

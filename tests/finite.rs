@@ -271,8 +271,8 @@ const PARTS: [Part; 17] = [
     Part::Shift(2),
 ];
 
-/// A host that fails at one call, whichever: the step fails and leaves no trace, and taken again the run is what it would have
-/// been. What is never told must not have changed a bit.
+/// A host that fails at one call, whichever: the step fails and leaves no trace, and taken again the run is what it
+/// would have been. What is never told must not have changed a bit.
 #[test]
 fn a_host_that_fails_once_costs_a_step_and_nothing_else() {
     const STEPS: usize = 24;

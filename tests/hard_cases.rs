@@ -64,7 +64,8 @@ fn dissimilar_bars_show_both_plateaus_and_part_in_time() {
             let release = record.t[record.force.iter().rposition(|f| *f > 0.0).unwrap()];
             let expected = start + 2.0 / 7.0;
             let allowed = 2.0 * bars.element_size(0) / 70.0 + h;
-            // The small plateau ends in the oscillation behind the front: early by a little more than the front is wide.
+            // The small plateau ends in the oscillation behind the front: early by a little more than the front is
+            // wide.
             assert!(
                 (release - expected).abs() < 1.25 * allowed,
                 "{}, phase {phase}: {release} {expected}",

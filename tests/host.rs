@@ -517,7 +517,8 @@ impl ContactConstraint<f64> for Relay {
 
 #[test]
 fn what_was_computed_for_one_row_is_not_used_for_the_next() {
-    // Masses of 1 and 5 fall under g = 10 on floors 0.1 and 0.5 below them; the first is pressed until it loses its floor.
+    // Masses of 1 and 5 fall under g = 10 on floors 0.1 and 0.5 below them; the first is pressed until it loses its
+    // floor.
     let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
     let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
     let weight = |_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -50.0]);

@@ -215,9 +215,9 @@ fn a_soft_block_in_a_bowl_converges_quadratically_and_meets_the_surface() {
     assert!(pressed >= 3 && quadratic > 200, "{pressed} pressed, {quadratic} pairs");
 }
 
-/// Displacements over the side and contact forces over E times it, of a square that falls on a floor; lengths are `length`
-/// times, E `stiffness` times, densities `density` times those of the default throw, and all slides at `slide` wave
-/// speeds.
+/// Displacements over the side and contact forces over E times it, of a square that falls on a floor; lengths are
+/// `length` times, E `stiffness` times, densities `density` times those of the default throw, and all slides at `slide`
+/// wave speeds.
 fn fall(scheme: Box<dyn TimeIntegrator>, [length, stiffness, density]: [f64; 3], slide: f64) -> Vec<f64> {
     let material =
         Material { young: stiffness * MATERIAL.young, density: density * MATERIAL.density, poisson: MATERIAL.poisson };

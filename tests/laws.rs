@@ -138,7 +138,8 @@ fn smooth_impacts_keep_the_order_of_the_scheme() {
 
 #[test]
 fn several_power_law_contacts_are_solved_together() {
-    // Statics of two masses on Hertz springs, tied by a stiff spring: forces must satisfy the laws and balance the load.
+    // Statics of two masses on Hertz springs, tied by a stiff spring: forces must satisfy the laws and balance the
+    // load.
     let laws = [(1e4, 1.5), (3e3, 2.0)];
     let rows = laws.iter().enumerate().fold(LinearRows::new(), |rows, (i, &(stiffness, exponent))| {
         rows.row(ContactLaw::PowerLaw { stiffness, exponent }, &[(i, 1.0)], 0.0)

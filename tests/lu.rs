@@ -1,5 +1,5 @@
-//! Matrices that are not symmetric: sparse LU by itself, and runs with gyroscopic, circulatory and follower forces, in contact
-//! and away from it.
+//! Matrices that are not symmetric: sparse LU by itself, and runs with gyroscopic, circulatory and follower forces, in
+//! contact and away from it.
 #![allow(clippy::float_cmp)] // exact zeros and small integers are meant exactly
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // small random numbers
 
@@ -548,8 +548,8 @@ fn follower_loads_converge_quadratically_with_their_exact_tangent() {
     assert!(message.contains("effective matrix is not symmetric") && message.contains("Lu"), "{message}");
 }
 
-/// A shaft of discs, each with two dofs (x, y), springs between neighbors and to the ground, gyroscopic coupling of x and y of one
-/// disc, circulatory coupling of the neighbors: nothing is symmetric but M.
+/// A shaft of discs, each with two dofs (x, y), springs between neighbors and to the ground, gyroscopic coupling of x
+/// and y of one disc, circulatory coupling of the neighbors: nothing is symmetric but M.
 struct Shaft {
     mass: Vec<f64>,
     stiffness: Entries,

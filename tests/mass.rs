@@ -225,8 +225,8 @@ fn optimal_weights_keep_the_stability_limit_of_central_differences() {
     }
 }
 
-/// A Gaussian pulse of 4 elements' width that travels through 120 elements: RMS of the displacement then, over that of the pulse,
-/// and how late its crest passes the node 120 elements on, in times a wave takes through an element.
+/// A Gaussian pulse of 4 elements' width that travels through 120 elements: RMS of the displacement then, over that of
+/// the pulse, and how late its crest passes the node 120 elements on, in times a wave takes through an element.
 fn pulse(scheme: impl TimeIntegrator + 'static, courant: f64, weight: f64) -> [f64; 2] {
     const ELEMENTS: usize = 200;
     let (start, travel, width) = (40.0, 120.0, 4.0);
@@ -281,8 +281,8 @@ fn a_pulse_arrives_in_time_with_the_optimal_weight() {
     }
 }
 
-/// Two bars of 100 elements, corrected with projection of the past: RMS errors of force and velocity of the contact node with
-/// lumped, optimal and consistent mass.
+/// Two bars of 100 elements, corrected with projection of the past: RMS errors of force and velocity of the contact
+/// node with lumped, optimal and consistent mass.
 #[test]
 fn impacts_are_sharper_with_the_optimal_weight() {
     type Make = fn() -> Box<dyn TimeIntegrator>;
@@ -333,8 +333,8 @@ fn courant_numbers_of_bars_are_exact() {
     close(&mass::courant(Mass::Consistent(consistent.as_ref()), k.as_ref(), h).unwrap(), &expected, 1e-14);
 }
 
-/// Over the Courant number of dilatational waves across the unit element: smallest and largest value of a mesh, and half
-/// the Ω of its highest mode.
+/// Over the Courant number of dilatational waves across the unit element: smallest and largest value of a mesh, and
+/// half the Ω of its highest mode.
 fn ratios<const D: usize>(solid: &Solid<D>) -> [f64; 3] {
     let (m, k) = (solid.lumped_mass::<f64>(), solid.stiffness::<f64>());
     let h = 0.1 / solid.material.wave_speed();

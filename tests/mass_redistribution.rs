@@ -50,7 +50,8 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64) {
     assert!(worst < tolerance, "{found:?}\ninstead of {expected:?}");
 }
 
-/// Positive semidefinite, with nothing stored in the rows and columns of the massless dofs and nothing else without mass.
+/// Positive semidefinite, with nothing stored in the rows and columns of the massless dofs and nothing else without
+/// mass.
 fn check_singular(m: &Matrix, massless: &[usize]) {
     let m = m.as_ref();
     for column in 0..m.ncols() {
@@ -126,7 +127,8 @@ fn the_end_of_a_bar_gives_its_mass_to_its_neighbor_or_to_all() {
 /// 3 × 3 nodes, the lowest massless upward: shares 1/3 and 2/3 of a corner, 1/4, 1/2, 1/4 of the middle.
 #[test]
 fn a_tapered_end_gives_more_of_its_mass_to_all() {
-    // Five elements of mass 1: the first node gives ½, its neighbor a fifth of 1, to the 4.5 that are kept, less the fifth.
+    // Five elements of mass 1: the first node gives ½, its neighbor a fifth of 1, to the 4.5 that are kept, less the
+    // fifth.
     let lumped = [0.5, 1.0, 1.0, 1.0, 1.0, 0.5];
     let m = bar(&[1.0; 5]);
     let by = Redistribution::Tapered { neighbors: m.symbolic(), fraction: 0.2 };
@@ -341,7 +343,8 @@ fn lumping_and_redistribution_commute() {
     }
 }
 
-/// A quadratic bar element of mass 30: its first node has the row sum 5, couplings 2 and −1, neighbors of diagonal 16 and 4.
+/// A quadratic bar element of mass 30: its first node has the row sum 5, couplings 2 and −1, neighbors of diagonal 16
+/// and 4.
 #[test]
 fn quadratic_elements_may_lose_mass_where_couplings_are_negative() {
     let rows = [[4.0, 2.0, -1.0], [2.0, 16.0, 2.0], [-1.0, 2.0, 4.0]];
@@ -357,8 +360,8 @@ fn quadratic_elements_may_lose_mass_where_couplings_are_negative() {
     refused!(mass::redistribute_consistent(m.as_ref(), &[0], &[0; 4], by), Error::Singular { dof: 1 | 2, .. });
 }
 
-/// Relative changes of the lowest three frequencies of a bar, fixed at one end, of n equal elements, by the mass given to
-/// its nodes 0 … n − 1 in place of the lumped one.
+/// Relative changes of the lowest three frequencies of a bar, fixed at one end, of n equal elements, by the mass given
+/// to its nodes 0 … n − 1 in place of the lumped one.
 fn frequency_changes(masses: &[f64]) -> [f64; 3] {
     let n = masses.len();
     // Eigenvalues of M½ K⁻¹ M½ are 1/ω²; K⁻¹ is the distance from the support of the farther node from the end.
@@ -574,7 +577,8 @@ fn mixed_mass_of_a_bar() {
     refused!(mass::mixed(huge.as_ref(), &[1.0]), Error::MatrixNotFinite { .. });
 }
 
-/// Highest Ω = ωh of a free bar of elements with c h/h_e = 1 (critical for central differences), a contact spring and mass at its end.
+/// Highest Ω = ωh of a free bar of elements with c h/h_e = 1 (critical for central differences), a contact spring and
+/// mass at its end.
 fn highest(stiffness: f64, mass: f64) -> f64 {
     let n = 6;
     let m: Vec<f64> = (0..n).map(|i| if i == 0 || i == n - 1 { 0.5 } else { 1.0 }).collect();
@@ -612,8 +616,8 @@ fn bipenalty_keeps_the_critical_step() {
     close(&courant, &[1.0; 2], 1e-15);
 }
 
-/// Z s/D of a long bar (k = m = 1 an element) with a massless end, (1 − θ) of mass on its neighbor, blend w: the end moves by 1
-/// and pulls with D.
+/// Z s/D of a long bar (k = m = 1 an element) with a massless end, (1 − θ) of mass on its neighbor, blend w: the end
+/// moves by 1 and pulls with D.
 fn stiffness_of_the_end(weight: f64, taper: f64, s: f64) -> f64 {
     let n = 4000;
     let full = bar(&vec![1.0; n]);

@@ -1,5 +1,5 @@
-//! What errors and states say: a host's own words with the step, a mass that is too short, facets that are inverted, and what
-//! contact forces and impulses are.
+//! What errors and states say: a host's own words with the step, a mass that is too short, facets that are inverted,
+//! and what contact forces and impulses are.
 #![cfg(feature = "search")]
 
 use contact_dynamics::contact::{Facet, NodeToFacet};

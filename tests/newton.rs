@@ -1,5 +1,5 @@
-//! Newton's method: it solves linear systems as the direct solve does, converges quadratically, follows curved gaps, and
-//! fails without leaving a trace.
+//! Newton's method: it solves linear systems as the direct solve does, converges quadratically, follows curved gaps,
+//! and fails without leaving a trace.
 
 use contact_dynamics::contact::{ContactLaw, GapFunction, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
@@ -51,8 +51,8 @@ impl<T: Real, S: System<T>> System<T> for Unknowing<S> {
     }
 }
 
-/// A point mass on a spring to the origin of the plane, with force k (l² − L²)/(2 L²) as that of a Green–Lagrange bar, and
-/// on a dashpot whose force is c |v|² v.
+/// A point mass on a spring to the origin of the plane, with force k (l² − L²)/(2 L²) as that of a Green–Lagrange bar,
+/// and on a dashpot whose force is c |v|² v.
 struct Pendulum {
     mass: [f64; 2],
     axial: f64,
@@ -595,7 +595,8 @@ fn history_variables_move_with_accepted_steps_only() {
 #[test]
 fn the_corrected_force_is_that_of_the_balance() {
     // Where the balance holds at the state: M a = f(u, v) + Gᵀ p after the correction too, with the damping of the
-    // corrected velocity and the normal at the end of the step; by schemes that read a to the order of h in that damping.
+    // corrected velocity and the normal at the end of the step; by schemes that read a to the order of h in that
+    // damping.
     let schemes: [Make; 3] =
         [|| Box::new(Composite), || Box::new(Newmark::trapezoidal()), || Box::new(Bathe::default())];
     for make in schemes {
@@ -712,7 +713,8 @@ fn the_conserving_scheme_books_loads_and_damping_exactly() {
 
 #[test]
 fn contact_ahead_of_the_state_is_met_after_several_iterations() {
-    // Explicit in the stiffness, implicit in a drag that is strong and not linear; the gap of the next state is imposed now.
+    // Explicit in the stiffness, implicit in a drag that is strong and not linear; the gap of the next state is imposed
+    // now.
     let mut tried = 0;
     for scheme in all() {
         let stages = (scheme.make)().tableau().stages;

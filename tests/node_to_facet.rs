@@ -1088,8 +1088,8 @@ fn following_and_rates_do_not_allocate() {
     assert_eq!(counted.count_total, 0);
 }
 
-/// Compares rates with differences of gaps that are searched for along u + s v; returns how many rows were compared, and
-/// how many of them on a side or a vertex.
+/// Compares rates with differences of gaps that are searched for along u + s v; returns how many rows were compared,
+/// and how many of them on a side or a vertex.
 fn check_acceleration<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Random) -> [usize; 2] {
     let step = 2e-3;
     let mut contact = mesh.contact(nodes, 0.8);

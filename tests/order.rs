@@ -128,9 +128,9 @@ fn several_dofs_are_second_order_from_the_first_step() {
     for scheme in all().into_iter().filter(|scheme| scheme.order == 2) {
         let found = observed(1600, |steps| error((scheme.make)(), steps, steps));
         assert!(found.iter().all(|o| (o - 2.0).abs() < 0.05), "{}: {found:?}", scheme.name());
-        // Houbolt and Park change from two trapezoidal steps to their own rows here. Schemes that store a at another time
-        // start with that of the first state, which their first few accelerations show. (Errors may change sign early:
-        // an order above 2 is no fault.)
+        // Houbolt and Park change from two trapezoidal steps to their own rows here. Schemes that store a at another
+        // time start with that of the first state, which their first few accelerations show. (Errors may change sign
+        // early: an order above 2 is no fault.)
         let early = observed(1600, |steps| error((scheme.make)(), steps, 3));
         let least = if is_shifted(scheme) { 0.9 } else { 1.7 };
         assert!(early.iter().all(|&o| o > least), "{}, third step: {early:?}", scheme.name());

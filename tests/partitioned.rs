@@ -398,8 +398,8 @@ fn compare(name: &str, scene: &Scene, corrected: bool, steps: usize) {
         let found = host.motion();
         comparison.add([&found[0], &found[1], &found[2], &found[3]], motion(&run));
         if !corrected {
-            // Contact opens and closes all the time, and each time differences of rounding grow threefold and more: every
-            // step begins where the other did.
+            // Contact opens and closes all the time, and each time differences of rounding grow threefold and more:
+            // every step begins where the other did.
             host.go_to(motion(&run));
         }
     }
@@ -504,7 +504,8 @@ fn frames_meet_the_equations_of_localized_multipliers() {
 
 #[test]
 fn bodies_in_a_row_alternate() {
-    // Masses 1, 2, 4 in a row: the outer ones are the first side, with the normal of the second contact toward the middle.
+    // Masses 1, 2, 4 in a row: the outer ones are the first side, with the normal of the second contact toward the
+    // middle.
     let (mass, v) = ([1.0, 2.0, 4.0], [3.0, 0.0, -1.0]);
     let first = Side { free: &[v[0], -v[2]], flexibility: &[1.0 / mass[0], 0.0, 0.0, 1.0 / mass[2]] };
     // Seen along the second normal the middle mass moves the other way.

@@ -1,4 +1,5 @@
-//! Fast nodes against obstacles and facets: a step stops them where they meet the surface, or is refused; nothing passes.
+//! Fast nodes against obstacles and facets: a step stops them where they meet the surface, or is refused; nothing
+//! passes.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Cylinder, Obstacle, Plane, Side, Sphere};
@@ -160,7 +161,8 @@ impl<const D: usize> Obstacle<f64, D> for Slab {
     }
 }
 
-/// All flights at an obstacle: offsets from its middle, phases of the impact, ways in a step, reaches, obstacles that move.
+/// All flights at an obstacle: offsets from its middle, phases of the impact, ways in a step, reaches, obstacles that
+/// move.
 fn sweep<const D: usize, O: Obstacle<f64, D> + 'static>(
     name: &str,
     side: Side,
@@ -255,7 +257,8 @@ fn what_accelerates_into_a_body_out_of_reach_is_seen() {
 
 #[test]
 fn compliant_contacts_may_be_deep() {
-    // A soft ball of radius 1 stops a mass that comes in by half of it, in 60 steps; the steps of the way out are as many.
+    // A soft ball of radius 1 stops a mass that comes in by half of it, in 60 steps; the steps of the way out are as
+    // many.
     let ball = Sphere::new([0.0; 3], 1.0, Side::Outside).unwrap();
     let contact = NodesOnObstacle::new(ball, &[[-1.1, 0.05, 0.0]], &[[0, 1, 2]], &[0]).unwrap();
     let contact = contact.with_law(ContactLaw::Penalty { stiffness: 4.0 });

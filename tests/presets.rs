@@ -12,8 +12,8 @@ use contact_dynamics_scenes::{Bars, MassKind, Record};
 const H: f64 = 1e-3;
 const F0: f64 = 0.0125;
 
-/// Mean and worst over the phases of: RMS and mean of the force error, largest force, total variation, energy lost, error of
-/// the contact node's velocity.
+/// Mean and worst over the phases of: RMS and mean of the force error, largest force, total variation, energy lost,
+/// error of the contact node's velocity.
 struct Sweep {
     mean: [f64; 6],
     worst: [f64; 6],

@@ -192,7 +192,8 @@ fn a_state_and_a_history_of_two_instants_are_refused() {
         let refused = build().resume(state.clone(), history.clone()).build();
         assert!(matches!(refused, Err(Error::Incompatible { .. })));
     }
-    // Of one instant they are taken, wherever the clock has begun; also under step control, after steps of another size.
+    // Of one instant they are taken, wherever the clock has begun; also under step control, after steps of another
+    // size.
     build().resume(late.0, late.1).build().unwrap();
     let controlled = || {
         let control = StepControl::halving(1e-3).unwrap().contact_changes(1).unwrap();

@@ -1,4 +1,5 @@
-//! Laws that read the gap at the start of a stage: the rate condition of Laursen and Chawla, and the persistency switch.
+//! Laws that read the gap at the start of a stage: the rate condition of Laursen and Chawla, and the persistency
+//! switch.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactLaw, GapOffset, Side, Sphere};
@@ -203,7 +204,8 @@ fn a_mass_rebounds_elastically_under_the_rate_condition() {
 fn a_mass_under_the_persistency_switch_follows_the_rows_of_its_scheme() {
     let (mass, h) = (3.0, 0.01);
     for s in [0.1_f64, 0.3, 0.49, 0.6, 0.74, 0.9, 0.99] {
-        // Step 1 ends on the floor with the velocity 1 − 2 s. The trapezoidal rule then has the acceleration 4 (1 − s)/h.
+        // Step 1 ends on the floor with the velocity 1 − 2 s. The trapezoidal rule then has the acceleration 4 (1 −
+        // s)/h.
         for trapezoidal in [false, true] {
             let scheme: Box<dyn TimeIntegrator> =
                 if trapezoidal { Box::new(Newmark::trapezoidal()) } else { Box::new(midpoint()) };

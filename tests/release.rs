@@ -61,8 +61,8 @@ fn runs_end_with_the_energy_that_release_gives_back() {
                 let [without, taken] = bounce(make, n, phase, With::Nothing);
                 let [found, _] = bounce(make, n, phase, With::Release);
                 let case = format!("{}, n = {n}, phase {phase}: {found} after {without}, taken {taken}", make().name());
-                // No energy is made, and what numerical damping leaves of it is gain. (What is given back adds to waves that
-                // the scheme may damp the more.)
+                // No energy is made, and what numerical damping leaves of it is gain. (What is given back adds to waves
+                // that the scheme may damp the more.)
                 assert!(found <= 1.0 + 1e-9, "{case}");
                 assert!(found >= without - 1e-3 * taken, "{case}");
                 // Without numerical damping all of it is there at the end.
@@ -74,8 +74,8 @@ fn runs_end_with_the_energy_that_release_gives_back() {
     }
 }
 
-/// A wall beside a chain of masses, in four forms: as a gap that changes, as an obstacle that moves, as a support that is
-/// driven, or as another chain.
+/// A wall beside a chain of masses, in four forms: as a gap that changes, as an obstacle that moves, as a support that
+/// is driven, or as another chain.
 #[derive(Clone, Copy, Debug)]
 enum Wall {
     Offset,

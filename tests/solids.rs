@@ -1,5 +1,5 @@
-//! Solids in two and three dimensions on rigid obstacles: drops of a block, solvers side by side, several contact zones,
-//! a soft disc.
+//! Solids in two and three dimensions on rigid obstacles: drops of a block, solvers side by side, several contact
+//! zones, a soft disc.
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};

@@ -1,4 +1,5 @@
-//! Rows that depend on one another and come to contradict each other: solved while they can be met, refused from then on.
+//! Rows that depend on one another and come to contradict each other: solved while they can be met, refused from then
+//! on.
 
 use contact_dynamics::contact_solver::{ContactSolver, Pivoting};
 use contact_dynamics::{ActiveSet, Composite, Error, Newmark, PersistencyCorrection, Simulation, TimeIntegrator};

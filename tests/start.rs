@@ -30,7 +30,8 @@ fn schemes() -> Vec<Box<dyn TimeIntegrator>> {
 
 #[test]
 fn a_stretched_string_is_let_go_without_a_jump() {
-    // Stretched evenly, its end free: the end goes at once to where nothing pulls, with the energy of the first element.
+    // Stretched evenly, its end free: the end goes at once to where nothing pulls, with the energy of the first
+    // element.
     let n = 50;
     let strain = 1e-3;
     let u: Vec<f64> = (0..=n).map(|i| strain * (n - i) as f64).collect();

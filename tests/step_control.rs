@@ -28,8 +28,8 @@ fn oscillator(omega: f64) -> LinearSystem<'static, f64> {
     LinearSystem::lumped(vec![1.0], k).unwrap()
 }
 
-/// Bars whose host admits no step longer than `limit` that ends in a window of time, as an element that is turned inside
-/// out by too large a step.
+/// Bars whose host admits no step longer than `limit` that ends in a window of time, as an element that is turned
+/// inside out by too large a step.
 struct Reluctant {
     inner: LinearSystem<'static, f64>,
     last: f64,
@@ -370,8 +370,8 @@ fn estimates_add_up_to_the_error_of_smooth_motion() {
             }
             (sum, error_of(&run, omega) - started)
         };
-        // The local error lies along one direction of the plane of u and v/ω while the estimate follows the motion around:
-        // its mean over a period is 2/π or more of what adds up.
+        // The local error lies along one direction of the plane of u and v/ω while the estimate follows the motion
+        // around: its mean over a period is 2/π or more of what adds up.
         let (sum, error) = run_with(2e-3);
         assert!((0.35..2.0).contains(&(sum / error)), "{}: {}", scheme.name(), sum / error);
         let (half, _) = run_with(1e-3);

@@ -59,7 +59,8 @@ fn observed(make: fn() -> Box<dyn TimeIntegrator>, steps: u32, ratio: impl Fn(u3
     [0, 1, 2].map(|i| (coarse[i] / fine[i]).log2())
 }
 
-/// A step size ratio in [1/√3, √3], so that neighbors differ by factors in [1/3, 3]; of a linear congruential generator.
+/// A step size ratio in [1/√3, √3], so that neighbors differ by factors in [1/3, 3]; of a linear congruential
+/// generator.
 fn random(i: u32) -> f64 {
     let draw = f64::from((i.wrapping_mul(747_796_405).wrapping_add(2_891_336_453) >> 9) & 0xffff) / 65_536.0;
     3.0_f64.powf(draw - 0.5)
@@ -154,7 +155,8 @@ fn growth(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: f64, period:
     (late / early).powf(1.0 / 200.0)
 }
 
-/// Regular changes may resonate with a mode that is damped little: hardly with the composite scheme, a little with Park's.
+/// Regular changes may resonate with a mode that is damped little: hardly with the composite scheme, a little with
+/// Park's.
 #[test]
 fn repeated_changes_feed_no_mode() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] =
@@ -342,7 +344,8 @@ fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
     assert!(matches!(fresh.set_step_size(1e-200), Err(Error::Parameter { .. })));
 }
 
-/// A spring so negative that a long step has no positive definite matrix: refused, and the short step goes on as before.
+/// A spring so negative that a long step has no positive definite matrix: refused, and the short step goes on as
+/// before.
 #[test]
 fn a_step_whose_matrix_cannot_be_factorized_leaves_the_factors_of_the_old_one() {
     let build = || {

@@ -1,5 +1,5 @@
-//! The stiff–soft springs of Bathe and Noh (Comput. Struct. 98–99, 2012): a driven dof, a stiff spring to the first mass,
-//! a soft one to the second, with a step that resolves the soft mode only.
+//! The stiff–soft springs of Bathe and Noh (Comput. Struct. 98–99, 2012): a driven dof, a stiff spring to the first
+//! mass, a soft one to the second, with a step that resolves the soft mode only.
 
 use contact_dynamics::tableau::StartUp;
 use contact_dynamics::{Bathe, Composite, GeneralizedAlpha, Newmark, Simulation, TimeIntegrator};

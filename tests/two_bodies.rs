@@ -158,8 +158,9 @@ fn impacts_of_blocks_keep_momentum_with_one_pass_and_with_two() {
     }
 }
 
-/// Two rings side by side that fly at each other: outer radius 40, inner 30, their surfaces 0.5 apart if `offset`, the height of
-/// the second one above the first, is zero; E = 1, ρ = 0.001 (in these units the wave crosses the wall in 0.25).
+/// Two rings side by side that fly at each other: outer radius 40, inner 30, their surfaces 0.5 apart if `offset`, the
+/// height of the second one above the first, is zero; E = 1, ρ = 0.001 (in these units the wave crosses the wall in
+/// 0.25).
 struct Rings {
     solid: Solid<2>,
     /// Number of nodes of the first one.

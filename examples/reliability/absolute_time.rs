@@ -9,7 +9,8 @@ fn spring(k: f64) -> Result<LinearSystem<'static, f64>, Anything> {
     Ok(LinearSystem::lumped(vec![1.0], k)?)
 }
 
-/// Largest displacement error of an oscillator, Ω = 0.1, whose step alternates between h and 1.5 h, against the start at 0.
+/// Largest displacement error of an oscillator, Ω = 0.1, whose step alternates between h and 1.5 h, against the start
+/// at 0.
 fn resampled(t0: f64, h: f64) -> Result<f64, Anything> {
     let run = |t0: f64| -> Result<Vec<f64>, Anything> {
         let omega = 0.1 / h;

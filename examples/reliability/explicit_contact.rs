@@ -6,7 +6,8 @@ use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::masses::MassMatrix;
 use contact_dynamics_scenes::measure::{figures, record_run};
 
-/// Largest force over F₀ and mean loss of energy of the paper's bars by the explicit preset, over the phases of the impact.
+/// Largest force over F₀ and mean loss of energy of the paper's bars by the explicit preset, over the phases of the
+/// impact.
 fn impact(n: usize, courant: f64, phases: u32) -> Result<String, Anything> {
     let (mut largest, mut loss) = (0.0_f64, 0.0);
     for k in 0..phases {

@@ -22,8 +22,8 @@ fn is_finite<T: Real>(run: &Simulation<'_, T>) -> bool {
     motion.into_iter().chain(forces).flatten().all(|x| x.is_finite())
 }
 
-/// Two masses fly at a wall whose rate (or acceleration) is NaN at one call, whichever: good steps with NaN in what they
-/// show, and runs that end elsewhere than the one without NaN though nothing was told, over all calls.
+/// Two masses fly at a wall whose rate (or acceleration) is NaN at one call, whichever: good steps with NaN in what
+/// they show, and runs that end elsewhere than the one without NaN though nothing was told, over all calls.
 fn swept(part: usize) -> Result<String, Anything> {
     let build = |call: usize| -> Result<(Simulation<'static, f64>, Arc<AtomicUsize>), Anything> {
         let left = Arc::new(AtomicUsize::new(usize::MAX / 2));

@@ -24,7 +24,8 @@ enum Outcome {
 }
 
 impl Flight {
-    /// Runs at h = 1 until the node has met something. Right is what loses the energy due, within a tenth of what there was.
+    /// Runs at h = 1 until the node has met something. Right is what loses the energy due, within a tenth of what there
+    /// was.
     fn run(&self, contact: impl ContactConstraint<f64>, held: usize, controlled: bool) -> Result<Outcome, Anything> {
         let n = 2 + held;
         let none: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();

@@ -7,8 +7,8 @@ use contact_dynamics_scenes::Bars;
 
 type Make = fn() -> Result<Box<dyn TimeIntegrator>, Anything>;
 
-/// Energies at the end with release less those without it, over those at the start: least and largest over phases; and the
-/// largest with release.
+/// Energies at the end with release less those without it, over those at the start: least and largest over phases; and
+/// the largest with release.
 fn energies(make: Make, n: u32, phases: u32) -> Result<String, Anything> {
     let run = |phase: f64, release: bool| -> Result<f64, Anything> {
         let h = 0.05 / f64::from(n);

@@ -8,8 +8,8 @@ use contact_dynamics_scenes::squeeze::{Squeeze, Walls};
 /// Ratios of masses and stiffnesses.
 const RATIOS: [f64; 5] = [1.0, 1e2, 1e4, 1e6, 1e8];
 
-/// Runs of random squeezes, 20 steps each or until one is refused: in how many a step was accepted though a gap was violated by
-/// more than 1e-5 of the sizes of its terms, and in how many one was refused while the walls left room.
+/// Runs of random squeezes, 20 steps each or until one is refused: in how many a step was accepted though a gap was
+/// violated by more than 1e-5 of the sizes of its terms, and in how many one was refused while the walls left room.
 fn count(ratio: f64, walls: Walls, runs: usize) -> Result<[usize; 2], Anything> {
     let mut random = xorshift(77);
     let (mut wrong, mut refused) = (0, 0);

@@ -6,8 +6,8 @@ use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
-/// A stretched string of n elements whose free end has no mass, let go: its energy at the start and after a step, over that of
-/// the stretch.
+/// A stretched string of n elements whose free end has no mass, let go: its energy at the start and after a step, over
+/// that of the stretch.
 fn string(n: usize) -> Result<String, Anything> {
     let entries = (0..n).flat_map(|e| [(e, e, 1.0), (e + 1, e + 1, 1.0), (e, e + 1, -1.0), (e + 1, e, -1.0)]);
     let entries: Vec<_> = entries.map(|(i, j, k)| Triplet::new(i, j, k)).collect();

@@ -43,8 +43,8 @@ const SAME_OVERSHOOT: f64 = 5e-3;
 /// Forces and costs within 5 % are equal: times are measured no better.
 const SAME: f64 = 1.05;
 
-/// The rows that no other one beats: as good in energy, force, overshoot of the force and cost, and better in one of them. In
-/// the order of energies; of equal rows the first one.
+/// The rows that no other one beats: as good in energy, force, overshoot of the force and cost, and better in one of
+/// them. In the order of energies; of equal rows the first one.
 pub(crate) fn front(results: &Results, cost: &[Option<f64>]) -> Vec<usize> {
     let all = || {
         (0..results.rows.len()).filter_map(|row| {

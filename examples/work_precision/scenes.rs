@@ -123,8 +123,8 @@ pub(crate) fn damped_bar() -> Scene {
     }
 }
 
-/// A driven dof, a stiff spring (10⁷) to a unit mass, a soft one (1) to another (Bathe, Noh, Comput. Struct. 98–99, 2012):
-/// the error is that of the second mass.
+/// A driven dof, a stiff spring (10⁷) to a unit mass, a soft one (1) to another (Bathe, Noh, Comput. Struct. 98–99,
+/// 2012): the error is that of the second mass.
 pub(crate) fn stiff_soft() -> Scene {
     let error = move |t: f64, u: &[f64], v: &[f64]| {
         let frequency = springs::FREQUENCY;

@@ -91,8 +91,8 @@ pub(crate) struct Bouncing;
 const PERIODS: f64 = 2.0;
 
 impl Bouncing {
-    /// The run, its time step, and the weights of the dofs: the step is a little smaller than asked for, so that the first
-    /// touch comes so far into a step.
+    /// The run, its time step, and the weights of the dofs: the step is a little smaller than asked for, so that the
+    /// first touch comes so far into a step.
     fn run(model: &Model<'_>, phase: f64) -> Result<(Simulation<'static, f64>, f64, Vec<f64>)> {
         let Model { row, elements, h } = model;
         let (bar, touch) = (WallBar::bouncing(*elements), BouncingBar::doyen().events()[0]);

@@ -1,7 +1,7 @@
 //! Error against work in scenes with contact: integrators with corrections and masses, mesh and step refined together.
 //!
-//! `cargo run --release --example work_precision_contact` prints the tables of `docs/performance.md` and writes them, the
-//! figure and all points (`work_precision_contact.csv`), in about four minutes; with `--quick` a few coarse ones.
+//! `cargo run --release --example work_precision_contact` prints the tables of `docs/performance.md` and writes them,
+//! the figure and all points (`work_precision_contact.csv`), in about four minutes; with `--quick` a few coarse ones.
 //!
 //! `rows.rs` has what is compared, `scene.rs` how it is measured, `bars.rs` and `block.rs` the scenes.
 

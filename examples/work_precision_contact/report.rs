@@ -40,8 +40,8 @@ fn front(points: &[Point], work: Of<'_>, error: Of<'_>) -> Vec<(f64, f64)> {
     all
 }
 
-/// Work at an error, on the straight line between two runs of the front in logarithms; `None` if no run is that accurate. A
-/// row whose cheapest run is better than asked for is charged for that run.
+/// Work at an error, on the straight line between two runs of the front in logarithms; `None` if no run is that
+/// accurate. A row whose cheapest run is better than asked for is charged for that run.
 fn work_at(front: &[(f64, f64)], target: f64) -> Option<f64> {
     let reached = front.iter().position(|(_, error)| *error <= target)?;
     let (work, error) = front[reached];

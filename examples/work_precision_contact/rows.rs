@@ -41,7 +41,8 @@ pub(crate) struct Row {
     pub(crate) curve: Option<&'static str>,
 }
 
-/// The trapezoidal rule with λ_v/λ_a, in whose work the tables count: without the correction it reaches no error at all.
+/// The trapezoidal rule with λ_v/λ_a, in whose work the tables count: without the correction it reaches no error at
+/// all.
 pub(crate) const REFERENCE: usize = 1;
 
 /// Two with neither scheme nor mass nor correction in common: the conservative preset, and the composite scheme with

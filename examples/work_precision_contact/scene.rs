@@ -116,8 +116,8 @@ fn point(scene: &dyn Scene, model: &Model<'_>, courant: f64, extent: &Extent) ->
     finite.then_some(Point { elements: model.elements, courant, dofs, steps, solves, seconds, errors })
 }
 
-/// Mean and RMS of the differences of forces and exact ones within a window, over `largest`; the mean leaves points out that
-/// are within `h` of a jump.
+/// Mean and RMS of the differences of forces and exact ones within a window, over `largest`; the mean leaves points out
+/// that are within `h` of a jump.
 pub(crate) fn force_errors(
     forces: &[(f64, f64)],
     exact: impl Fn(f64) -> f64,

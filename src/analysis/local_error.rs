@@ -27,8 +27,8 @@ pub struct LocalError {
 /// The local error of a scheme, from a free oscillation at small Ω: the error that a step adds to it is that of its
 /// principal root, and the distance that of its principal vector, so what earlier steps did to v and a is part of it.
 ///
-/// `None` if the error does not follow the distance: schemes of first order like Newmark's with γ ≠ ½ err in v by h², of
-/// which h v shows h³ only.
+/// `None` if the error does not follow the distance: schemes of first order like Newmark's with γ ≠ ½ err in v by h²,
+/// of which h v shows h³ only.
 ///
 /// ```
 /// use contact_dynamics::{Newmark, TimeIntegrator, analysis};

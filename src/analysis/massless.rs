@@ -3,12 +3,13 @@
 use crate::tableau::Tableau;
 
 /// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic,
-/// 0 = f(ū), and ū = α u + (1 − α) u₀ carries an error of u₀ over by −(1 − α)/α. `None` if the displacement of such a dof is
-/// not determined (explicit schemes), or not by that of the state before alone.
+/// 0 = f(ū), and ū = α u + (1 − α) u₀ carries an error of u₀ over by −(1 − α)/α. `None` if the displacement of such a
+/// dof is not determined (explicit schemes), or not by that of the state before alone.
 ///
 /// Below 1 in size errors decay, and a [`Simulation`](crate::Simulation) takes dofs without mass; at 1 they alternate
-/// forever. Explicit stages that balance forces at displacements which they know beforehand bring such dofs into static balance
-/// there, and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f) for generalized-α (theory, section 15).
+/// forever. Explicit stages that balance forces at displacements which they know beforehand bring such dofs into static
+/// balance there, and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f)
+/// for generalized-α (theory, section 15).
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, GeneralizedAlpha, MoreauJean, Newmark, TimeIntegrator, analysis};
@@ -34,8 +35,9 @@ pub fn massless_factor(tableau: &Tableau) -> Option<f64> {
     tableau.stages.iter().map(factor).try_fold(1.0, |product, factor| Some(product * factor?))
 }
 
-/// Whether every stage of a scheme knows its displacements before its forces, and balances forces at these displacements: dofs
-/// without mass can then be brought into static balance with the others, before anything else of the stage is solved.
+/// Whether every stage of a scheme knows its displacements before its forces, and balances forces at these
+/// displacements: dofs without mass can then be brought into static balance with the others, before anything else of
+/// the stage is solved.
 pub(crate) fn massless_follow(tableau: &Tableau) -> bool {
     tableau.stages.iter().all(|stage| {
         stage.recovery.u.z == 0.0 && stage.balance.u == stage.recovery.u && (stage.load - stage.end).abs() < 1e-12

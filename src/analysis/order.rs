@@ -35,8 +35,8 @@ const TEST: [f64; 2] = [0.731, 1.273];
 /// Order of consistency of a tableau.
 ///
 /// The rows are applied to the equation u″ + c u′ + k u = F with the motion eᵗ. Its response in the scheme, a power
-/// series in h, is found exactly; the first power in which it differs from eᵗ is the order. Nothing is simulated, and no
-/// step size is chosen.
+/// series in h, is found exactly; the first power in which it differs from eᵗ is the order. Nothing is simulated, and
+/// no step size is chosen.
 ///
 /// ```
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};

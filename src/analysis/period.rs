@@ -4,8 +4,8 @@ use super::order::response;
 use super::series::Series;
 use crate::tableau::Tableau;
 
-/// p of the relative elongation of periods T′/T = 1 + p Ω² + O(Ω⁴), without damping: 1/12 for the trapezoidal rule, −1/24
-/// for central differences.
+/// p of the relative elongation of periods T′/T = 1 + p Ω² + O(Ω⁴), without damping: 1/12 for the trapezoidal rule,
+/// −1/24 for central differences.
 ///
 /// `None` if free oscillations err at first order, in phase or amplitude.
 ///
@@ -26,7 +26,8 @@ pub fn period_elongation(tableau: &Tableau) -> Option<f64> {
     // that is missing, e h² + …, so e^{t} is the scheme's motion for u″ = (1 + e h²) u.
     let [displacement, ..] = response(tableau, [0.0, -1.0], 1.0)?;
     let missing = Series::monomial(1.0, 0).over(&displacement);
-    // In terms of the rate σ = √(1 + e h²) that the scheme was given: σ h (1 − ½ e (σ h)²) is the exponent of a step. The
-    // series has real coefficients in σ h; at σ h = iΩ the angle is Ω (1 + ½ e Ω²), which shortens the period for e > 0.
+    // In terms of the rate σ = √(1 + e h²) that the scheme was given: σ h (1 − ½ e (σ h)²) is the exponent of a step.
+    // The series has real coefficients in σ h; at σ h = iΩ the angle is Ω (1 + ½ e Ω²), which shortens the period for e
+    // > 0.
     missing.valuation().filter(|&power| power >= 2).map(|_| -0.5 * missing.coefficient(2))
 }

@@ -6,8 +6,8 @@ use faer::{Mat, c64};
 
 /// Spectral radius at infinite frequency (ρ∞), without damping; `None` for explicit schemes.
 ///
-/// It is taken from the limit of the amplification matrix itself, in which stiffness alone decides the unknown; no large
-/// number is involved.
+/// It is taken from the limit of the amplification matrix itself, in which stiffness alone decides the unknown; no
+/// large number is involved.
 ///
 /// ```
 /// use contact_dynamics::{Composite, Newmark, TimeIntegrator, analysis};
@@ -51,8 +51,8 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
     power.norm_max() <= 1e-13 * scale.powi(i32::try_from(n).unwrap_or(i32::MAX))
 }
 
-/// Ω up to which the scheme is stable at damping ratio ξ: the spectral radius does not exceed 1 below it. `None` if that
-/// holds for all Ω between 0.01 and 10⁴, `Some(0.0)` if it fails at 0.01 already.
+/// Ω up to which the scheme is stable at damping ratio ξ: the spectral radius does not exceed 1 below it. `None` if
+/// that holds for all Ω between 0.01 and 10⁴, `Some(0.0)` if it fails at 0.01 already.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, Composite, TimeIntegrator, analysis};

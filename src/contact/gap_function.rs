@@ -29,8 +29,8 @@ struct Row<'a, T> {
 /// It is pure; where only the gap matters v is zero. The last may be left zero at the price of the correctors:
 /// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
 ///
-/// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are
-/// identified by their order.
+/// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step
+/// ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are identified by their order.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, GapFunction};
@@ -124,8 +124,8 @@ impl<'a, T: Real> GapFunction<'a, T> {
         self
     }
 
-    /// The size of the coordinates (length) that the functions compute with: within the rounding of it gaps are zero. None
-    /// by default, and then a row that touches at the start must be given with a gap of exactly zero or more.
+    /// The size of the coordinates (length) that the functions compute with: within the rounding of it gaps are zero.
+    /// None by default, and then a row that touches at the start must be given with a gap of exactly zero or more.
     ///
     /// # Errors
     ///

@@ -34,17 +34,17 @@ pub enum ContactLaw {
         /// e, from 0 (plastic, the same as `Rigid`) to 1 (elastic).
         coefficient: f64,
     },
-    /// The rate condition of Laursen and Chawla (Int. J. Numer. Meth. Eng. 40, 1997): a row that is closed at the start of
-    /// the stage, gₙ ≤ 0, has 0 ≤ (g′ − gₙ)/h ⊥ λ ≥ 0; an open one takes no part. For schemes that impose contact on the
-    /// displacements of the state.
+    /// The rate condition of Laursen and Chawla (Int. J. Numer. Meth. Eng. 40, 1997): a row that is closed at the start
+    /// of the stage, gₙ ≤ 0, has 0 ≤ (g′ − gₙ)/h ⊥ λ ≥ 0; an open one takes no part. For schemes that impose contact on
+    /// the displacements of the state.
     ///
-    /// * λ (g′ − gₙ) = 0. With the balance in the middle of the step, and the mean of v as the change of u (the midpoint
-    ///   rule, [`Gssss::new(1, 1, 1)`](crate::Gssss), and [`EnergyMomentum`](crate::EnergyMomentum)), contact with fixed rows
-    ///   does no work, and energy is conserved. Linear momentum is, with every scheme.
+    /// * λ (g′ − gₙ) = 0. With the balance in the middle of the step, and the mean of v as the change of u (the
+    ///   midpoint rule, [`Gssss::new(1, 1, 1)`](crate::Gssss), and [`EnergyMomentum`](crate::EnergyMomentum)), contact
+    ///   with fixed rows does no work, and energy is conserved. Linear momentum is, with every scheme.
     /// * Known failures: bodies penetrate by up to one step's approach, and stay there while they are pressed (so a run
-    ///   may start inside). Contact nodes rebound elastically, and contact chatters. With the balance elsewhere contact does
-    ///   work: a mass leaves three times as fast as it came by the trapezoidal rule. Rows of curved surfaces that are
-    ///   not followed drift by (h v)²/(2R) a step.
+    ///   may start inside). Contact nodes rebound elastically, and contact chatters. With the balance elsewhere contact
+    ///   does work: a mass leaves three times as fast as it came by the trapezoidal rule. Rows of curved surfaces that
+    ///   are not followed drift by (h v)²/(2R) a step.
     /// * [`Works::contact`](crate::Works::contact) takes the mean of the forces of two steps and shows work that
     ///   is none; its remainder takes that back.
     ///
@@ -70,13 +70,14 @@ pub enum ContactLaw {
     RateCondition,
     /// The dynamic persistency switch (as in the mechanical contact of MOOSE): a row that is open at the start of the
     /// stage, gₙ > 0, has 0 ≤ g′ ⊥ λ ≥ 0, a closed one 0 ≤ ġ′ ⊥ λ ≥ 0, with ġ′ from the velocities that the scheme
-    /// recovers. For schemes that impose contact on the displacements of the state, if their velocities contain the unknown.
+    /// recovers. For schemes that impose contact on the displacements of the state, if their velocities contain the
+    /// unknown.
     ///
     /// * From the second step on the rate of a pressed contact is zero: it persists. With the midpoint rule,
     ///   [`Gssss::new(1, 1, 1)`](crate::Gssss), and a fine mesh the force is smooth without a corrector (figures in
     ///   `docs/contact.md`). Linear momentum is conserved.
-    /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open behind it.
-    ///   The second one leaves a gap that is not mended while contact lasts, up to half a step's approach where the
+    /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open behind
+    ///   it. The second one leaves a gap that is not mended while contact lasts, up to half a step's approach where the
     ///   change of u is the mean of v (so a run may start inside). Accelerations are free to alternate: by the
     ///   trapezoidal rule forces do, and energy may rise. Rows of curved surfaces that are not followed drift as
     ///   under `RateCondition`.
@@ -93,8 +94,8 @@ pub enum ContactLaw {
         /// p ≥ 1.
         exponent: f64,
     },
-    /// λ = ⟨−k g − m g̈⟩: a spring and a mass that contact couples in (Asano 1986; Hetherington, Rodríguez-Ferran, Askes
-    /// 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical step.
+    /// λ = ⟨−k g − m g̈⟩: a spring and a mass that contact couples in (Asano 1986; Hetherington, Rodríguez-Ferran,
+    /// Askes 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical step.
     /// Switching the mass on at speed changes the kinetic energy, and over many impacts energy grows;
     /// [`StabilizedBipenalty`](Self::StabilizedBipenalty) mends that.
     Bipenalty {
@@ -103,24 +104,25 @@ pub enum ContactLaw {
         /// m (mass).
         mass: f64,
     },
-    /// The bipenalty with m = k h²/4 in a stabilized form, for [`CentralDifference`](crate::CentralDifference): the free motion
-    /// predicts the gap of the next step, and with ḡ₋ and ḡ₊ the means of the gap over the last and the coming step
+    /// The bipenalty with m = k h²/4 in a stabilized form, for [`CentralDifference`](crate::CentralDifference): the
+    /// free motion predicts the gap of the next step, and with ḡ₋ and ḡ₊ the means of the gap over the last and the
+    /// coming step
     ///
     /// ```text
     /// λ = ½ k ⟨−ḡ₊ + ⟨−ḡ₋⟩⟩,      ḡ₊ = ĝ₊ + ½ h² G M⁻¹ Gᵀ λ
     /// ```
     ///
-    /// with ĝ₊ predicted. While contact lasts it is the plain form, k g + m g̈. That one counts ḡ₋ where it is open too, which is
-    /// the work that its impacts create; here the mass acts on what contact itself does. The critical step is that of the mesh,
-    /// whatever k; without loads, for linear gaps and an obstacle at rest, the energy
+    /// with ĝ₊ predicted. While contact lasts it is the plain form, k g + m g̈. That one counts ḡ₋ where it is open
+    /// too, which is the work that its impacts create; here the mass acts on what contact itself does. The critical
+    /// step is that of the mesh, whatever k; without loads, for linear gaps and an obstacle at rest, the energy
     ///
     /// ```text
     /// ½ v̂ᵀ M v̂ + ½ uₙᵀ K uₙ₊₁ + ½ k ⟨−ḡ⟩²,      v̂ = (uₙ₊₁ − uₙ)/h,      ḡ = ½ (gₙ + gₙ₊₁)
     /// ```
     ///
     /// never rises, and stays the same while contact lasts (`docs/theory.md`, section 5.2). A predictor and a corrector
-    /// are the idea of Kolman, Kopačka, González, Cho, Park (Math. Comput. Simul. 189, 2021); their formulas were not available to
-    /// us, this form and its proof are ours.
+    /// are the idea of Kolman, Kopačka, González, Cho, Park (Math. Comput. Simul. 189, 2021); their formulas were not
+    /// available to us, this form and its proof are ours.
     ///
     /// Known failures: penetration, as with a penalty; a very stiff spring rings.
     StabilizedBipenalty {
@@ -170,7 +172,8 @@ impl ContactLaw {
         *self == Self::Equality
     }
 
-    /// Whether the condition depends on the gap at the start of the stage. The gap of a closed row may then be negative.
+    /// Whether the condition depends on the gap at the start of the stage. The gap of a closed row may then be
+    /// negative.
     pub(crate) fn reads_start(&self) -> bool {
         matches!(self, Self::RateCondition | Self::PersistencySwitch)
     }

@@ -101,10 +101,11 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self.row(ContactLaw::Equality, entries, offset)
     }
 
-    /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) + g0.
+    /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) +
+    /// g0.
     ///
-    /// The normal has any length, as that of a [`Plane`](super::Plane): gaps are lengths, forces are forces. Where the pair is
-    /// free to slide nothing else acts on it.
+    /// The normal has any length, as that of a [`Plane`](super::Plane): gaps are lengths, forces are forces. Where the
+    /// pair is free to slide nothing else acts on it.
     ///
     /// # Errors
     ///
@@ -142,8 +143,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
-    /// The size of the coordinates from which the host has computed the gaps (length), for all rows: gaps within their rounding
-    /// are zero. Zero by default, as if the gaps were exact.
+    /// The size of the coordinates from which the host has computed the gaps (length), for all rows: gaps within their
+    /// rounding are zero. Zero by default, as if the gaps were exact.
     #[must_use]
     pub fn coordinates(mut self, size: T) -> Self {
         self.coordinates = size.abs();

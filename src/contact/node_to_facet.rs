@@ -149,36 +149,38 @@ impl Pass {
     }
 }
 
-/// Contact of two deforming surfaces, of the nodes of each with the facets of the other: segments in two dimensions, triangles
-/// and bilinear quadrilaterals in three. Two passes are made, unless [`one_pass`](Self::one_pass) is asked for by name.
+/// Contact of two deforming surfaces, of the nodes of each with the facets of the other: segments in two dimensions,
+/// triangles and bilinear quadrilaterals in three. Two passes are made, unless [`one_pass`](Self::one_pass) is asked
+/// for by name.
 ///
 /// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
 /// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on
-/// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and angular
-/// momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see below). Nodes at
-/// a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
+/// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum,
+/// and angular momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see
+/// below). Nodes at a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
 ///
 /// # Linearization
 ///
-/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; in between gaps are affine,
-/// `g = g* + G (u − u*)`. Rows follow the contact of a step
+/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; in between gaps are
+/// affine, `g = g* + G (u − u*)`. Rows follow the contact of a step
 /// ([`follow`](ContactConstraint::follow)): closest points are found again at each trial state, in the lists of the
 /// search, and at the end of the step gaps are the distances there. G is the derivative of the distance, and
 /// [`rates`](ContactConstraint::rates) have its second derivative along the motion, from nodes that slide on facets
 /// that turn. Geometry is computed in `f64` in every run.
 ///
-/// What a step brings near is searched, whatever the speed: a node looks as far as its velocity against the other surface
-/// takes it. A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which a node, moving by more than an
-/// eighth of a facet, has gone through one, or was stopped where the surface is not; or, moving by more than a facet, was
-/// stopped along a normal that is not that of the place. Way and facets are taken as straight within the step.
+/// What a step brings near is searched, whatever the speed: a node looks as far as its velocity against the other
+/// surface takes it. A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which a node, moving
+/// by more than an eighth of a facet, has gone through one, or was stopped where the surface is not; or, moving by more
+/// than a facet, was stopped along a normal that is not that of the place. Way and facets are taken as straight within
+/// the step.
 ///
 /// A row lasts for its step. Its facet goes on a quarter of itself beyond an open rim, and may turn 19° nearer to the
 /// node's own normal than [`facing`](Self::facing) lets a search find it, so that a node that slides off a table or
 /// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
 /// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
 /// reach where it was last linearized, it is open, and the row stays as it was. A row whose normal has jumped more than
-/// eight times since the search at one time, between two facets or around an edge that its node touches, stays as it was too: there is
-/// no normal that an iteration could converge to.
+/// eight times since the search at one time, between two facets or around an edge that its node touches, stays as it
+/// was too: there is no normal that an iteration could converge to.
 ///
 /// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and
 /// are those of the facet.
@@ -267,18 +269,21 @@ pub struct NodeToFacet<T: Real> {
 }
 
 impl<T: Real> NodeToFacet<T> {
-    /// Contact of two surfaces in two passes: the nodes of the facets `one` meet the facets `other`, and the other way round.
+    /// Contact of two surfaces in two passes: the nodes of the facets `one` meet the facets `other`, and the other way
+    /// round.
     ///
     /// Two passes treat both surfaces alike, and pass the patch test on meshes that do not match, which
-    /// [one pass](Self::one_pass) fails where the nodes are coarser than the facets. Normals of both surfaces are compared as in
-    /// [`facing`](Self::facing). Of two nodes that stand on each other only the first pass makes a row. There are more rows than
-    /// independent gaps where a flat interface closes as a whole: the multipliers are then those of least norm. On curved
-    /// surfaces the gaps of both passes cannot all be zero; neither penetrates. The second pass costs its rows: one for each
-    /// node of `other`, in the search and in the contact problem.
+    /// [one pass](Self::one_pass) fails where the nodes are coarser than the facets. Normals of both surfaces are
+    /// compared as in
+    /// [`facing`](Self::facing). Of two nodes that stand on each other only the first pass makes a row. There are more
+    /// rows than independent gaps where a flat interface closes as a whole: the multipliers are then those of least
+    /// norm. On curved surfaces the gaps of both passes cannot all be zero; neither penetrates. The second pass costs
+    /// its rows: one for each node of `other`, in the search and in the contact problem.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; facets name nodes by their index there. Nodes that none names are not read later. The
-    /// two surfaces share no node. The law is [`ContactLaw::Rigid`], unless [`with_law`](Self::with_law) gives another.
+    /// dofs of their displacements; facets name nodes by their index there. Nodes that none names are not read later.
+    /// The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless [`with_law`](Self::with_law) gives
+    /// another.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -318,8 +323,8 @@ impl<T: Real> NodeToFacet<T> {
         Ok(contact)
     }
 
-    /// Contact of `nodes` with `facets` in one pass: facets do not meet the nodes' own surface, and may pass between its
-    /// nodes. For single nodes, beams and cables, and where the nodes are finer than the facets; on two meshes that
+    /// Contact of `nodes` with `facets` in one pass: facets do not meet the nodes' own surface, and may pass between
+    /// its nodes. For single nodes, beams and cables, and where the nodes are finer than the facets; on two meshes that
     /// do not match pressure errs by some percent to a half ([`new`](Self::new) is exact there).
     ///
     /// `coordinates`, `dofs` and facets are those of [`new`](Self::new); `nodes` names nodes by their index.
@@ -388,8 +393,8 @@ impl<T: Real> NodeToFacet<T> {
         self
     }
 
-    /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the facets. What
-    /// the velocities bring near within a step is found as well, so that no reach must fit the speed.
+    /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the
+    /// facets. What the velocities bring near within a step is found as well, so that no reach must fit the speed.
     ///
     /// # Errors
     ///
@@ -517,8 +522,8 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body makes with
-    /// its velocities in theirs within the time `ahead`.
+    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body
+    /// makes with its velocities in theirs within the time `ahead`.
     fn find_rows(&mut self, pass: usize, (near, speeds): (&Bounds, &Bounds), u: &[T], v: &[T], ahead: f64) {
         let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
         self.find_rows_and(pass, (near, speeds), u, v, ahead, &mut clearance);

@@ -34,15 +34,16 @@ impl<T: Real, const D: usize> Node<T, D> {
 /// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
 /// identified by the number of the node.
 ///
-/// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end; schemes that
-/// impose contact on velocities see the tangent plane of the start of the step instead (which moves with the obstacle), and on a
-/// surface of radius R that leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes nearer than that, or than their
-/// velocity brings them within the step, are candidates, and a body farther away costs a bounding box.
+/// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end;
+/// schemes that impose contact on velocities see the tangent plane of the start of the step instead (which moves with
+/// the obstacle), and on a surface of radius R that leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes
+/// nearer than that, or than their velocity brings them within the step, are candidates, and a body farther away costs
+/// a bounding box.
 ///
-/// Steps are refused ([`Error::PassedThrough`], which a smaller step mends) in which a node goes straight through the body;
-/// presses along a normal that turns by more than 30° on its way; or is stopped along a normal that is not that of the
-/// place where it is, so that the energy lost would be wrong by more than a tenth. What this cannot see is a way that is not
-/// straight: a node that turns around within a step.
+/// Steps are refused ([`Error::PassedThrough`], which a smaller step mends) in which a node goes straight through the
+/// body; presses along a normal that turns by more than 30° on its way; or is stopped along a normal that is not that
+/// of the place where it is, so that the energy lost would be wrong by more than a tenth. What this cannot see is a way
+/// that is not straight: a node that turns around within a step.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
@@ -125,8 +126,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Nodes farther away than this (length) are no candidates, unless their velocity brings them as near as that within the
-    /// step; by default all are. It saves the cost of rows that stay open.
+    /// Nodes farther away than this (length) are no candidates, unless their velocity brings them as near as that
+    /// within the step; by default all are. It saves the cost of rows that stay open.
     ///
     /// # Errors
     ///
@@ -149,8 +150,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self.motion.as_mut().map_or([[T::zero(); D]; 3], |motion| motion(t))
     }
 
-    /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal, and than
-    /// the longest way that a node makes against the obstacle, which moves by `carried` in the time `ahead`.
+    /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal, and
+    /// than the longest way that a node makes against the obstacle, which moves by `carried` in the time `ahead`.
     fn is_far(&self, u: &[T], v: &[T], shift: [T; D], carried: [T; D], ahead: T) -> bool {
         if self.reach.is_infinite() {
             return false;
@@ -172,8 +173,9 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     }
 }
 
-/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is wrong,
-/// and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end: closed or not.
+/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is
+/// wrong, and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end:
+/// closed or not.
 fn look_at<T: Real, const D: usize>(
     obstacle: &dyn Obstacle<T, D>,
     row: Option<(&Row<T, D>, [bool; 2])>,

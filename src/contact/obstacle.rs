@@ -6,8 +6,8 @@ use crate::real::Real;
 
 /// A rigid body, given by the signed distance of a point from its surface: positive outside, negative inside.
 ///
-/// Evaluations are pure. The gradient of a signed distance is the outward unit normal at the nearest point of the surface.
-/// The obstacle stands still in its own frame; [`NodesOnObstacle`](super::NodesOnObstacle) moves it.
+/// Evaluations are pure. The gradient of a signed distance is the outward unit normal at the nearest point of the
+/// surface. The obstacle stands still in its own frame; [`NodesOnObstacle`](super::NodesOnObstacle) moves it.
 ///
 /// ```
 /// use contact_dynamics::contact::Obstacle;
@@ -29,8 +29,8 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
     /// Signed distance of x (length) and its gradient, the unit normal.
     fn distance(&self, x: [T; D]) -> (T, [T; D]);
 
-    /// wᵀ H w with H the second derivative of the distance: the acceleration of the gap that comes from moving with velocity
-    /// w along a curved surface. Default: none, as on flat surfaces.
+    /// wᵀ H w with H the second derivative of the distance: the acceleration of the gap that comes from moving with
+    /// velocity w along a curved surface. Default: none, as on flat surfaces.
     fn curvature(&self, x: [T; D], w: [T; D]) -> T {
         let _ = (x, w);
         T::zero()
@@ -41,9 +41,9 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
         None
     }
 
-    /// Where a straight way goes into the body and turns outward again, if it does: what moves so in one step has missed a
-    /// contact. Default: found by going along the way in steps that the distance allows, but no shorter than 1/16 of it;
-    /// hollows and crests smaller than that may be missed.
+    /// Where a straight way goes into the body and turns outward again, if it does: what moves so in one step has
+    /// missed a contact. Default: found by going along the way in steps that the distance allows, but no shorter than
+    /// 1/16 of it; hollows and crests smaller than that may be missed.
     fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
         trace(|x| self.distance(x), from, minus(to, from))
     }
@@ -101,8 +101,8 @@ fn trace<T: Real, const D: usize>(
     None
 }
 
-/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are across its axis; `length` is
-/// that of the whole way.
+/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are across its axis;
+/// `length` is that of the whole way.
 fn through_round<T: Real, const D: usize>(
     from: [T; D],
     way: [T; D],

@@ -46,8 +46,8 @@ impl<T: Real> ContactProblem<'_, T> {
         worst.1
     }
 
-    /// Refuses a W that is not symmetric. What rounding of badly conditioned responses makes of a symmetric one passes; that
-    /// little is for the acceptance rule to judge.
+    /// Refuses a W that is not symmetric. What rounding of badly conditioned responses makes of a symmetric one passes;
+    /// that little is for the acceptance rule to judge.
     pub(super) fn check_symmetric(&self) -> std::result::Result<(), ContactFailure<T>> {
         match self.asymmetry(T::epsilon().sqrt()) {
             Some((row, other)) => Err(ContactFailure::Unsymmetric { row, other }),
@@ -116,16 +116,16 @@ impl<T: Real> Settings<T> {
 /// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given
 /// fraction of the largest |q_i|.
 ///
-/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen. What counts
-/// as rounding is [bounded](Self::bears) by the problem: rows that contradict each other can be met but for the rounding of
-/// multipliers that grow beyond all bounds.
+/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen.
+/// What counts as rounding is [bounded](Self::bears) by the problem: rows that contradict each other can be met but for
+/// the rounding of multipliers that grow beyond all bounds.
 #[derive(Debug)]
 pub(super) struct Acceptance<'a, T> {
     problem: &'a ContactProblem<'a, T>,
     accepted: T,
-    /// A small share of the largest |q_j|/√W_jj: row j closed alone takes the energy ½ (|q_j|/√W_jj)², and by Cauchy and Schwarz
-    /// this moves row i by at most √W_ii times the root. Light bodies would move far with the energy of heavy ones: the same
-    /// share of many times the largest |q_j| bounds what they do.
+    /// A small share of the largest |q_j|/√W_jj: row j closed alone takes the energy ½ (|q_j|/√W_jj)², and by Cauchy
+    /// and Schwarz this moves row i by at most √W_ii times the root. Light bodies would move far with the energy of
+    /// heavy ones: the same share of many times the largest |q_j| bounds what they do.
     reach: T,
     largest: T,
     /// The row that failed last, asked first: far from the solution one row costs the check.

@@ -10,20 +10,21 @@ use crate::real::Real;
 /// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
 /// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
 /// on only while the number of violations falls, otherwise a single row, the last one, is exchanged until it falls
-/// again. That is finite for every positive definite W, symmetric or not (Murty's rule: for every matrix with positive principal
-/// minors). Steady contact takes one iteration, and while W and the active
+/// again. That is finite for every positive definite W, symmetric or not (Murty's rule: for every matrix with positive
+/// principal minors). Steady contact takes one iteration, and while W and the active
 /// rows stay the same no factorization.
 ///
-/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are then
-/// those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a W, the
-/// problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control Optim.
-/// 14, 1976), and if these do not end, by [`Pivoting`]. Rows that contradict each other are an error that names them. What W leaves
-/// of nearly dependent rows may be rounding, on which multipliers grow beyond all bounds and pretend to meet what cannot be met: a
-/// pivot must exceed the rounding of the combination of rows that it measures, and a solution is accepted only if every row
-/// misses complementarity by less than a small share of what moves it without contact, whatever the multipliers.
+/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are
+/// then those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a
+/// W, the problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control
+/// Optim. 14, 1976), and if these do not end, by [`Pivoting`]. Rows that contradict each other are an error that names
+/// them. What W leaves of nearly dependent rows may be rounding, on which multipliers grow beyond all bounds and
+/// pretend to meet what cannot be met: a pivot must exceed the rounding of the combination of rows that it measures,
+/// and a solution is accepted only if every row misses complementarity by less than a small share of what moves it
+/// without contact, whatever the multipliers.
 ///
-/// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant rows always
-/// go the way of proximal steps.
+/// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant
+/// rows always go the way of proximal steps.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     factor: DenseCholesky<T>,
@@ -54,7 +55,8 @@ enum Symmetry {
     General,
 }
 
-/// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is given.)
+/// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is
+/// given.)
 const ROUNDED: f64 = 4096.0;
 
 /// Block exchanges granted without progress before single ones begin.
@@ -80,7 +82,8 @@ enum Form {
     Proximal,
 }
 
-/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding; `column` gives those of W.
+/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding; `column` gives those
+/// of W.
 fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     problem: &ContactProblem<'_, T>,
     column: impl Fn(usize) -> C,
@@ -107,9 +110,10 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     for (own, &tolerance) in own.iter_mut().zip(problem.tolerance) {
         *own = tolerance + T::of(32.0) * T::epsilon() * *own;
     }
-    // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a body
-    // at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up like the
-    // steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single precision.)
+    // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a
+    // body at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up
+    // like the steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single
+    // precision.)
     noise.clear();
     noise.resize(own.len(), T::zero());
     for (j, &own) in own.iter().enumerate() {
@@ -189,8 +193,8 @@ impl<T: Real> ActiveSet<T> {
                     judge(problem, |j| problem.delassus[j..].iter().step_by(size), given, solved, y, own, noise);
                 }
             }
-            // On dependent rows the equations of the active rows may contradict each other: one that is left open lets go,
-            // one that is left violated waits for the others.
+            // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
+            // go, one that is left violated waits for the others.
             let open = |i: usize| factor.is_singular() && y[i] > noise[i];
             let violates = |i: usize, active: bool| match problem.bounds[i] {
                 Bound::Free => false,

@@ -18,8 +18,9 @@ use crate::real::Real;
 /// 1992), hence with redundant rows too. y is then unique, the multipliers are not: it finds those that its sweeps
 /// reach, which depend on the guess and on the order of the rows.
 ///
-/// A W that is not symmetric it takes as well, but the theorem is then for diagonally dominant W only (Cottle, Pang and Stone, The
-/// Linear Complementarity Problem, ch. 5, for H-matrices); weakly coupled rows are such. Where sweeps do not converge, it fails.
+/// A W that is not symmetric it takes as well, but the theorem is then for diagonally dominant W only (Cottle, Pang and
+/// Stone, The Linear Complementarity Problem, ch. 5, for H-matrices); weakly coupled rows are such. Where sweeps do not
+/// converge, it fails.
 ///
 /// A result is accepted by its residual: in every row `|min(y_i, W_ii λ_i)|` (`|y_i|` of a free row) is rounding or at
 /// most the tolerance times the largest |q_i|. A guess that is accepted is returned after 0 sweeps; one that is not

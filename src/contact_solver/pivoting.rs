@@ -28,8 +28,8 @@ use crate::real::Real;
 /// that the residual is more than rounding, sweeps of Gauss–Seidel spread the load to the rows they imply. It does not
 /// use the guess, so the multipliers never depend on it.
 ///
-/// A W that is not symmetric is refused ([`ContactFailure::Unsymmetric`]): the factor is a Cholesky factor, and the argument that no
-/// set comes twice needs an energy.
+/// A W that is not symmetric is refused ([`ContactFailure::Unsymmetric`]): the factor is a Cholesky factor, and the
+/// argument that no set comes twice needs an energy.
 ///
 /// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen,
 /// and limited); a row whose independence is rounding counts as dependent.

@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::{Rows, Tableau};
 
-/// The contact-implicit form of a one-step scheme (Kane, Repetto, Ortiz, Marsden, Comput. Methods Appl. Mech. Eng. 180, 1999):
-/// forces of contact act as one impulse at the end of the step and leave no trace in the acceleration.
+/// The contact-implicit form of a one-step scheme (Kane, Repetto, Ortiz, Marsden, Comput. Methods Appl. Mech. Eng. 180,
+/// 1999): forces of contact act as one impulse at the end of the step and leave no trace in the acceleration.
 ///
 /// With Newmark's rows, internal accelerations a_i and the contact's a_c = M⁻¹ Gᵀ λ_K:
 ///
@@ -14,13 +14,13 @@ use crate::tableau::{Rows, Tableau};
 /// u' = u + h v + h² ((½ − β) a_i + β a_i') + ½ h² a_c'      v' = v + h ((1 − γ) a_i + γ a_i') + h a_c'
 /// ```
 ///
-/// which is the step of the scheme itself with λ_K = 2 β λ, a ← a − M⁻¹ Gᵀ λ and v ← v + h (2β − γ) M⁻¹ Gᵀ λ: nothing else is
-/// solved. Any one-step scheme of one stage takes it, with its own response in place of 1, γ, β.
+/// which is the step of the scheme itself with λ_K = 2 β λ, a ← a − M⁻¹ Gᵀ λ and v ← v + h (2β − γ) M⁻¹ Gᵀ λ: nothing
+/// else is solved. Any one-step scheme of one stage takes it, with its own response in place of 1, γ, β.
 ///
 /// Linear momentum is conserved. For β = ¼, γ = ½ the energy never rises. With damping it needs γ = 2β, where v is left
-/// as it is; otherwise building a simulation is refused, for the impulse that v gets has not been felt by the damping of
-/// the step. Known failure: contact force and velocity of the contact nodes oscillate, and the gap rate does not vanish
-/// in persistent contact; [`ContactStabilized`] mends the first.
+/// as it is; otherwise building a simulation is refused, for the impulse that v gets has not been felt by the damping
+/// of the step. Known failure: contact force and velocity of the contact nodes oscillate, and the gap rate does not
+/// vanish in persistent contact; [`ContactStabilized`] mends the first.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -55,17 +55,18 @@ impl<T: Real> Corrector<T> for ContactImplicit {
     }
 }
 
-/// The contact-stabilized scheme (Deuflhard, Krause, Ertel, Int. J. Numer. Methods Eng. 73, 2008): [`ContactImplicit`], and the
-/// displacements u + h v that a step starts from are first moved to the nearest admissible ones in the norm of the mass.
+/// The contact-stabilized scheme (Deuflhard, Krause, Ertel, Int. J. Numer. Methods Eng. 73, 2008): [`ContactImplicit`],
+/// and the displacements u + h v that a step starts from are first moved to the nearest admissible ones in the norm of
+/// the mass.
 ///
-/// The contact forces are then free of the spurious oscillation. [`improved`](Self::improved) moves them on contacts that
-/// were closed before only (Klapproth, Schiela, Deuflhard, SIAM J. Numer. Anal. 49, 2011), so that bodies may approach
-/// within a step as they do without contact.
+/// The contact forces are then free of the spurious oscillation. [`improved`](Self::improved) moves them on contacts
+/// that were closed before only (Klapproth, Schiela, Deuflhard, SIAM J. Numer. Anal. 49, 2011), so that bodies may
+/// approach within a step as they do without contact.
 ///
-/// Linear momentum is conserved, and the energy never rises (β = ¼, γ = ½). Known failures: an impact loses the energy of
-/// the contact nodes' mass, as a plastic one; their velocity keeps the value that the stopped approach has left in it,
-/// because displacements alone are moved. Damping would act on that velocity for as long as contact lasts, so that building
-/// a simulation of bodies with damping is refused. Costs a contact problem in the norm of the mass a step.
+/// Linear momentum is conserved, and the energy never rises (β = ¼, γ = ½). Known failures: an impact loses the energy
+/// of the contact nodes' mass, as a plastic one; their velocity keeps the value that the stopped approach has left in
+/// it, because displacements alone are moved. Damping would act on that velocity for as long as contact lasts, so that
+/// building a simulation of bodies with damping is refused. Costs a contact problem in the norm of the mass a step.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -121,8 +122,8 @@ impl<T: Real> Corrector<T> for ContactStabilized {
     }
 }
 
-/// Refuses schemes that read a past before the last state, or go through intermediate ones: there the force of a step leaves
-/// more than an acceleration behind.
+/// Refuses schemes that read a past before the last state, or go through intermediate ones: there the force of a step
+/// leaves more than an acceleration behind.
 pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static str> {
     match tableau.depth() == 1 && tableau.stages.len() == 1 {
         true => Ok(()),

@@ -82,8 +82,8 @@ pub(crate) trait Gaps<T: Real> {
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
 
-    /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized there;
-    /// afterwards rows are those of `here` (time, u) again.
+    /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized
+    /// there; afterwards rows are those of `here` (time, u) again.
     fn elsewhere(&mut self, field: usize, there: (f64, [&[T]; 3]), here: (f64, &[T]), out: &mut [T]) -> Result<()>;
 }
 
@@ -324,8 +324,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Takes for no jump what the rows of the scheme make of gaps that are met to some of their rounding: rows that depend on one
-    /// another contradict each other by that.
+    /// Takes for no jump what the rows of the scheme make of gaps that are met to some of their rounding: rows that
+    /// depend on one another contradict each other by that.
     fn allow_rounding_of_gaps(&mut self, rows: &[usize], jump: Jump) {
         /// Roundings of a gap that it may miss.
         const ROUNDINGS: f64 = 32.0;
@@ -391,23 +391,24 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies impulses to v along rows, v ← v + δv with δv = M⁻¹ Gᵀ impulses, and with damping the change of its forces
-    /// to a. They are booked as impulses of their contacts, and the energy they take, seen from the obstacle, as dissipated by
-    /// these.
+    /// Applies impulses to v along rows, v ← v + δv with δv = M⁻¹ Gᵀ impulses, and with damping the change of its
+    /// forces to a. They are booked as impulses of their contacts, and the energy they take, seen from the obstacle, as
+    /// dissipated by these.
     ///
     /// ```text
     /// a ← a − M⁻¹ C δv               by schemes that read no a: the balance holds at the corrected state
     /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others: it holds to order h
     /// ```
     ///
-    /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of δv at
-    /// this instant; with h C large beside M it changes v by many times δv, though the damping would have stopped the bodies
-    /// by then. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for large ones; momentum
-    /// is conserved as before. It costs a solve where v changes.
+    /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of
+    /// δv at this instant; with h C large beside M it changes v by many times δv, though the damping would have stopped
+    /// the bodies by then. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for
+    /// large ones; momentum is conserved as before. It costs a solve where v changes.
     ///
     /// # Errors
     ///
-    /// [`Error::ContactNotFinite`] if a rate of the gaps is, and those of the linear solver, which direct ones do not have.
+    /// [`Error::ContactNotFinite`] if a rate of the gaps is, and those of the linear solver, which direct ones do not
+    /// have.
     pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         self.read_rates()?;
         self.apply(rows, impulses)
@@ -539,8 +540,8 @@ impl<T: Real> Correction<'_, T> {
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
     }
 
-    /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as there
-    /// is one: the bodies leave each other faster, or with a negative energy slower.
+    /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as
+    /// there is one: the bodies leave each other faster, or with a negative energy slower.
     ///
     /// # Errors
     ///
@@ -555,8 +556,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can tell:
-    /// the bodies leave each other with that energy more, and the past that later rows read has had the same velocity.
+    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can
+    /// tell: the bodies leave each other with that energy more, and the past that later rows read has had the same
+    /// velocity.
     pub(super) fn give_back(&mut self, row: usize) -> Result<()> {
         let (s, rate) = (self.compliance(row), self.rate(row)?);
         let taken = self.contacts.dissipated[row];
@@ -581,8 +583,8 @@ impl<T: Real> Correction<'_, T> {
         self.move_past(row, impulse)
     }
 
-    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later rows read
-    /// them. Schemes that difference displacements would see a part of it else, or more than all.
+    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
+    /// rows read them. Schemes that difference displacements would see a part of it else, or more than all.
     fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
         // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
@@ -607,9 +609,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
-    /// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
-    /// (u, h v, h² a) to a multiplier.
+    /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in
+    /// this step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response
+    /// of the scheme's (u, h v, h² a) to a multiplier.
     pub(super) fn act_implicitly(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
@@ -629,8 +631,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Zeroes the accelerations of all dofs that engaged rows act on, and takes their inertia out of the reported forces;
-    /// after [`solve_acceleration_jumps`](Self::solve_acceleration_jumps).
+    /// Zeroes the accelerations of all dofs that engaged rows act on, and takes their inertia out of the reported
+    /// forces; after [`solve_acceleration_jumps`](Self::solve_acceleration_jumps).
     pub(super) fn stop_accelerations(&mut self) {
         let Self { buffers, contacts, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
@@ -658,8 +660,8 @@ impl<T: Real> Correction<'_, T> {
         Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
     }
 
-    /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw multipliers of
-    /// the closed rows, as far as there is any.
+    /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw
+    /// multipliers of the closed rows, as far as there is any.
     pub(super) fn exchange_by_forces(&mut self, energy: T) -> Result<()> {
         self.read_rates()?;
         let rows = std::mem::take(&mut self.buffers.closed);
@@ -697,9 +699,9 @@ impl<T: Real> Correction<'_, T> {
         (0..self.buffers.opened.len()).try_for_each(|i| each(self, self.buffers.opened[i]))
     }
 
-    /// In the last stage of a step calls a function with every row that was closed in this step, or at its start, and is open at
-    /// its end, up to its first error. Velocities between stages are not read again by every scheme: what is to last is given
-    /// to the state at the end.
+    /// In the last stage of a step calls a function with every row that was closed in this step, or at its start, and
+    /// is open at its end, up to its first error. Velocities between stages are not read again by every scheme: what is
+    /// to last is given to the state at the end.
     ///
     /// # Errors
     ///
@@ -709,8 +711,8 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
-    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the law
-    /// reads the gap at the start of a stage.
+    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
+    /// law reads the gap at the start of a stage.
     ///
     /// # Errors
     ///
@@ -757,7 +759,8 @@ impl<T: Real> Correction<'_, T> {
         before.clear();
         before.extend_from_slice(jump);
         projection.solve(jump);
-        // In a stage before the last the state that the step starts from loses what the later stages do not see any more.
+        // In a stage before the last the state that the step starts from loses what the later stages do not see any
+        // more.
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
             constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
             for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {

@@ -58,15 +58,15 @@ pub struct JumpProjection<T: Real> {
 }
 
 impl<T: Real> JumpProjection<T> {
-    /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those without
-    /// mass.
+    /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those
+    /// without mass.
     ///
     /// # Errors
     ///
     /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is negative or
     /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::MissingDof`] and
-    /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`] for a matrix that is not
-    /// square.
+    /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`] for a matrix
+    /// that is not square.
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
@@ -113,8 +113,9 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] for a row that G does not have, or with a consistent mass one beyond those announced; [`Error::MissingDof`] for a dof of G that the mass does not have; [`Error::ContactNotFinite`] for
-    /// a row whose S is not a number (`feature` is the row of G).
+    /// [`Error::Incompatible`] for a row that G does not have, or with a consistent mass one beyond those announced;
+    /// [`Error::MissingDof`] for a dof of G that the mass does not have; [`Error::ContactNotFinite`] for a row whose S
+    /// is not a number (`feature` is the row of G).
     pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.check_rows(g, rows)?;
         let contact = |feature| ContactId { constraint: 0, feature, candidate: 0 };

@@ -6,19 +6,21 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
 
-/// The velocity jump of Laursen and Love (Int. J. Numer. Methods Eng. 53, 2002): after a step the velocities along closed
-/// contacts jump so that kinetic energy changes by what the contact forces took from the bodies, to the digit.
+/// The velocity jump of Laursen and Love (Int. J. Numer. Methods Eng. 53, 2002): after a step the velocities along
+/// closed contacts jump so that kinetic energy changes by what the contact forces took from the bodies, to the digit.
 ///
 /// ```text
 /// v ← v + τ M⁻¹ Gᵀ λ,      ½ τ² λᵀ S λ + τ λᵀ G v + λᵀ (g' − g) = 0
 /// ```
 ///
-/// with the root that separates. For schemes whose balance holds in the middle of the step, where λ (g' − g) is what contact
-/// does: with the midpoint rule, `Gssss::new(1.0, 1.0, 1.0)`, and with [`EnergyMomentum`](crate::EnergyMomentum) every step
-/// ends with the energy it began with, whatever the mesh and the step. Linear momentum is conserved.
+/// with the root that separates. For schemes whose balance holds in the middle of the step, where λ (g' − g) is what
+/// contact does: with the midpoint rule, `Gssss::new(1.0, 1.0, 1.0)`, and with
+/// [`EnergyMomentum`](crate::EnergyMomentum) every step ends with the energy it began with, whatever the mesh and the
+/// step. Linear momentum is conserved.
 ///
-/// Known failure: the contact nodes rebound elastically, one element deep, so that contact is lost and found again while the
-/// bodies stay together: forces come as a train of pulses, and the velocity of contact nodes is wrong by its own size.
+/// Known failure: the contact nodes rebound elastically, one element deep, so that contact is lost and found again
+/// while the bodies stay together: forces come as a train of pulses, and the velocity of contact nodes is wrong by its
+/// own size.
 ///
 /// ```
 /// use contact_dynamics::Corrector;

@@ -37,21 +37,21 @@ pub enum HistoryProjection {
 /// p' = p − (w_ā/w_a) S⁻¹ (G a − γ_a)
 /// ```
 ///
-/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses). p' is the reported force; the
-/// raw p keeps deciding release. Rows that touch without pressure are corrected on approach only. Linear momentum is conserved,
-/// and the correction never raises the kinetic energy: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n) of the energy of two
-/// equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed contact are projected too;
-/// multistep schemes need it, one-step schemes that read no past ignore it.
+/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses). p' is the reported force;
+/// the raw p keeps deciding release. Rows that touch without pressure are corrected on approach only. Linear momentum
+/// is conserved, and the correction never raises the kinetic energy: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n)
+/// of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed
+/// contact are projected too; multistep schemes need it, one-step schemes that read no past ignore it.
 ///
-/// It applies to schemes that impose contact on the displacements of the state; with the others ([`ContactLevel`]) building
-/// a simulation is refused.
+/// It applies to schemes that impose contact on the displacements of the state; with the others ([`ContactLevel`])
+/// building a simulation is refused.
 ///
 /// [`ContactLevel`]: crate::tableau::ContactLevel
 ///
 /// Known failures: it cannot restore the energy of the contact nodes' mass, and at release the velocity keeps the
 /// overshoot that any scheme shows there. In the step in which contact opens the trapezoidal rule lets the force of the
-/// state before act for half a step over the gap that opens; where a step is long beside the waves that end contact (Courant
-/// numbers far above 1) that may still raise the energy of a run. Take a scheme with numerical damping there.
+/// state before act for half a step over the gap that opens; where a step is long beside the waves that end contact
+/// (Courant numbers far above 1) that may still raise the energy of a run. Take a scheme with numerical damping there.
 ///
 /// ```
 /// use contact_dynamics::corrector::Parts;

@@ -1,5 +1,5 @@
-//! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the contact
-//! conditions.
+//! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the
+//! contact conditions.
 
 use super::correction::{ErasedGaps, contact_error, rounding};
 use super::{Buffers, JumpProjection};
@@ -50,9 +50,9 @@ impl<T: Real> Prediction<'_, T> {
         self.t
     }
 
-    /// Moves u + h v to the nearest point, in the norm of the mass, that no contact forbids, and shifts the displacements
-    /// that the stage starts from by as much: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts of dofs without mass
-    /// are left out, and all under other laws than rigid ones.
+    /// Moves u + h v to the nearest point, in the norm of the mass, that no contact forbids, and shifts the
+    /// displacements that the stage starts from by as much: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts of
+    /// dofs without mass are left out, and all under other laws than rigid ones.
     ///
     /// # Errors
     ///

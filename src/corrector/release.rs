@@ -4,27 +4,28 @@ use super::{Correction, Corrector, Edits};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
-/// Gives back at release what corrections took at impact: the release counterpart of the λ_v/λ_a correction, to be added
-/// after it.
+/// Gives back at release what corrections took at impact: the release counterpart of the λ_v/λ_a correction, to be
+/// added after it.
 ///
-/// An impact stops the mass m_c of the contact nodes, and their energy ½ m_c ġ² is gone (theory, sections 10 and 16). Nothing in the bodies
-/// has lost it: the exact solution has no such mass. At the end of the first step in which the contact is open its nodes get the
-/// impulse that restores [`dissipated`](crate::ContactState::dissipated) to the kinetic energy,
+/// An impact stops the mass m_c of the contact nodes, and their energy ½ m_c ġ² is gone (theory, sections 10 and 16).
+/// Nothing in the bodies has lost it: the exact solution has no such mass. At the end of the first step in which the
+/// contact is open its nodes get the impulse that restores [`dissipated`](crate::ContactState::dissipated) to the
+/// kinetic energy,
 ///
 /// ```text
 /// v ← v + M⁻¹ G_rowᵀ j,      ½ S j² + j ⟦v⟧ = dissipated,      ⟦v⟧ = G_row v + ∂g/∂t
 /// ```
 ///
-/// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also the
-/// velocity that the exact solution jumps to. Accelerations need no correction: those of the first open step hold no contact
-/// force. Linear momentum is conserved. ⟦v⟧ and what was taken are relative, so that a velocity common to all changes nothing. Kinetic
-/// energy never exceeds what it was before the impact by more than the scheme makes of it, and without numerical damping the
-/// run keeps what is given back (`docs/theory.md`, section 16).
+/// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also
+/// the velocity that the exact solution jumps to. Accelerations need no correction: those of the first open step hold
+/// no contact force. Linear momentum is conserved. ⟦v⟧ and what was taken are relative, so that a velocity common to
+/// all changes nothing. Kinetic energy never exceeds what it was before the impact by more than the scheme makes of it,
+/// and without numerical damping the run keeps what is given back (`docs/theory.md`, section 16).
 ///
-/// Known failure: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping removes again. A
-/// contact that is pushed shut for good keeps what it took. Schemes that read a past want it projected at impact
-/// ([`with_history_projection`](crate::PersistencyCorrection::with_history_projection)): else contacts may open and close again,
-/// and such a run of Park's scheme may end with .02 % of the energy less than without release.
+/// Known failure: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping removes
+/// again. A contact that is pushed shut for good keeps what it took. Schemes that read a past want it projected at
+/// impact ([`with_history_projection`](crate::PersistencyCorrection::with_history_projection)): else contacts may open
+/// and close again, and such a run of Park's scheme may end with .02 % of the energy less than without release.
 ///
 /// ```
 /// use contact_dynamics::corrector::Release;
@@ -49,29 +50,30 @@ impl<T: Real> Corrector<T> for Release {
     }
 }
 
-/// Impact and release conditions from waves in the contact elements (Hughes, Taylor, Sackman, Curnier, Kanoknukulchai, Comput.
-/// Methods Appl. Mech. Eng. 8, 1976; Taylor, Papadopoulos, Int. J. Numer. Methods Eng. 36, 1993), in a form that conserves
-/// momentum.
+/// Impact and release conditions from waves in the contact elements (Hughes, Taylor, Sackman, Curnier, Kanoknukulchai,
+/// Comput. Methods Appl. Mech. Eng. 8, 1976; Taylor, Papadopoulos, Int. J. Numer. Methods Eng. 36, 1993), in a form
+/// that conserves momentum.
 ///
 /// At impact, and as long as it lasts, velocity and acceleration of both sides are the common ones, as by
-/// [`PersistencyCorrection`](super::PersistencyCorrection). At release the stress p that the contact has held runs off as a
-/// wave, and changes the velocity of side i by p/(ρ_i c_i): the gap opens at the rate λ (1/Z₁ + 1/Z₂), with the impedances Z_i = ρ_i c_i A of
-/// the bodies behind the contact and λ the last force reported. The nodes get this relative velocity from one impulse j along the
-/// row,
+/// [`PersistencyCorrection`](super::PersistencyCorrection). At release the stress p that the contact has held runs off
+/// as a wave, and changes the velocity of side i by p/(ρ_i c_i): the gap opens at the rate λ (1/Z₁ + 1/Z₂), with the
+/// impedances Z_i = ρ_i c_i A of the bodies behind the contact and λ the last force reported. The nodes get this
+/// relative velocity from one impulse j along the row,
 ///
 /// ```text
 /// v ← v + M⁻¹ Gᵀ j,      S j = λ (1/Z₁ + 1/Z₂)        (S = G M⁻¹ Gᵀ)
 /// ```
 ///
-/// which takes from one side the momentum that it gives to the other, whatever the bodies. With contact nodes of mass m_i = ½ τ_i Z_i, whose
-/// elements a wave crosses in τ_i, it is j = ½ λ (τ₁ m₂ + τ₂ m₁)/(m₁ + m₂): the papers' own condition where τ₁ = τ₂, and then
-/// [`new`](Self::new) says it with τ alone, j = ½ τ λ. Where they differ, the papers' velocities of the two sides would not
-/// conserve momentum on the nodes; here each side has its share of the relative velocity by its mass.
+/// which takes from one side the momentum that it gives to the other, whatever the bodies. With contact nodes of mass
+/// m_i = ½ τ_i Z_i, whose elements a wave crosses in τ_i, it is j = ½ λ (τ₁ m₂ + τ₂ m₁)/(m₁ + m₂): the papers' own
+/// condition where τ₁ = τ₂, and then
+/// [`new`](Self::new) says it with τ alone, j = ½ τ λ. Where they differ, the papers' velocities of the two sides would
+/// not conserve momentum on the nodes; here each side has its share of the relative velocity by its mass.
 ///
 /// Energy changes at release by ½ S j² + j ⟦v⟧, which may be a rise.
 ///
-/// Known failure: where the force falls to zero over several steps, as waves on a mesh make it, there is hardly any left to be
-/// released, and the condition does next to nothing.
+/// Known failure: where the force falls to zero over several steps, as waves on a mesh make it, there is hardly any
+/// left to be released, and the condition does next to nothing.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -108,8 +110,8 @@ impl TaylorPapadopoulos {
         positive("the transit time of the contact elements", transit).map(|transit| Self(Waves::Transit(transit)))
     }
 
-    /// With the impedances ρ c A of the two sides (mass/time), A the area that belongs to a contact; of all contacts the same. The
-    /// impedance of what is rigid is infinite.
+    /// With the impedances ρ c A of the two sides (mass/time), A the area that belongs to a contact; of all contacts
+    /// the same. The impedance of what is rigid is infinite.
     ///
     /// # Errors
     ///

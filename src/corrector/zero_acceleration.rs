@@ -4,13 +4,15 @@ use super::{Correction, Corrector};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Sets the accelerations of all dofs that pressed contacts act on to zero, and takes the inertia of the relative acceleration
-/// out of the reported force: the naive stabilization that is common in Schwarz couplings and for obstacles at rest.
+/// Sets the accelerations of all dofs that pressed contacts act on to zero, and takes the inertia of the relative
+/// acceleration out of the reported force: the naive stabilization that is common in Schwarz couplings and for
+/// obstacles at rest.
 ///
-/// Between equal bodies that meet head on it is the acceleration part of the λ_v/λ_a correction. Velocities are left as they
-/// are. Linear momentum is not conserved where bodies differ, nor for an obstacle that accelerates: what is left of a is
-/// removed, though nothing pushes. The impulse of a contact books the relative part alone, so that it misses the change of
-/// momentum of the schemes that read a. Where rows are oblique to the dofs, tangential accelerations vanish too.
+/// Between equal bodies that meet head on it is the acceleration part of the λ_v/λ_a correction. Velocities are left as
+/// they are. Linear momentum is not conserved where bodies differ, nor for an obstacle that accelerates: what is left
+/// of a is removed, though nothing pushes. The impulse of a contact books the relative part alone, so that it misses
+/// the change of momentum of the schemes that read a. Where rows are oblique to the dofs, tangential accelerations
+/// vanish too.
 ///
 /// ```
 /// use contact_dynamics::Corrector;

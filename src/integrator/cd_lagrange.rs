@@ -3,8 +3,8 @@
 use super::{TimeIntegrator, central_difference};
 use crate::tableau::{ContactLevel, Rows, Stage, Tableau};
 
-/// CD-Lagrange (Fekak, Brun, Gravouil, Depale, Comput. Mech. 60, 2017; Di Stasio et al., Adv. Model. Simul. Eng. Sci. 6,
-/// 2019): central differences with contact as a condition on the half-step velocity.
+/// CD-Lagrange (Fekak, Brun, Gravouil, Depale, Comput. Mech. 60, 2017; Di Stasio et al., Adv. Model. Simul. Eng. Sci.
+/// 6, 2019): central differences with contact as a condition on the half-step velocity.
 ///
 /// ```text
 /// u' = u + h v + ½ h² a,     v' = v + ½ h (a + a')         M a' + C v' + f_int(u') = f(t') + Gᵀλ'

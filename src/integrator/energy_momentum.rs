@@ -3,28 +3,29 @@
 use super::TimeIntegrator;
 use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 
-/// The conserving scheme of Simo and Tarnow (Z. angew. Math. Phys. 43, 1992) and of Gonzalez (Comput. Methods Appl. Mech.
-/// Eng. 190, 2000), for nonlinear systems: the internal force of a step is the one whose work is the change of the
-/// potential.
+/// The conserving scheme of Simo and Tarnow (Z. angew. Math. Phys. 43, 1992) and of Gonzalez (Comput. Methods Appl.
+/// Mech. Eng. 190, 2000), for nonlinear systems: the internal force of a step is the one whose work is the change of
+/// the potential.
 ///
 /// ```text
 /// u' = u + ½ h (v + v'),     M (v' − v)/h = f(t + ½ h; u → u', v̄) + Gᵀ λ,     v̄ = ½ (v + v')
 /// ```
 ///
-/// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none, the
-/// mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; the latter reads
+/// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none,
+/// the mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; the latter
+/// reads
 /// [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and takes
 /// three forces an iteration, and two tangents.
 ///
 /// * Conserves the energy of conservative systems without contact, whatever the step, to the tolerance of
-///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` does (the mean
-///   stress on the mean configuration does, Simpson's mean errs by O(h²)).
-/// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a lives at the middle
-///   of the step and is extrapolated for a [`State`](crate::State).
-/// * The exact tangent of a path is not symmetric and takes [`Lu`](crate::Lu); a symmetric one close to it takes an iteration more. Of
-///   the mean of three forces it is that of Simpson's rule.
-/// * Contact is imposed on the displacements at the end of the step. Impacts cost the energy of the contact nodes if they
-///   are corrected; raw, energy may rise or fall there.
+///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` does (the
+///   mean stress on the mean configuration does, Simpson's mean errs by O(h²)).
+/// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a lives at the
+///   middle of the step and is extrapolated for a [`State`](crate::State).
+/// * The exact tangent of a path is not symmetric and takes [`Lu`](crate::Lu); a symmetric one close to it takes an
+///   iteration more. Of the mean of three forces it is that of Simpson's rule.
+/// * Contact is imposed on the displacements at the end of the step. Impacts cost the energy of the contact nodes if
+///   they are corrected; raw, energy may rise or fall there.
 ///
 /// ```
 /// use contact_dynamics::{EnergyMomentum, Newmark, TimeIntegrator, analysis};

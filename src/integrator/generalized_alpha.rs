@@ -26,8 +26,8 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 ///   damping for a given ρ∞; its spectrum with ρ∞ = 0 is Houbolt's.
 /// * Internal forces are those of the mean displacement, f_int(ū), not the mean of two forces.
 /// * Conserves linear momentum in the form v + (1 − γ − α_m) h a.
-/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + (1 − α_f) h. The scheme
-///   carries a: after an impact it needs both parts of the correction.
+/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + (1 − α_f) h. The
+///   scheme carries a: after an impact it needs both parts of the correction.
 ///
 /// ```
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};

@@ -4,21 +4,21 @@ use super::{TimeIntegrator, within};
 use crate::error::Result;
 use crate::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 
-/// The θ scheme of Moreau and Jean for nonsmooth dynamics (Jean, Comput. Methods Appl. Mech. Eng. 177, 1999): impacts are
-/// impulses of the step, contact is a condition on velocities.
+/// The θ scheme of Moreau and Jean for nonsmooth dynamics (Jean, Comput. Methods Appl. Mech. Eng. 177, 1999): impacts
+/// are impulses of the step, contact is a condition on velocities.
 ///
 /// ```text
 /// u' = u + h v̄,     M (v' − v)/h + C v̄ + f_int(ū) = f(t + θh) + Gᵀλ,     x̄ = θ x' + (1 − θ) x
 /// 0 ≤ ġ' ⊥ λ ≥ 0  for contacts with g(t) + ½ h ġ(t) ≤ 0
 /// ```
 ///
-/// * Order 2 for θ = ½, order 1 otherwise. The stored a is the mean of the step and lives at its middle; the acceleration
-///   of a [`State`](crate::State) is extrapolated to its time.
+/// * Order 2 for θ = ½, order 1 otherwise. The stored a is the mean of the step and lives at its middle; the
+///   acceleration of a [`State`](crate::State) is extrapolated to its time.
 /// * Unconditionally stable for θ ≥ ½; ρ∞ = (1 − θ)/θ. θ = ½ conserves the energy of linear free motion and has the
 ///   trapezoidal rule's spectrum.
 /// * Conserves linear momentum in the form v. Impacts are plastic (restitution 0).
-/// * Contact is imposed on the velocities at the end of the step. Gaps are not controlled: a penetration of the order of
-///   h times the approach speed stays. At the impact the force is the impulse over h, and no correction applies.
+/// * Contact is imposed on the velocities at the end of the step. Gaps are not controlled: a penetration of the order
+///   of h times the approach speed stays. At the impact the force is the impulse over h, and no correction applies.
 ///
 /// ```
 /// use contact_dynamics::{MoreauJean, TimeIntegrator, analysis};

@@ -37,7 +37,8 @@ impl Newmark {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless 0 < β ≤ 1 and ½ ≤ γ ≤ 1 (below γ = ½ the scheme has negative damping).
+    /// [`Error::Parameter`](crate::Error::Parameter) unless 0 < β ≤ 1 and ½ ≤ γ ≤ 1 (below γ = ½ the scheme has
+    /// negative damping).
     pub fn new(beta: f64, gamma: f64) -> Result<Self> {
         Ok(Self {
             beta: within("Newmark's β", beta, f64::MIN_POSITIVE..=1.0, "in (0, 1]")?,

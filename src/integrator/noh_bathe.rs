@@ -17,10 +17,11 @@ use crate::tableau::{A, ContactLevel, Row, Rows, Stage, Tableau, U, V, Z};
 ///
 /// * Order 2. For p = 0.54: period error −0.25 % at h/T = 0.1, stable for Ω < 3.745; high frequencies are damped.
 /// * Conserves linear momentum.
-/// * Displacements are known before a stage's forces, so contact is imposed on those at the end of the next stage, which
-///   the multiplier decides (forward increments, as in [`CentralDifference`](crate::CentralDifference)): no state
-///   penetrates, and no correction applies. Imposed on the velocities of either stage instead, the multipliers of the two
-///   stages fight: the force of two bars had ten times the error. A rigid mass leaves with up to 6 % of its approach speed.
+/// * Displacements are known before a stage's forces, so contact is imposed on those at the end of the next stage,
+///   which the multiplier decides (forward increments, as in [`CentralDifference`](crate::CentralDifference)): no state
+///   penetrates, and no correction applies. Imposed on the velocities of either stage instead, the multipliers of the
+///   two stages fight: the force of two bars had ten times the error. A rigid mass leaves with up to 6 % of its
+///   approach speed.
 ///
 /// ```
 /// use contact_dynamics::{NohBathe, TimeIntegrator, analysis};

@@ -10,17 +10,17 @@ use std::ops::Range;
 
 /// Factorizes each body on its own.
 ///
-/// Bodies are the connected components of the matrix. Contact and ties by multipliers couple none of them, so that bodies in
-/// contact stay apart in the effective matrix; bodies that share a dof, a spring or a penalty in K are one. Each
-/// is ordered, factorized and solved alone, with one solver for all or with a solver of its own
+/// Bodies are the connected components of the matrix. Contact and ties by multipliers couple none of them, so that
+/// bodies in contact stay apart in the effective matrix; bodies that share a dof, a spring or a penalty in K are one.
+/// Each is ordered, factorized and solved alone, with one solver for all or with a solver of its own
 /// ([`body`](Self::body)). Results are those of a single factorization up to rounding.
 ///
 /// Dofs that are coupled to no other (prescribed ones, point masses, a whole diagonal matrix) are gathered and divided
-/// through, whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs of
-/// contact is condensed by its own solver.
+/// through, whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs
+/// of contact is condensed by its own solver.
 ///
-/// Symmetry and rounding are judged body by body, relative to the entries of the body: a soft body beside a stiff one is
-/// held to its own scale. Errors name dofs of the whole system.
+/// Symmetry and rounding are judged body by body, relative to the entries of the body: a soft body beside a stiff one
+/// is held to its own scale. Errors name dofs of the whole system.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -56,8 +56,8 @@ impl<'a, T: Real> ByBody<'a, T> {
         Self { others: Box::new(solver), chosen: Vec::new() }
     }
 
-    /// A solver for the bodies that have any of these dofs: one dof of a body, or the range of all its dofs, of which some may
-    /// be prescribed.
+    /// A solver for the bodies that have any of these dofs: one dof of a body, or the range of all its dofs, of which
+    /// some may be prescribed.
     ///
     /// The analysis refuses dofs that do not exist ([`Error::MissingDof`]) and bodies that are given two solvers
     /// ([`Error::Incompatible`]).
@@ -285,8 +285,8 @@ impl<T: Real> Part<T> {
         factor.solve(column).map_err(|error| in_system(error, |dof| dofs.at(dof)))
     }
 
-    /// Condenses, what contact touches; the solution on its part of the interface is in `on_interface`. What contact does
-    /// not touch is solved.
+    /// Condenses, what contact touches; the solution on its part of the interface is in `on_interface`. What contact
+    /// does not touch is solved.
     fn condense(&mut self, rhs: &[T]) -> Result<()> {
         if !self.touches() {
             return self.solve(rhs);

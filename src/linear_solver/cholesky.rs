@@ -14,16 +14,16 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// Sparse Cholesky factorization of symmetric positive definite matrices, the dofs of contact eliminated last, the others
-/// in an order with little fill ([`Ordering`]).
+/// Sparse Cholesky factorization of symmetric positive definite matrices, the dofs of contact eliminated last, the
+/// others in an order with little fill ([`Ordering`]).
 ///
 /// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
 /// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst
 /// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
 /// see `docs/design.md`.
 ///
-/// With the feature `rayon` large factors are computed and swept by the threads of the pool in which that is called. Results are
-/// the same bit for bit by any number of them.
+/// With the feature `rayon` large factors are computed and swept by the threads of the pool in which that is called.
+/// Results are the same bit for bit by any number of them.
 ///
 /// [`analyze`](LinearSolver::analyze) refuses, besides what the trait says, an order that does not fit the pattern:
 /// [`Error::Dimension`], [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
@@ -49,8 +49,8 @@ impl Cholesky {
         Self { ordering }
     }
 
-    /// Number of scalars that the factor of a pattern (both triangles) will hold with `last` (ascending) eliminated last,
-    /// without allocating it: what [`Factorization::stored_values`] will say.
+    /// Number of scalars that the factor of a pattern (both triangles) will hold with `last` (ascending) eliminated
+    /// last, without allocating it: what [`Factorization::stored_values`] will say.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -103,7 +103,8 @@ struct Factor<T: Real> {
     cursor: Vec<usize>,
 }
 
-/// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of zero.
+/// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of
+/// zero.
 pub(super) fn negligible<T: Real>(n: usize) -> T {
     T::of(16.0 * (n as f64).sqrt()) * T::epsilon()
 }

@@ -9,15 +9,16 @@ use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// The preconditioner of [`ConjugateGradients`]. All work on blocks of the two or three dofs of a node, where the pattern of
-/// the matrix shows such.
+/// The preconditioner of [`ConjugateGradients`]. All work on blocks of the two or three dofs of a node, where the
+/// pattern of the matrix shows such.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preconditioner {
     /// The diagonal blocks. For comparison: the other two need fewer iterations.
     Nodes,
-    /// A forward and a backward sweep of Gauss–Seidel, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci. Stat.
-    /// Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no memory of its own.
+    /// A forward and a backward sweep of Gauss–Seidel, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci.
+    /// Stat. Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no memory of its
+    /// own.
     #[default]
     GaussSeidel,
     /// Incomplete Cholesky factorization without fill (Meijerink and van der Vorst, Math. Comput. 31, 1977), with a
@@ -26,22 +27,22 @@ pub enum Preconditioner {
     IncompleteCholesky,
 }
 
-/// Preconditioned conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) for symmetric positive
-/// definite matrices: an iteration instead of a factor, for large solid bodies at small steps.
+/// Preconditioned conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) for symmetric
+/// positive definite matrices: an iteration instead of a factor, for large solid bodies at small steps.
 ///
 /// At small steps inertia dominates the effective matrix w_ā/h² M + K: its condition number is about 1 + Co² with the
-/// Courant number Co of the step, whatever the size of the body, and few iterations do. `docs/performance.md` has the Courant
-/// number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky). Memory is that of
-/// half the matrix, where factors of solids hold ten to a hundred times as much.
+/// Courant number Co of the step, whatever the size of the body, and few iterations do. `docs/performance.md` has the
+/// Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky). Memory
+/// is that of half the matrix, where factors of solids hold ten to a hundred times as much.
 ///
 /// Every solve starts from zero and remembers nothing of earlier ones. Steps solve for the increment from the predicted
-/// motion, so that zero is the prediction: the start is as warm as a scheme can make it, and a run that is resumed from a
-/// clone goes on bit for bit.
+/// motion, so that zero is the prediction: the start is as warm as a scheme can make it, and a run that is resumed from
+/// a clone goes on bit for bit.
 ///
-/// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), over that of the right-hand side, which does not
-/// depend on the units of the dofs: nearly the error in the energy norm of A. An iteration ends at the
-/// [`tolerance`](Self::tolerance), or where a step changes nothing more that the scalar resolves (as it always does in `f32`
-/// with the default tolerance).
+/// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), over that of the right-hand side, which
+/// does not depend on the units of the dofs: nearly the error in the energy norm of A. An iteration ends at the
+/// [`tolerance`](Self::tolerance), or where a step changes nothing more that the scalar resolves (as it always does in
+/// `f32` with the default tolerance).
 ///
 /// Offers no [`condensation`](Factorization::condensation): contact takes a full solve for each row that presses (kept
 /// as long as rows and matrix are) and one more a step. For hundreds of contacts that move, take a factorization.
@@ -71,8 +72,8 @@ pub enum Preconditioner {
 ///
 /// A factorization refuses what [`Cholesky`](super::Cholesky) refuses of entries and symmetry, and diagonal blocks
 /// that are not positive definite: [`Error::Singular`]. A solve fails with [`Error::LinearNotConverged`], and with
-/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is found out only
-/// if a right-hand side leads there. [`Error::Dimension`] for right-hand sides of another size.
+/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is found out
+/// only if a right-hand side leads there. [`Error::Dimension`] for right-hand sides of another size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConjugateGradients {
     tolerance: f64,
@@ -88,9 +89,11 @@ impl Default for ConjugateGradients {
 }
 
 impl ConjugateGradients {
-    /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by default.
+    /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by
+    /// default.
     ///
-    /// The default leaves energy, momentum and displacements of a run with impacts to about a fifth of itself of those by
+    /// The default leaves energy, momentum and displacements of a run with impacts to about a fifth of itself of those
+    /// by
     /// [`Cholesky`](super::Cholesky) (`cargo bench --bench iterative`): below the error of any step in practice, for an
     /// iteration more a digit. Errors do not grow as steps become smaller: each solve is for the increment of its step.
     ///
@@ -272,8 +275,8 @@ impl<T: Real> Matrix<T> {
     fn incomplete(&mut self) -> Result<()> {
         let Self { size, pointers, columns, values, factor, inverses, .. } = self;
         let lower = Blocks { pointers, columns, values };
-        // Doubled from a thousandth of the diagonal: with the shift the factor of any matrix with a unit diagonal exists in the
-        // end.
+        // Doubled from a thousandth of the diagonal: with the shift the factor of any matrix with a unit diagonal
+        // exists in the end.
         let shifts = std::iter::successors(Some(1e-3), |shift| Some(2.0 * shift)).take_while(|shift| *shift < 1e6);
         for shift in std::iter::once(0.0).chain(shifts) {
             if T::incomplete_cholesky(*size, &lower, T::of(shift), factor, inverses) {

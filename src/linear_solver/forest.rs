@@ -1,9 +1,10 @@
 //! The elimination forest of a supernodal factor: who hands what to whom in a sweep, and what may go side by side.
 //!
-//! A sweep with a work vector for each supernode (its own rows, then those below it) needs nothing but that of the parent:
-//! forward a supernode adds what its children have for it, backward it hands its children what they need (Duff and Reid,
-//! ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may be swept at the same time. What is added
-//! to what, and in which order, is a matter of the factor alone: results are the same bit for bit on any number of threads.
+//! A sweep with a work vector for each supernode (its own rows, then those below it) needs nothing but that of the
+//! parent: forward a supernode adds what its children have for it, backward it hands its children what they need (Duff
+//! and Reid, ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may be swept at the same time.
+//! What is added to what, and in which order, is a matter of the factor alone: results are the same bit for bit on any
+//! number of threads.
 
 use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;

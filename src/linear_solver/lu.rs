@@ -14,22 +14,22 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// Sparse LU factorization with partial pivoting, for any regular matrix: tangents that are not symmetric (loads that
 /// follow the motion, gyroscopic and circulatory matrices), and indefinite ones.
 ///
-/// Columns are eliminated in an order with little fill for every choice of pivots (COLAMD), rows as the pivots demand. Rows and
-/// columns are first scaled by powers of two, to largest entries of about one: pivots do not depend on the units of
-/// translations and rotations, or on a stiff body beside a soft one.
+/// Columns are eliminated in an order with little fill for every choice of pivots (COLAMD), rows as the pivots demand.
+/// Rows and columns are first scaled by powers of two, to largest entries of about one: pivots do not depend on the
+/// units of translations and rotations, or on a stiff body beside a soft one.
 ///
-/// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16 ε) (Hager's
-/// estimate of the 1-norm). A generic right-hand side shows it, so it takes one solve a factorization, and three more only where
-/// that one grows. The dof named is the one that moves most in the null vector.
+/// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16
+/// ε) (Hager's estimate of the 1-norm). A generic right-hand side shows it, so it takes one solve a factorization, and
+/// three more only where that one grows. The dof named is the one that moves most in the null vector.
 ///
 /// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
-/// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact takes a full solve for
-/// each contact that presses, and one more. [`stored_values`](Factorization::stored_values) is a bound that holds for every choice
-/// of pivots; the factor may hold much less. Factorizing again does not allocate for long thin structures, where faer works column
-/// by column; for plates and solids it works in blocks and allocates some for each.
+/// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact takes a full
+/// solve for each contact that presses, and one more. [`stored_values`](Factorization::stored_values) is a bound that
+/// holds for every choice of pivots; the factor may hold much less. Factorizing again does not allocate for long thin
+/// structures, where faer works column by column; for plates and solids it works in blocks and allocates some for each.
 ///
-/// An **indefinite** matrix is factorized without complaint: where a step is too long for a negative stiffness, Newton's
-/// method is not told so, as by Cholesky.
+/// An **indefinite** matrix is factorized without complaint: where a step is too long for a negative stiffness,
+/// Newton's method is not told so, as by Cholesky.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -121,8 +121,8 @@ impl<T: Real> LinearSolver<T> for Lu {
     }
 }
 
-/// The largest number of entries of L and U with this order of columns, whatever the pivots: U fits into the triangular factor of
-/// AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8, 1987).
+/// The largest number of entries of L and U with this order of columns, whatever the pivots: U fits into the triangular
+/// factor of AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8, 1987).
 fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usize>) -> Result<usize> {
     let n = pattern.ncols();
     let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU" };
@@ -202,8 +202,8 @@ impl<T: Real> Factor<T> {
 
     /// Forms R A C; `Err` names a dof without entries.
     ///
-    /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds units that
-    /// belong to dofs.
+    /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds
+    /// units that belong to dofs.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
         self.scaled.copy_from_slice(a.val());
         self.rows.fill(T::one());
@@ -268,8 +268,8 @@ impl<T: Real> Factor<T> {
         T::lu_solve((symbolic, numeric), side, probe, 1, memory);
     }
 
-    /// Whether R A C has a condition number that leaves digits; `Err` holds the dof that moves most in its null vector, and whether
-    /// that is known.
+    /// Whether R A C has a condition number that leaves digits; `Err` holds the dof that moves most in its null vector,
+    /// and whether that is known.
     fn judge(&mut self) -> std::result::Result<(), (usize, bool)> {
         let norm = (0..self.rows.len())
             .map(|dof| sum_of_sizes(&self.scaled[self.pattern.as_ref().col_range(dof)]))

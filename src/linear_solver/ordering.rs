@@ -48,22 +48,23 @@ pub enum Ordering {
     /// dissection. Never more fill than with [`MinimumDegree`](Self::MinimumDegree).
     #[default]
     Automatic,
-    /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and hard
-    /// to beat in one and two dimensions.
+    /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and
+    /// hard to beat in one and two dimensions.
     MinimumDegree,
-    /// Multilevel nested dissection of the matrix's graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998): for solids
-    /// much less fill, the more the larger they are. Needs nothing but the matrix, and gives the same order every time.
+    /// Multilevel nested dissection of the matrix's graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998): for
+    /// solids much less fill, the more the larger they are. Needs nothing but the matrix, and gives the same order
+    /// every time.
     NestedDissection,
-    /// Nested dissection by the coordinates of each dof (those of its node): halves along the longest axis, separated by
-    /// one layer of nodes. Found faster than [`NestedDissection`](Self::NestedDissection), and as good on regular meshes
-    /// of compact bodies. Dimensions that do not exist are zero.
+    /// Nested dissection by the coordinates of each dof (those of its node): halves along the longest axis, separated
+    /// by one layer of nodes. Found faster than [`NestedDissection`](Self::NestedDissection), and as good on regular
+    /// meshes of compact bodies. Dimensions that do not exist are zero.
     Coordinates(Vec<[f64; 3]>),
     /// The host's own order, each dof once: the first entry names the dof eliminated first.
     Given(Vec<usize>),
 }
 
-/// Scalars in the factor for each dof from which on nested dissection is tried: blocks of seven elements a side and more
-/// have them. Plates and slender beams do not; dissected, they gain a few percent or lose (`benches/ordering.rs`).
+/// Scalars in the factor for each dof from which on nested dissection is tried: blocks of seven elements a side and
+/// more have them. Plates and slender beams do not; dissected, they gain a few percent or lose (`benches/ordering.rs`).
 const WORTHWHILE: usize = 200;
 
 /// The symbolic factorization with `last` (ascending) eliminated last.

@@ -9,10 +9,13 @@ use crate::{memory, sparse};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// L D Lᵀ of symmetric positive definite matrices that are tridiagonal when their dofs are numbered along strings: bars, and
-/// trains of masses and springs, in any numbering, any number of them. Contact may act on one end of a string.
+/// L D Lᵀ of symmetric positive definite matrices that are tridiagonal when their dofs are numbered along strings:
+/// bars, and trains of masses and springs, in any numbering, any number of them. Contact may act on one end of a
+/// string.
 ///
-/// Two scalars a dof, no indices, and two strings at a time: faster than [`Cholesky`](super::Cholesky), whose errors it shares. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) takes it where it fits.
+/// Two scalars a dof, no indices, and two strings at a time: faster than [`Cholesky`](super::Cholesky), whose errors it
+/// shares. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) takes it where it
+/// fits.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

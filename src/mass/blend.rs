@@ -8,18 +8,19 @@ use crate::sparse;
 use crate::tableau::Tableau;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 
-/// `weight · consistent + (1 − weight) · lumped`: total mass and row sums stay, the dispersion of waves changes (theory,
-/// section 14); [`optimal_weight`] is the one for which it is least.
+/// `weight · consistent + (1 − weight) · lumped`: total mass and row sums stay, the dispersion of waves changes
+/// (theory, section 14); [`optimal_weight`] is the one for which it is least.
 ///
-/// A weight in [0, 1] gives a positive definite matrix. One beyond 1 does as long as it is below 1/(1 − θ), with θ the least
-/// ratio of consistent to lumped kinetic energy of an element: 3/2 for linear bars, 9/8 and 27/26 for quadrilaterals and
-/// hexahedra with constant Jacobian, 4/3 and 5/4 for linear triangles and tetrahedra. Outside [0, 1] the matrix is
-/// factorized once to make sure. Stiffness is not touched, and the lumped matrix may come from anywhere.
+/// A weight in [0, 1] gives a positive definite matrix. One beyond 1 does as long as it is below 1/(1 − θ), with θ the
+/// least ratio of consistent to lumped kinetic energy of an element: 3/2 for linear bars, 9/8 and 27/26 for
+/// quadrilaterals and hexahedra with constant Jacobian, 4/3 and 5/4 for linear triangles and tetrahedra. Outside [0, 1]
+/// the matrix is factorized once to make sure. Stiffness is not touched, and the lumped matrix may come from anywhere.
 ///
 /// # Errors
 ///
 /// [`Error::Parameter`] for a weight that is not finite; [`Error::Dimension`], [`Error::MatrixNotFinite`],
-/// [`Error::Asymmetric`] for the matrix; [`Error::Dimension`], [`Error::Mass`] for the lumped masses, which must be positive;
+/// [`Error::Asymmetric`] for the matrix; [`Error::Dimension`], [`Error::Mass`] for the lumped masses, which must be
+/// positive;
 /// [`Error::Singular`] if the weight is outside [0, 1] and the blend is not positive definite.
 ///
 /// ```
@@ -60,18 +61,19 @@ pub fn blend<T: Real>(
 /// cancel: ½ + 12 p Co², with p of [`period_elongation`] and the Courant number Co = c h/h_e of elements of length h_e
 /// (theory, section 14).
 ///
-/// The phase velocity of plane waves along the mesh then errs by κ⁴ instead of κ², κ = 2π h_e over the wave length. Derived
-/// for uniform bars; it carries over to waves along the axes of uniform quadrilaterals and hexahedra, not to oblique ones,
-/// nor to shear waves, which have a Courant number of their own. Damping of the scheme is not changed.
+/// The phase velocity of plane waves along the mesh then errs by κ⁴ instead of κ², κ = 2π h_e over the wave length.
+/// Derived for uniform bars; it carries over to waves along the axes of uniform quadrilaterals and hexahedra, not to
+/// oblique ones, nor to shear waves, which have a Courant number of their own. Damping of the scheme is not changed.
 ///
-/// Trapezoidal rule: ½ + Co², which is possible for Co < 1. Central differences: (1 − Co²)/2, which is the lumped mass at
-/// Co = 1, where they are exact; in between a matrix must be factorized. Co → 0 gives ½ for every scheme.
+/// Trapezoidal rule: ½ + Co², which is possible for Co < 1. Central differences: (1 − Co²)/2, which is the lumped mass
+/// at Co = 1, where they are exact; in between a matrix must be factorized. Co → 0 gives ½ for every scheme.
 ///
 /// # Errors
 ///
 /// [`Error::Parameter`] for a Courant number that is negative or not finite, and for a weight that reaches 3/2, beyond
 /// which no blend is positive definite (in two and three dimensions [`blend`] refuses smaller ones);
-/// [`Error::Incompatible`] for schemes whose free oscillations err at first order; [`Error::Tableau`] for what is no scheme.
+/// [`Error::Incompatible`] for schemes whose free oscillations err at first order; [`Error::Tableau`] for what is no
+/// scheme.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, Newmark, TimeIntegrator, mass};
@@ -100,7 +102,8 @@ pub fn optimal_weight(tableau: &Tableau, courant: f64) -> Result<f64> {
     }
 }
 
-/// The weight of [`optimal_weight`] whether or not a blend with it is definite; `None` for schemes that err at first order.
+/// The weight of [`optimal_weight`] whether or not a blend with it is definite; `None` for schemes that err at first
+/// order.
 pub(crate) fn dispersion_weight(tableau: &Tableau, courant: f64) -> Option<f64> {
     period_elongation(tableau).map(|elongation| 0.5 + 12.0 * elongation * courant * courant)
 }

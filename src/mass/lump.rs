@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 ///
 /// # Errors
 ///
-/// [`Error::Mass`] if a row sum is not positive (those of quadratic elements; [`lump_diagonal`] takes them), with the dof
-/// and the sum.
+/// [`Error::Mass`] if a row sum is not positive (those of quadratic elements; [`lump_diagonal`] takes them), with the
+/// dof and the sum.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -30,26 +30,27 @@ pub fn lump<T: Real>(mass: SparseColMatRef<'_, usize, T>) -> Result<Vec<T>> {
     Ok(lumped)
 }
 
-/// Diagonal scaling: the diagonal of the consistent matrix, scaled so that each group keeps its total mass (Hinton, Rock,
-/// Zienkiewicz, Earthq. Eng. Struct. Dyn. 4, 1976).
+/// Diagonal scaling: the diagonal of the consistent matrix, scaled so that each group keeps its total mass (Hinton,
+/// Rock, Zienkiewicz, Earthq. Eng. Struct. Dyn. 4, 1976).
 ///
 /// `groups` gives every dof a number; dofs with the same number share one total, the sum of all entries between them.
-/// Directions are groups of their own (`dof % 3` for three dofs a node), rotations too: their units differ. Bodies may be.
+/// Directions are groups of their own (`dof % 3` for three dofs a node), rotations too: their units differ. Bodies may
+/// be.
 ///
 /// The method of the paper scales **element by element**: for that, call this on each element's matrix before assembly.
 /// On an assembled matrix there is one factor for all elements of a group. Both agree where all elements have the same
-/// quotient of mass and trace, whatever their sizes and densities: one kind of element with constant Jacobian (bars, straight
-/// triangles and tetrahedra, parallelograms, parallelepipeds). If these are linear, both equal the row sums of [`lump`] as
-/// well. On distorted quadrilaterals and hexahedra the three differ; in a group that mixes kinds of elements
-/// the one factor moves mass from one kind to the other.
+/// quotient of mass and trace, whatever their sizes and densities: one kind of element with constant Jacobian (bars,
+/// straight triangles and tetrahedra, parallelograms, parallelepipeds). If these are linear, both equal the row sums of
+/// [`lump`] as well. On distorted quadrilaterals and hexahedra the three differ; in a group that mixes kinds of
+/// elements the one factor moves mass from one kind to the other.
 ///
 /// Masses are positive whatever the element, where row sums are not: a corner of the square 8-node quadrilateral
 /// of mass m has the row sum −m/12 and is given 3m/76.
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] if the matrix is not square or `groups` is not one number a dof, [`Error::Mass`] with the first dof
-/// whose diagonal entry or scaled mass is not positive.
+/// [`Error::Dimension`] if the matrix is not square or `groups` is not one number a dof, [`Error::Mass`] with the first
+/// dof whose diagonal entry or scaled mass is not positive.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

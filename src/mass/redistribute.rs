@@ -17,8 +17,8 @@ pub enum Redistribution<'a> {
     /// Numer. Methods Eng. 73, 2008, do the like by quadrature in the elements at the contact boundary).
     ///
     /// Neighbors are the dofs of the same group in the dof's column of this pattern, usually that of the stiffness
-    /// matrix; stored zeros count. Each group keeps its total. Its center of mass moves inward by the order of h_e², and
-    /// its inertia changes as much; frequencies change by the order of h_e³. The end of a uniform bar gives its
+    /// matrix; stored zeros count. Each group keeps its total. Its center of mass moves inward by the order of h_e²,
+    /// and its inertia changes as much; frequencies change by the order of h_e³. The end of a uniform bar gives its
     /// neighbor 3/2 of its mass.
     Neighbors(SymbolicSparseColMatRef<'a, usize>),
     /// All dofs of the group that keep mass, in proportion to their mass: the body becomes denser.
@@ -27,12 +27,12 @@ pub enum Redistribution<'a> {
     Uniform,
     /// As `Uniform`, and the neighbors of massless dofs give away a fraction of their mass too.
     ///
-    /// The mass then begins softly behind the contact, so that the force of an impact rises without overshoot: between bars
-    /// a fraction of 0.15 takes it from 8 % to 3 % (docs/corrections.md). Each group keeps its total, the rest is as for
-    /// `Uniform`.
+    /// The mass then begins softly behind the contact, so that the force of an impact rises without overshoot: between
+    /// bars a fraction of 0.15 takes it from 8 % to 3 % (docs/corrections.md). Each group keeps its total, the rest is
+    /// as for `Uniform`.
     Tapered {
-        /// Neighbors are the dofs of the same group in the column of a massless dof of this pattern, usually that of the
-        /// stiffness matrix.
+        /// Neighbors are the dofs of the same group in the column of a massless dof of this pattern, usually that of
+        /// the stiffness matrix.
         neighbors: SymbolicSparseColMatRef<'a, usize>,
         /// In [0, 1): of their row sums of M.
         fraction: f64,
@@ -57,26 +57,28 @@ pub enum Redistribution<'a> {
     },
 }
 
-/// Takes the mass of some dofs and gives it to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech. A/Solids
-/// 27, 2008).
+/// Takes the mass of some dofs and gives it to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech.
+/// A/Solids 27, 2008).
 ///
 /// Without mass at contact dofs the contact force has nothing to make jump: a semi-discrete solution has bounded
-/// accelerations and conserves energy, and impact costs none. The balance of such a dof is static, and M has no inverse.
+/// accelerations and conserves energy, and impact costs none. The balance of such a dof is static, and M has no
+/// inverse.
 ///
-/// `massless` lists dofs in any order: the contact nodes' in the normal direction if that is along an axis, otherwise in
-/// all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass stays among dofs
-/// with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Dofs with another number yet,
-/// such as supports, which would take mass out of the motion, take no part.
+/// `massless` lists dofs in any order: the contact nodes' in the normal direction if that is along an axis, otherwise
+/// in all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass stays among
+/// dofs with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Dofs with another
+/// number yet, such as supports, which would take mass out of the motion, take no part.
 ///
 /// The result is zero on massless dofs, positive on all others. Where only normal directions are massless the masses of
-/// a node differ from direction to direction: each direction keeps its own inertia, but for a node that turns far that is no
-/// longer the inertia of a body. For large rotations make all directions massless.
+/// a node differ from direction to direction: each direction keeps its own inertia, but for a node that turns far that
+/// is no longer the inertia of a body. For large rotations make all directions massless.
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] for sizes that do not agree, [`Error::MissingDof`] for listed dofs out of range; [`Error::Mass`]
-/// for a mass that is not positive (zero is admitted on massless dofs) or would not be in the end, with the dof and that
-/// mass; [`Error::Incompatible`] if no dof is left to take the mass of another one, or none that could keep the motions;
+/// [`Error::Dimension`] for sizes that do not agree, [`Error::MissingDof`] for listed dofs out of range;
+/// [`Error::Mass`] for a mass that is not positive (zero is admitted on massless dofs) or would not be in the end, with
+/// the dof and that mass; [`Error::Incompatible`] if no dof is left to take the mass of another one, or none that could
+/// keep the motions;
 /// [`Error::Empty`], [`Error::NotFinite`] for the motions.
 ///
 /// ```
@@ -111,20 +113,21 @@ pub fn redistribute<T: Real>(
 
 /// As [`redistribute`] for a consistent or blended mass matrix, both triangles stored.
 ///
-/// Rows and columns of the massless dofs are left out. What another dof loses with them it gets back on its own diagonal,
-/// so that its row sum stays; the row sums of the massless dofs, which are their lumped masses, are then given away. Neighbors
-/// get their shares on the diagonal, in proportion to that of M. The other two options change the density,
-/// Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix stays like one of a consistent mass, and a lumped mass is a special case.
+/// Rows and columns of the massless dofs are left out. What another dof loses with them it gets back on its own
+/// diagonal, so that its row sum stays; the row sums of the massless dofs, which are their lumped masses, are then
+/// given away. Neighbors get their shares on the diagonal, in proportion to that of M. The other two options change the
+/// density, Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix stays like one of a consistent mass, and a lumped mass is a special case.
 ///
 /// With [`Redistribution::Uniform`], lumping of the result gives what [`redistribute`] makes of the lumped mass; with
-/// neighbors, too, if the diagonal is in one proportion to the row sums (one kind of linear element with constant Jacobian).
-/// Least squares keep the inertia of this matrix, which is not that of the lumped one.
+/// neighbors, too, if the diagonal is in one proportion to the row sums (one kind of linear element with constant
+/// Jacobian). Least squares keep the inertia of this matrix, which is not that of the lumped one.
 ///
-/// Shares of neighbors that are not negative leave M positive definite on the dofs that keep mass, if it was. In all other
-/// cases (couplings of quadratic elements are negative, density may fall) the result is factorized once to make sure.
-/// Entries between dofs of different groups belong to no group; those of massless dofs are lost.
+/// Shares of neighbors that are not negative leave M positive definite on the dofs that keep mass, if it was. In all
+/// other cases (couplings of quadratic elements are negative, density may fall) the result is factorized once to make
+/// sure. Entries between dofs of different groups belong to no group; those of massless dofs are lost.
 ///
-/// Nothing is stored in the rows and columns of massless dofs, nor zeros elsewhere: a diagonal result has a diagonal pattern.
+/// Nothing is stored in the rows and columns of massless dofs, nor zeros elsewhere: a diagonal result has a diagonal
+/// pattern.
 ///
 /// # Errors
 ///
@@ -182,13 +185,14 @@ pub fn redistribute_consistent<T: Real>(
     Ok(result)
 }
 
-/// The motions 1, x, y, z of [`Redistribution::LeastSquares`]: one value a dof, coordinates from their mean, the same in each
-/// direction of a node.
+/// The motions 1, x, y, z of [`Redistribution::LeastSquares`]: one value a dof, coordinates from their mean, the same
+/// in each direction of a node.
 ///
-/// `coordinates` and `dofs` by node; `size` is the number of dofs of the system. Dofs of no node have zeros: they take no mass.
+/// `coordinates` and `dofs` by node; `size` is the number of dofs of the system. Dofs of no node have zeros: they take
+/// no mass.
 ///
-/// A rigid motion moves direction x by a + ω_y z − ω_z y: for rigid motions alone the coordinates **across** a direction would
-/// do. All of them are kept so that nothing depends on the axes, and because it is no harder.
+/// A rigid motion moves direction x by a + ω_y z − ω_z y: for rigid motions alone the coordinates **across** a
+/// direction would do. All of them are kept so that nothing depends on the axes, and because it is no harder.
 ///
 /// # Errors
 ///
@@ -381,9 +385,10 @@ impl<'a> Loss<'a> {
 
     /// Writes the density p of least Σ mᵢ pᵢ² that makes up for what ψᵀ M ψ′ has lost, for all pairs ψ, ψ′.
     ///
-    /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) of the matrix B that is kept. With the
-    /// weights mᵢ the functions aᵢ/mᵢ are made orthonormal one after the other (Gram and Schmidt, twice), and the b with
-    /// them; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start far away.
+    /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) of the matrix B that is kept. With
+    /// the weights mᵢ the functions aᵢ/mᵢ are made orthonormal one after the other (Gram and Schmidt, twice), and the b
+    /// with them; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start far
+    /// away.
     fn least_squares(&self, group: &Group, motions: &[Vec<f64>], epsilon: f64, change: &mut Change) -> Result<()> {
         let tolerance = 1e3 * epsilon;
         let mass: Vec<f64> = group.receivers.iter().map(|&dof| self.mass[dof]).collect();

@@ -11,27 +11,28 @@ use std::collections::BTreeMap;
 /// contact boundary are treated apart as by Hager, Hüeber, Wohlmuth, Int. J. Numer. Methods Eng. 73, 2008, and Tkachuk,
 /// Wohlmuth, Bischoff, Int. J. Numer. Methods Eng. 94, 2013).
 ///
-/// `elements` are pairs of dofs and the row-major element matrix, consistent, lumped or blended. An element that touches
-/// listed dofs (`massless`, in any order) loses their rows and columns; what is left is scaled by one factor for each
-/// group, so that the element keeps the total of each. `groups` gives every dof of the system a number as in
+/// `elements` are pairs of dofs and the row-major element matrix, consistent, lumped or blended. An element that
+/// touches listed dofs (`massless`, in any order) loses their rows and columns; what is left is scaled by one factor
+/// for each group, so that the element keeps the total of each. `groups` gives every dof of the system a number as in
 /// [`lump_diagonal`](super::lump_diagonal); entries between groups take the geometric mean of both factors. Elements
 /// without such dofs are assembled as they are.
 ///
-/// Beside [`redistribute_consistent`](super::redistribute_consistent) with neighbors this needs the elements, and the mass of an
-/// element stays in it. Centers of mass move inward by the order of h_e². In a bar of equal linear elements both agree.
+/// Beside [`redistribute_consistent`](super::redistribute_consistent) with neighbors this needs the elements, and the
+/// mass of an element stays in it. Centers of mass move inward by the order of h_e². In a bar of equal linear elements
+/// both agree.
 ///
 /// Positive semidefinite if the element matrices are, with exactly the listed dofs massless: nothing is stored in their
 /// rows and columns. Zeros are not stored either, so that lumped elements give a diagonal pattern.
 ///
-/// An element all of whose dofs of a group are listed, such as a triangle in a corner of the boundary, cannot keep its mass
-/// and is refused: list fewer dofs there, or redistribute.
+/// An element all of whose dofs of a group are listed, such as a triangle in a corner of the boundary, cannot keep its
+/// mass and is refused: list fewer dofs there, or redistribute.
 ///
 /// # Errors
 ///
-/// [`Error::MissingDof`] for dofs that have no group, [`Error::Dimension`] for an element matrix of another size than its
-/// dofs, [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] (row and column are dofs of the system);
-/// [`Error::Incompatible`] with the number of an element that cannot keep its mass; [`Error::Mass`] if a dof that is not
-/// listed has none.
+/// [`Error::MissingDof`] for dofs that have no group, [`Error::Dimension`] for an element matrix of another size than
+/// its dofs, [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] (row and column are dofs of the system);
+/// [`Error::Incompatible`] with the number of an element that cannot keep its mass; [`Error::Mass`] if a dof that is
+/// not listed has none.
 ///
 /// ```
 /// use contact_dynamics::mass;
@@ -99,24 +100,24 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
     Ok(mass)
 }
 
-/// The mass matrix M = Cᵀ D⁻¹ C of a mixed formulation with velocities in a space of their own, discontinuous from element to
-/// element (Renard, J. Comput. Appl. Math. 234, 2010; Tkachuk, Wohlmuth, Bischoff 2013).
+/// The mass matrix M = Cᵀ D⁻¹ C of a mixed formulation with velocities in a space of their own, discontinuous from
+/// element to element (Renard, J. Comput. Appl. Math. 234, 2010; Tkachuk, Wohlmuth, Bischoff 2013).
 ///
 /// With the density ρ, velocity functions ψ_e and displacement functions φ_i: row e of `coupling` (velocity space ×
-/// displacement space) is C_ei = ∫ ρ ψ_e φ_i, and `velocity_mass` the diagonal D_e = ∫ ρ ψ_e². The velocities are then D⁻¹ C u̇,
-/// and ½ u̇ᵀ M u̇ is their kinetic energy.
+/// displacement space) is C_ei = ∫ ρ ψ_e φ_i, and `velocity_mass` the diagonal D_e = ∫ ρ ψ_e². The velocities are then
+/// D⁻¹ C u̇, and ½ u̇ᵀ M u̇ is their kinetic energy.
 ///
-/// M is symmetric and positive semidefinite, and singular wherever C is: its null space is that of C. A dof whose column of
-/// C is empty has no mass: leave the contact dofs out of the functions that the velocities see. If C maps a uniform unit
-/// velocity to D 1 (velocities take up constants exactly) the total mass is Σ D_e.
+/// M is symmetric and positive semidefinite, and singular wherever C is: its null space is that of C. A dof whose
+/// column of C is empty has no mass: leave the contact dofs out of the functions that the velocities see. If C maps a
+/// uniform unit velocity to D 1 (velocities take up constants exactly) the total mass is Σ D_e.
 ///
 /// C must see every other motion: piecewise constant velocities on plain linear elements miss the alternating one, so
 /// that there a motion of the whole body has no mass (known failure; the function cannot see it).
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] unless there is one velocity mass for each row, [`Error::Mass`] for one that is not positive (its
-/// `dof` is the row), [`Error::MatrixNotFinite`] for the coupling, and for the product if it overflows.
+/// [`Error::Dimension`] unless there is one velocity mass for each row, [`Error::Mass`] for one that is not positive
+/// (its `dof` is the row), [`Error::MatrixNotFinite`] for the coupling, and for the product if it overflows.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

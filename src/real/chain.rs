@@ -1,14 +1,14 @@
 //! Recurrences of L D Lᵀ with bidiagonal L, down and up two chains at a time.
 //!
-//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains wait at the same time, and a
-//! product that is fused with its sum waits half as long, on machines that have it.
+//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains wait at the same time,
+//! and a product that is fused with its sum waits half as long, on machines that have it.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
 
 use super::Real;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-/// Of two chains: the entries of L below the diagonal (one for each unknown, the last one to what comes behind), 1/D, and
-/// the unknowns. All slices of a chain are of one length.
+/// Of two chains: the entries of L below the diagonal (one for each unknown, the last one to what comes behind), 1/D,
+/// and the unknowns. All slices of a chain are of one length.
 #[derive(Debug)]
 pub struct Chains<'a, T> {
     pub lower: [&'a [T]; 2],

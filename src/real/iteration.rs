@@ -35,8 +35,8 @@ fn store<T: Real, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
     }
 }
 
-/// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the place of a pivot that is not
-/// larger than what rounding leaves of its diagonal entry.
+/// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the place of a pivot that is
+/// not larger than what rounding leaves of its diagonal entry.
 #[inline]
 fn inverse_factor<T: Real, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B>, usize> {
     let mut l = [[T::zero(); B]; B];
@@ -173,8 +173,8 @@ fn incomplete<T: Real, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r
     }
 }
 
-/// Scales a matrix: `values` and `diagonal` hold its blocks and become C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the Cholesky factors
-/// C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
+/// Scales a matrix: `values` and `diagonal` hold its blocks and become C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the Cholesky
+/// factors C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
 #[inline]
 pub(super) fn scale<T: Real, const B: usize>(
     (pointers, columns): (&[usize], &[u32]),
@@ -263,8 +263,8 @@ struct Judge {
     tolerance: f64,
     /// The squared norm of the right-hand side.
     first: f64,
-    /// Σ α ρ: the square of the solution's length so far, as the matrix measures it (Hestenes and Stiefel, 1952, theorem
-    /// 6:1: directions are orthogonal in that measure).
+    /// Σ α ρ: the square of the solution's length so far, as the matrix measures it (Hestenes and Stiefel, 1952,
+    /// theorem 6:1: directions are orthogonal in that measure).
     length: f64,
     rounding: f64,
     iterations: usize,
@@ -295,8 +295,8 @@ impl Judge {
     }
 }
 
-/// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding less than two
-/// of its digits mean anything: the matrix is singular for all the scalar can tell.
+/// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding less
+/// than two of its digits mean anything: the matrix is singular for all the scalar can tell.
 const NEGLIGIBLE: f64 = 64.0;
 
 /// Solves A x = b in place. Zero is the start.

@@ -1,8 +1,8 @@
 //! Sweeps over a supernodal factor for one right-hand side, at the speed of reading the factor once.
 //!
-//! Eight columns of a supernode go together: every entry of L is read once, every entry of the vector an eighth as often. The
-//! loops that do are plain ones in functions of their own, compiled for the vector units of the machine that they run on. (Inlined
-//! into more than that, they would not always be recognized as vector loops.)
+//! Eight columns of a supernode go together: every entry of L is read once, every entry of the vector an eighth as
+//! often. The loops that do are plain ones in functions of their own, compiled for the vector units of the machine that
+//! they run on. (Inlined into more than that, they would not always be recognized as vector loops.)
 //!
 //! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; what
 //! is eliminated behind it column by column.
@@ -24,14 +24,14 @@ pub(super) struct Interior<'a, T> {
     pub(super) forest: &'a Forest,
 }
 
-/// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them what
-/// its parent has to add. `b` are the entries of the right-hand side, `order` where each column finds its own.
+/// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them
+/// what its parent has to add. `b` are the entries of the right-hand side, `order` where each column finds its own.
 pub(super) fn forest_forward<T: Real>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
     forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
 }
 
-/// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry those of
-/// the roots know the solution on the rows below them.
+/// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry those
+/// of the roots know the solution on the rows below them.
 pub(super) fn forest_backward<T: Real>(interior: &Interior<'_, T>, w: &mut [T]) {
     backward_plan(&interior.forest.plan, interior, 0, w);
 }

@@ -1,7 +1,7 @@
 //! An elastic bar that falls on a wall, bounces and falls again.
 
-/// A bar of unit section dropped from rest onto a wall, in the proportions of Doyen, Ern and Piperno (SIAM J. Sci. Comput.
-/// 33, 2011, where the solution is a series).
+/// A bar of unit section dropped from rest onto a wall, in the proportions of Doyen, Ern and Piperno (SIAM J. Sci.
+/// Comput. 33, 2011, where the solution is a series).
 ///
 /// There the flight between the two contacts of a period lasts three round trips of the waves. The bar then leaves the
 /// first contact, in which the force rises, with uniform speed and twice the strain of its weight, and returns so; the

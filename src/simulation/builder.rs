@@ -139,9 +139,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Leaves contact as the scheme solves it: without correctors, and without the one that is there by default. Contact forces
-    /// then spike at impact, and velocities oscillate: the trapezoidal rule may end the fall of a block with many times its
-    /// energy. For comparisons, and for schemes that are studied raw.
+    /// Leaves contact as the scheme solves it: without correctors, and without the one that is there by default.
+    /// Contact forces then spike at impact, and velocities oscillate: the trapezoidal rule may end the fall of a block
+    /// with many times its energy. For comparisons, and for schemes that are studied raw.
     #[must_use]
     pub fn uncorrected(mut self) -> Self {
         self.correctors.clear();
@@ -150,9 +150,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Adds a corrector; several act in the order given, and in place of the one that is there by default:
-    /// [`PersistencyCorrection::with_history_projection`], where contact is rigid, on dofs with mass, and imposed on the
-    /// displacements of the state. (Contact on velocities or ahead of the state leaves nothing to correct, compliant laws
-    /// and [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] have cures of their own.)
+    /// [`PersistencyCorrection::with_history_projection`], where contact is rigid, on dofs with mass, and imposed on
+    /// the displacements of the state. (Contact on velocities or ahead of the state leaves nothing to correct,
+    /// compliant laws and [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] have cures of their own.)
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
         self.correction = DefaultCorrection::Replaced;
@@ -210,8 +210,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Lets the run change its step size by itself; without this every step has the size given, and one that fails is the
-    /// caller's affair.
+    /// Lets the run change its step size by itself; without this every step has the size given, and one that fails is
+    /// the caller's affair.
     #[must_use]
     pub fn step_control(mut self, control: StepControl) -> Self {
         self.control = Some(control);
@@ -254,17 +254,19 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused, and a
-    /// step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
+    /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused,
+    /// and a step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
     ///
-    /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K: that of
-    /// [`System::highest_frequency`], or a bound by Gershgorin's circles where that clears the step, or Lanczos' estimate from
-    /// below. So what is refused is unstable; what passes may exceed the limit by a fraction of a percent. At the limit
-    /// itself a step is taken: waves along a uniform bar are exact there, though the shortest grows linearly in time once it is
-    /// excited. For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`), and it may
-    /// stiffen later. Damping counts where the scheme takes its forces from before the step: the strongest damping in the
-    /// highest mode, which is exact for Rayleigh's and may refuse what is stable otherwise. Stiffness of compliant contact
-    /// laws does not count, nor does a K that is not symmetric beyond its circles.
+    /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K:
+    /// that of
+    /// [`System::highest_frequency`], or a bound by Gershgorin's circles where that clears the step, or Lanczos'
+    /// estimate from below. So what is refused is unstable; what passes may exceed the limit by a fraction of a
+    /// percent. At the limit itself a step is taken: waves along a uniform bar are exact there, though the shortest
+    /// grows linearly in time once it is excited. For nonlinear systems the tangent at the start counts (at the present
+    /// state, for `set_step_size`), and it may stiffen later. Damping counts where the scheme takes its forces from
+    /// before the step: the strongest damping in the highest mode, which is exact for Rayleigh's and may refuse what is
+    /// stable otherwise. Stiffness of compliant contact laws does not count, nor does a K that is not symmetric beyond
+    /// its circles.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
         self.stability = Stability::Unchecked;
@@ -391,8 +393,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 }
 
-/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not known
-/// yet), on dofs with mass.
+/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
+/// known yet), on dofs with mass.
 fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
@@ -568,8 +570,8 @@ fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
     admitted
 }
 
-/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether they
-/// follow statically before the other dofs move.
+/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
+/// they follow statically before the other dofs move.
 fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
     let Some(dof) = dof else { return Ok(false) };
     let reason = match analysis::massless_factor(&scheme.tableau) {

@@ -131,8 +131,8 @@ impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
 }
 
 impl<'a, T: Real> Constraints<'a, T> {
-    /// The constraints after a search at (t, u, v), and room for the rows of their G (kept apart: corrections read G while
-    /// they evaluate gaps), which the next search reads.
+    /// The constraints after a search at (t, u, v), and room for the rows of their G (kept apart: corrections read G
+    /// while they evaluate gaps), which the next search reads.
     pub(crate) fn new(
         mut parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
         (t, u, v): (f64, &[T], &[T]),
@@ -448,8 +448,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         contacts.ids.iter().enumerate().filter_map(move |(contact, id)| row(contact, id).map(|row| (contact, row)))
     }
 
-    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates are
-    /// zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
+    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates
+    /// are zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
     pub(crate) fn check_rates(&mut self, motion: &Motion<T>, h: f64, jacobian: &ContactJacobian<T>) -> Result<()> {
         let mut compared = std::mem::replace(&mut self.compared, Compared::empty());
         let result = self.compare(&mut compared, motion, h, jacobian);

@@ -64,8 +64,8 @@ pub(super) struct ContactRowsWork<T> {
     /// Gaps where the balance holds, for compliant laws.
     pub(super) balance_gap: Vec<T>,
     pub(super) curved: CurvedRowsWork<T>,
-    /// What each row constrains in this stage; for rows whose law reads it the gap where the stage starts, and what of it
-    /// is none.
+    /// What each row constrains in this stage; for rows whose law reads it the gap where the stage starts, and what of
+    /// it is none.
     measure: Vec<Measure>,
     start_gap: Vec<T>,
     start_tolerance: Vec<T>,
@@ -91,8 +91,8 @@ pub(super) struct ContactRowsWork<T> {
 }
 
 impl<T: Real> ContactRowsWork<T> {
-    /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of `forecast_dofs`
-    /// dofs (0 if the scheme has none) with `supports` prescribed ones.
+    /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of
+    /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed ones.
     pub(super) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
         let reserved = || Vec::with_capacity(rows);
         let zero = || vec![T::zero(); rows];
@@ -355,8 +355,8 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
 const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Finds the multipliers of the stage from d on the interface, adds their response to it, and leaves their forces there.
-    /// Motions are left as predicted. Says whether curved rows fit where d ends.
+    /// Finds the multipliers of the stage from d on the interface, adds their response to it, and leaves their forces
+    /// there. Motions are left as predicted. Says whether curved rows fit where d ends.
     pub(super) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -436,8 +436,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         [rigid, balance_u, balance_a]
     }
 
-    /// Evaluates what every row constrains at d without contact, with the rows there are, and applies forces of compliant laws
-    /// that do not depend on d.
+    /// Evaluates what every row constrains at d without contact, with the rows there are, and applies forces of
+    /// compliant laws that do not depend on d.
     fn observe(
         &mut self,
         operator: &mut Operator<T>,
@@ -575,7 +575,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are any.
+    /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are
+    /// any.
     pub(super) fn press_without_coupling(
         &mut self,
         operator: &mut Operator<T>,
@@ -678,8 +679,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Solves on the rows that may be active, and leaves the response in `interface.response`; whoever is pushed in by that
-    /// joins. The set only grows: this ends.
+    /// Solves on the rows that may be active, and leaves the response in `interface.response`; whoever is pushed in by
+    /// that joins. The set only grows: this ends.
     fn press_linearized(&mut self, operator: &mut Operator<T>, t: f64, work: &mut Workspace<T>) -> Result<()> {
         let Self { constraints, g, solver, statistics, .. } = self;
         let Workspace { rows, trial, interface, .. } = work;

@@ -11,14 +11,14 @@ use crate::state::{History, Motion, State, resolution};
 
 /// How a run changes its step size by itself.
 ///
-/// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a smaller
-/// one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is taken again with
-/// half the size; after two steps that went well the size doubles where that meets the nominal grid again, so every
-/// nominal time is met. If doubling fails at once, it waits twice as long the next time.
+/// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a
+/// smaller one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is
+/// taken again with half the size; after two steps that went well the size doubles where that meets the nominal grid
+/// again, so every nominal time is met. If doubling fails at once, it waits twice as long the next time.
 ///
 /// Two judgements may be added: an estimate of the [local error](Self::local_error), and a limit to the
-/// [contacts that change](Self::contact_changes) in a step. At the smallest size a judgement refuses nothing: the step is
-/// taken and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
+/// [contacts that change](Self::contact_changes) in a step. At the smallest size a judgement refuses nothing: the step
+/// is taken and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
 /// [`Error::StepRefused`], and the run is as it was before the step, with the step size it had.
 ///
 /// Changes of the step size allocate, factorize, and resample the past of multistep schemes
@@ -66,12 +66,12 @@ impl StepControl {
 
     /// Refuses steps whose local error in any displacement is estimated at more than `tolerance` (length).
     ///
-    /// The estimate compares a step with Taylor's expansion of the state it starts from, as that was shown, scaled by what
-    /// the tableau says ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or
-    /// opens it is not scaled, for the motion is not smooth there, and is about the distance that the contact moves in the
-    /// step with the velocity it lost: so uncertain is the instant of impact. Corrections do not hide it, since velocities
-    /// are compared as well. Schemes that impose contact ahead of the state show an impact one step late, and some of first
-    /// order show nothing of what they err in velocity: `build` refuses both.
+    /// The estimate compares a step with Taylor's expansion of the state it starts from, as that was shown, scaled by
+    /// what the tableau says ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact
+    /// closes or opens it is not scaled, for the motion is not smooth there, and is about the distance that the contact
+    /// moves in the step with the velocity it lost: so uncertain is the instant of impact. Corrections do not hide it,
+    /// since velocities are compared as well. Schemes that impose contact ahead of the state show an impact one step
+    /// late, and some of first order show nothing of what they err in velocity: `build` refuses both.
     ///
     /// # Errors
     ///
@@ -257,7 +257,8 @@ impl<T: Real> Simulation<'_, T> {
         self.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
     }
 
-    /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it was.
+    /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it
+    /// was.
     ///
     /// Two factorizations, if `t` is not on the grid.
     ///

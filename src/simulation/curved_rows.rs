@@ -1,8 +1,10 @@
-//! Curved gaps within a stage: the gap is met where contact is imposed, the force acts along the rows where the balance holds.
+//! Curved gaps within a stage: the gap is met where contact is imposed, the force acts along the rows where the balance
+//! holds.
 //!
-//! Contact is solved with rows that are linear on the interface. Afterwards rows are linearized again, at the displacements that
-//! came out, and the problem is solved once more, until they fit. W = F A⁻¹ Fᵀ is made of the force rows F alone, which keeps it
-//! symmetric; gaps are evaluated as they are, so that the point that is reached is that of the unsymmetric G A⁻¹ Fᵀ.
+//! Contact is solved with rows that are linear on the interface. Afterwards rows are linearized again, at the
+//! displacements that came out, and the problem is solved once more, until they fit. W = F A⁻¹ Fᵀ is made of the force
+//! rows F alone, which keeps it symmetric; gaps are evaluated as they are, so that the point that is reached is that of
+//! the unsymmetric G A⁻¹ Fᵀ.
 
 use super::Workspace;
 use super::constraints::Constraints;
@@ -14,11 +16,13 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
 
-/// Linearizations of curved rows in a contact problem, at most, and those after which forces that go to and fro are borne with.
+/// Linearizations of curved rows in a contact problem, at most, and those after which forces that go to and fro are
+/// borne with.
 pub(super) const FOLLOWED: usize = 40;
 const LONG: usize = 12;
 
-/// The relative miss of gaps and forces at which rows fit, in roundings, and that which is accepted where it falls no more.
+/// The relative miss of gaps and forces at which rows fit, in roundings, and that which is accepted where it falls no
+/// more.
 const FIT: f64 = 64.0;
 const NEAR: f64 = 1e-8;
 
@@ -66,7 +70,8 @@ pub(super) struct CurvedRowsWork<T> {
     gaps: Vec<T>,
     /// What the rows that were solved with make of the gaps; one a candidate.
     pub(super) foreseen: Vec<T>,
-    /// The miss of gaps and forces after the last linearization, relative; the row that misses its gap most, and by how much.
+    /// The miss of gaps and forces after the last linearization, relative; the row that misses its gap most, and by how
+    /// much.
     pub(super) miss: f64,
     pub(super) worst: (usize, T),
 }
@@ -115,8 +120,8 @@ impl<T: Real> CurvedRowsWork<T> {
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Makes gaps at d without contact those by the force rows, along which contact will answer, from where the last iteration of
-    /// Newton's method has left them; else each iteration would begin again with what G and F differ by.
+    /// Makes gaps at d without contact those by the force rows, along which contact will answer, from where the last
+    /// iteration of Newton's method has left them; else each iteration would begin again with what G and F differ by.
     pub(super) fn extrapolate(&self, new: &Motion<T>, work: &mut Workspace<T>) {
         let Workspace { rows, interface, .. } = work;
         if !rows.curved.apart {
@@ -232,8 +237,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         })
     }
 
-    /// How much gaps and forces by the rows that follow d differ from those that were solved with. Leaves y of the rows where d
-    /// is placed.
+    /// How much gaps and forces by the rows that follow d differ from those that were solved with. Leaves y of the rows
+    /// where d is placed.
     pub(super) fn miss(&mut self, new: &Motion<T>, work: &mut Workspace<T>) -> Result<Miss> {
         self.evaluate(new, work)?;
         let Self { constraints, g, part, .. } = self;

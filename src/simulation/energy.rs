@@ -32,8 +32,8 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Works done on the system since the start, by the trapezoidal rule over the steps (that of contact with its forces in the
-/// middle of the step, which is the same where they live at the end of it); all but `remainder` are what
+/// Works done on the system since the start, by the trapezoidal rule over the steps (that of contact with its forces in
+/// the middle of the step, which is the same where they live at the end of it); all but `remainder` are what
 /// physics says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Works<T> {

@@ -1,5 +1,5 @@
-//! Dofs without mass in explicit stages: they follow from static balance with the others and with contact, before anything else
-//! of the stage is solved.
+//! Dofs without mass in explicit stages: they follow from static balance with the others and with contact, before
+//! anything else of the stage is solved.
 
 use super::contact_step::{ContactStep, Part};
 use super::operator::Operator;
@@ -42,8 +42,8 @@ struct Columns<T> {
 }
 
 impl<T: Real> Columns<T> {
-    /// From the tangent, or for an empty pattern by one evaluation of the force a column. (The system is linear: where the
-    /// tangent is taken says nothing.)
+    /// From the tangent, or for an empty pattern by one evaluation of the force a column. (The system is linear: where
+    /// the tangent is taken says nothing.)
     fn of(system: &mut dyn System<T>, dofs: &[usize], at: &Motion<T>) -> Result<Self> {
         let mut free = vec![true; system.dofs()];
         for &dof in system.prescribed() {
@@ -133,7 +133,8 @@ impl<T: Real> Columns<T> {
     }
 }
 
-/// A factor of K_bb that takes vectors of the whole system, and an interface of which it knows a part: other dofs do not respond.
+/// A factor of K_bb that takes vectors of the whole system, and an interface of which it knows a part: other dofs do
+/// not respond.
 #[derive(Debug)]
 struct Embedded<T> {
     inner: Box<dyn Factorization<T>>,
@@ -288,8 +289,8 @@ impl<T: Real> MasslessBlock<T> {
 /// What a simulation has moved before its first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartAdjustment<T> {
-    /// Change of the potential energy, that of the load (its force times the way) included: what the jump would have taken from the
-    /// run, not positive. None if the system has no potential.
+    /// Change of the potential energy, that of the load (its force times the way) included: what the jump would have
+    /// taken from the run, not positive. None if the system has no potential.
     pub energy: Option<T>,
     /// The largest change of a displacement (length), and of which dof.
     pub largest: T,
@@ -300,9 +301,9 @@ pub struct StartAdjustment<T> {
 /// Iterations of the balance at the start, at most: two for linear systems.
 const ITERATIONS: usize = 30;
 
-/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method: 0 = f_b + Gᵀ λ,
-/// 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that damping acts on: their
-/// displacements are initial values of their own.
+/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method:
+/// f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that
+/// damping acts on: their displacements are initial values of their own.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
     solver: &mut dyn ContactSolver<T>,
@@ -326,7 +327,8 @@ pub(super) fn balance_start<T: Real>(
         let columns = Columns::of(system, dofs, motion)?;
         let factor = match Embedded::factorized(&columns, dofs, &interface) {
             Ok(factor) => factor,
-            // Without a definite stiffness of their own there is no balance to speak of: the step will say what it can do.
+            // Without a definite stiffness of their own there is no balance to speak of: the step will say what it can
+            // do.
             Err(Error::Asymmetric { .. } | Error::Singular { .. }) => {
                 motion.u = given;
                 constraints.search(motion, ahead, g)?;
@@ -380,8 +382,8 @@ pub(super) fn balance_start<T: Real>(
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: dofs[0] })
 }
 
-/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns the
-/// largest way by which gaps may be missed, as a displacement.
+/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns
+/// the largest way by which gaps may be missed, as a displacement.
 fn press_start<T: Real>(
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -454,9 +456,9 @@ pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> 
 }
 
 impl<T: Real> StageSolve<'_, '_, T> {
-    /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact. The
-    /// residual in `work.increment` becomes that of the others in this configuration, with the forces of contact on the dofs
-    /// without mass.
+    /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact.
+    /// The residual in `work.increment` becomes that of the others in this configuration, with the forces of contact on
+    /// the dofs without mass.
     ///
     /// Rows follow these dofs: an iteration of Newton's method on the gaps alone, for the balance is linear.
     pub(super) fn settle(

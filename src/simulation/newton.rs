@@ -12,10 +12,10 @@ pub(super) enum TangentUpdate {
 
 /// How Newton's method solves the stages of a nonlinear system.
 ///
-/// With r = f − M ā + Gᵀ λ and A the effective matrix, an iteration solves `A Δ = r` together with the contact conditions
-/// at the end of the step, 0 ≤ g ⊥ λ ≥ 0, and moves the unknown by Δ. Gaps that are not affine in u are linearized anew
-/// within the iteration, on the dofs of contact alone, until they are met: their curvature costs no factorization, and
-/// does not slow the convergence of the rest.
+/// With r = f − M ā + Gᵀ λ and A the effective matrix, an iteration solves `A Δ = r` together with the contact
+/// conditions at the end of the step, 0 ≤ g ⊥ λ ≥ 0, and moves the unknown by Δ. Gaps that are not affine in u are
+/// linearized anew within the iteration, on the dofs of contact alone, until they are met: their curvature costs no
+/// factorization, and does not slow the convergence of the rest.
 ///
 /// A stage is solved when both
 ///
@@ -23,9 +23,9 @@ pub(super) enum TangentUpdate {
 /// * the increment to come, estimated by ‖Δ‖ ‖r‖ / ‖r before‖, is at most `displacement` times the whole increment
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
-/// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of the
-/// whole, and the residual has fallen by `force` or falls no more; or when they are below the resolution of u, ε ‖u‖.
-/// Tolerances below 64 ε of the scalar are raised to it.
+/// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of
+/// the whole, and the residual has fallen by `force` or falls no more; or when they are below the resolution of u, ε
+/// ‖u‖. Tolerances below 64 ε of the scalar are raised to it.
 ///
 /// ```
 /// use contact_dynamics::Newton;
@@ -60,8 +60,9 @@ impl Newton {
         Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
     }
 
-    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller or lead to a state that
-    /// the host does not admit. It costs nothing where full increments do. Slender structures converge through larger residuals and are better left without.
+    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller or lead to a state
+    /// that the host does not admit. It costs nothing where full increments do. Slender structures converge through
+    /// larger residuals and are better left without.
     #[must_use]
     pub const fn line_search(self) -> Self {
         Self { line_search: true, ..self }

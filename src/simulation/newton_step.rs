@@ -134,8 +134,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Whether an iteration of this size, which has brought the residual from `before` to what it is now (and that of the
-    /// prediction was `first`), is the last one; it is reported.
+    /// Whether an iteration of this size, which has brought the residual from `before` to what it is now (and that of
+    /// the prediction was `first`), is the last one; it is reported.
     fn has_converged(
         &self,
         newton: &mut NewtonWork<T>,
@@ -149,8 +149,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
-        // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more, or has
-        // fallen far; or no force can tell the displacements before from those after.
+        // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more,
+        // or has fallen far; or no force can tell the displacements before from those after.
         let [in_u, in_v, _] = self.stage.balanced().weights();
         let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));

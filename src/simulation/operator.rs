@@ -12,8 +12,8 @@ use faer::sparse::SymbolicSparseColMatRef;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
-/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A step is begun,
-/// which gives the solution on the interface, and finished with the values there after contact.
+/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A step is
+/// begun, which gives the solution on the interface, and finished with the values there after contact.
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
     /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
@@ -50,7 +50,8 @@ enum ContactPath {
     Apart,
 }
 
-/// Fill beyond that of a free order, above which a matrix that is factorized again and again is not ordered for contact.
+/// Fill beyond that of a free order, above which a matrix that is factorized again and again is not ordered for
+/// contact.
 const DEAR: f64 = 1.25;
 
 /// The Delassus operator of some rows, kept until they or their responses change.
@@ -157,8 +158,8 @@ impl<T: Real> Operator<T> {
         Ok(operator)
     }
 
-    /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it, it is
-    /// not factorized again.
+    /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it,
+    /// it is not factorized again.
     pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, rows: usize, interface: &[usize]) -> Result<Self> {
         Ok(Self {
             weights: [f64::NAN; 3],
@@ -189,8 +190,8 @@ impl<T: Real> Operator<T> {
         self.tangent == Tangent::Present && self.linearity == Linearity::Nonlinear
     }
 
-    /// Factorizes for the step size h with the tangent at a motion; responses are forgotten. Where the matrix varies this
-    /// does not allocate but for the first time.
+    /// Factorizes for the step size h with the tangent at a motion; responses are forgotten. Where the matrix varies
+    /// this does not allocate but for the first time.
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
@@ -317,8 +318,8 @@ impl<T: Real> Operator<T> {
         &self.columns[row * self.interface.len()..(row + 1) * self.interface.len()]
     }
 
-    /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version. `versions`
-    /// counts those given so far.
+    /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
+    /// `versions` counts those given so far.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,
@@ -389,8 +390,8 @@ fn check_sources<T: Real>(system: &dyn System<T>, tangent: Tangent, combination:
     combination.check(diagonal, what.into_iter().flatten())
 }
 
-/// Analyzes with the interface last, or freely: where the solver does not condense, and where a matrix that varies would
-/// cost much more to factorize than a few full solves.
+/// Analyzes with the interface last, or freely: where the solver does not condense, and where a matrix that varies
+/// would cost much more to factorize than a few full solves.
 fn analyze<T: Real>(
     solver: &dyn LinearSolver<T>,
     pattern: SymbolicSparseColMatRef<'_, usize>,

@@ -36,8 +36,8 @@ impl<T: Real> PathWork<T> {
     }
 
     /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end,
-    /// a f(u₀) + b f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such means
-    /// the one nearest to Simpson's rule. Each of the three sums to no net force, hence the mean does.
+    /// a f(u₀) + b f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such
+    /// means the one nearest to Simpson's rule. Each of the three sums to no net force, hence the mean does.
     pub(super) fn force(
         &mut self,
         system: &mut dyn System<T>,

@@ -218,8 +218,8 @@ pub(crate) struct Program<T> {
 }
 
 impl<T: Real> Program<T> {
-    /// Recompiles the same stages for another step size; after an error the program is as it was. Matrices that vary are
-    /// left to the iterations of the step.
+    /// Recompiles the same stages for another step size; after an error the program is as it was. Matrices that vary
+    /// are left to the iterations of the step.
     pub(crate) fn set_step_size(
         &mut self,
         stages: &[Stage],
@@ -233,7 +233,8 @@ impl<T: Real> Program<T> {
                 continue;
             }
             if let Err(error) = self.operators[i].factorize(system, h, at) {
-                // They could be factorized before; should the host's tangent fail now, its first error is the one to tell.
+                // They could be factorized before; should the host's tangent fail now, its first error is the one to
+                // tell.
                 let mut constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
                 constant.try_for_each(|operator| operator.factorize(system, old, at)).ok();
                 return Err(error);

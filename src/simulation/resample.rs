@@ -18,15 +18,16 @@ impl<T: Real> Simulation<'_, T> {
         self.history.clock.h
     }
 
-    /// Changes the step size from here on. Effective matrices are factorized anew (their analysis is kept), and the past
-    /// of a multistep scheme is resampled at the new spacing: u by the cubic through (u, v) of two states, v by the cubic
-    /// through (v, a), a linearly. States from before a contact closed or opened are not used: the past is then
-    /// extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the closed
-    /// contacts.
+    /// Changes the step size from here on. Effective matrices are factorized anew (their analysis is kept), and the
+    /// past of a multistep scheme is resampled at the new spacing: u by the cubic through (u, v) of two states, v by
+    /// the cubic through (v, a), a linearly. States from before a contact closed or opened are not used: the past is
+    /// then extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the
+    /// closed contacts.
     ///
-    /// Every scheme keeps its order when the step changes by factors up to 3, every time if need be (`docs/schemes.md`);
-    /// beyond that the past is extrapolated farther than it is known. Total momentum is conserved; the impulse of one
-    /// contact agrees with the change of a body's momentum across a change of h only to the order of the scheme.
+    /// Every scheme keeps its order when the step changes by factors up to 3, every time if need be
+    /// (`docs/schemes.md`); beyond that the past is extrapolated farther than it is known. Total momentum is conserved;
+    /// the impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of
+    /// the scheme.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -45,9 +46,12 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless h is positive and finite, [`Error::TimeNotAdvancing`](crate::Error::TimeNotAdvancing) if a step of that size would not
-    /// change the time, [`Error::BeyondStability`](crate::Error::BeyondStability) if the scheme is not stable with it, [`Error::MatrixNotFinite`](crate::Error::MatrixNotFinite) or
-    /// [`Error::Singular`](crate::Error::Singular) if the effective matrix cannot be factorized. The simulation is then as it was.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless h is positive and finite,
+    /// [`Error::TimeNotAdvancing`](crate::Error::TimeNotAdvancing) if a step of that size would not change the time,
+    /// [`Error::BeyondStability`](crate::Error::BeyondStability) if the scheme is not stable with it,
+    /// [`Error::MatrixNotFinite`](crate::Error::MatrixNotFinite) or
+    /// [`Error::Singular`](crate::Error::Singular) if the effective matrix cannot be factorized. The simulation is then
+    /// as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         self.guarded(|run| {
             run.change_step_size(h)?;
@@ -126,8 +130,8 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Starts again from the displacements and velocities of the present state, after a discontinuity that the host
-    /// knows of (a load or a support that jumps): accelerations are those of equilibrium now, contacts at rest are found
-    /// anew, and the past is forgotten and made again as at the start.
+    /// knows of (a load or a support that jumps): accelerations are those of equilibrium now, contacts at rest are
+    /// found anew, and the past is forgotten and made again as at the start.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -183,8 +187,8 @@ impl<T: Real> Simulation<'_, T> {
     }
 }
 
-/// A computed motion, and how long before the newest one it was: a sum of step sizes, since differences of absolute times
-/// have the rounding of these.
+/// A computed motion, and how long before the newest one it was: a sum of step sizes, since differences of absolute
+/// times have the rounding of these.
 struct Node<'h, T> {
     motion: &'h Motion<T>,
     age: f64,

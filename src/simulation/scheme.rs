@@ -41,8 +41,8 @@ impl<'a> Scheme<'a> {
         self.tableau.stages.iter().map(|stage| stage.end + stage.contact.lead()).fold(1.0, f64::max)
     }
 
-    /// ψ of the known states over h, one entry a dof: times M it is the momentum that the scheme conserves. `past` holds the
-    /// states before the newest, in the spacing h.
+    /// ψ of the known states over h, one entry a dof: times M it is the momentum that the scheme conserves. `past`
+    /// holds the states before the newest, in the spacing h.
     pub(super) fn momentum<T: Real>(&self, newest: &Motion<T>, past: &[Motion<T>], h: f64) -> Vec<T> {
         let mut sum = vec![T::zero(); newest.u.len()];
         let known = past.len().min(self.depth - 1);
@@ -61,8 +61,9 @@ impl<'a> Scheme<'a> {
         [of(1), of(2)]
     }
 
-    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown as
-    /// they are. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is finite.
+    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown
+    /// as they are. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is
+    /// finite.
     pub(super) fn show<T: Real>(
         &self,
         new: &Motion<T>,

@@ -21,8 +21,8 @@ pub(super) enum StepLimit {
     Cleared(f64),
 }
 
-/// Steps of Lanczos' iteration, at most: one product with K each. They are taken only where Gershgorin's circles do not clear
-/// the step.
+/// Steps of Lanczos' iteration, at most: one product with K each. They are taken only where Gershgorin's circles do not
+/// clear the step.
 const ITERATIONS: usize = 40;
 
 /// After so many of them the estimate is looked at.
@@ -55,10 +55,10 @@ pub(super) fn check_scheme(integrator: &str, tableau: &Tableau) -> Result<()> {
 
 /// Refuses a step beyond the limit of the scheme, as far as that is known; says up to which step it is.
 ///
-/// Gershgorin's circles bound the highest frequency from above: a step that they clear is stable. Where they do not, Lanczos'
-/// iteration on M⁻¹ K tells: Ritz values are never above the highest frequency, so what is refused by them is unstable. What they
-/// let pass may exceed the limit by what the iteration has missed (within its steps a fraction of a percent on meshes).
-/// Nonlinear systems are judged by the tangent at `motion`.
+/// Gershgorin's circles bound the highest frequency from above: a step that they clear is stable. Where they do not,
+/// Lanczos' iteration on M⁻¹ K tells: Ritz values are never above the highest frequency, so what is refused by them is
+/// unstable. What they let pass may exceed the limit by what the iteration has missed (within its steps a fraction of a
+/// percent on meshes). Nonlinear systems are judged by the tangent at `motion`.
 pub(super) fn check_step<T: Real>(
     system: &mut dyn System<T>,
     scheme: &Scheme<'_>,
@@ -95,7 +95,8 @@ pub(super) fn check_step<T: Real>(
         lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
     };
     if lags && highest.at_least > 0.0 {
-        // The mode of the highest frequency with the strongest damping of any: exact for Rayleigh's, on the safe side otherwise.
+        // The mode of the highest frequency with the strongest damping of any: exact for Rayleigh's, on the safe side
+        // otherwise.
         let still = vec![T::zero(); system.dofs()];
         let damping = lanczos.highest(system, 0.0, |system, x, y| {
             system.damping_force(&still, x, y);
@@ -147,7 +148,8 @@ struct Circles<T> {
 }
 
 impl<'s, T: Real> Stiffness<'s, T> {
-    /// The tangent, where the system has one; its force otherwise. None for nonlinear forces without a length to vary them by.
+    /// The tangent, where the system has one; its force otherwise. None for nonlinear forces without a length to vary
+    /// them by.
     fn of(system: &mut dyn System<T>, at: &'s Motion<T>) -> Result<Option<Self>> {
         let dofs = system.dofs();
         let entries = system.pattern().row_idx().len();
@@ -220,8 +222,9 @@ impl<'s, T: Real> Stiffness<'s, T> {
     }
 }
 
-/// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980, chapter 13), without
-/// orthogonalization against older vectors: copies of eigenvalues that this brings do no harm at the end of the spectrum.
+/// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980, chapter 13),
+/// without orthogonalization against older vectors: copies of eigenvalues that this brings do no harm at the end of the
+/// spectrum.
 struct Lanczos<T> {
     inverse: InverseMass<T>,
     /// Sizes of the entries of the first vector; their signs have no pattern.
@@ -306,7 +309,8 @@ impl<T: Real> Lanczos<T> {
     }
 }
 
-/// The highest eigenvalue of a tridiagonal matrix, and that with the residual of its vector, if `beta` follows beside it.
+/// The highest eigenvalue of a tridiagonal matrix, and that with the residual of its vector, if `beta` follows beside
+/// it.
 fn ritz(diagonal: &[f64], beside: &[f64], beta: f64) -> Highest {
     let n = diagonal.len();
     let matrix = Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {

@@ -36,11 +36,11 @@ pub enum InitialOverclosure {
     /// [`Error::InitialViolation`], which names the depth.
     #[default]
     Refused,
-    /// The gap of such a contact is measured from where it starts, for good: nothing is strained. The depth is that of the
-    /// whole feature ([`ContactId::feature`](crate::contact::ContactId::feature)): a node that slides on keeps it.
+    /// The gap of such a contact is measured from where it starts, for good: nothing is strained. The depth is that of
+    /// the whole feature ([`ContactId::feature`](crate::contact::ContactId::feature)): a node that slides on keeps it.
     AdjustedGaps,
-    /// The overlap is removed over a time from the start, along 1 − 3 τ² + 2 τ³ with τ from 0 to 1, as an interference fit is
-    /// mounted: what is strained then is strained by it.
+    /// The overlap is removed over a time from the start, along 1 − 3 τ² + 2 τ³ with τ from 0 to 1, as an interference
+    /// fit is mounted: what is strained then is strained by it.
     RemovedOver(f64),
 }
 
@@ -97,8 +97,8 @@ impl<T: Real> Start<'_, T> {
             1
         };
         let shown = scheme.shown(&motion);
-        // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate would
-        // be that of the stiffest mode.
+        // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate
+        // would be that of the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
         T::axpy(T::of(scheme.shifts[0] * h), a, v);
         let clock = Clock::new(t, h);
@@ -242,8 +242,8 @@ struct StartProblem<T> {
 }
 
 impl<T: Real> StartProblem<T> {
-    /// Contacts at rest: closed, with no approach or separation. One that approaches is left to the first step, one that
-    /// separates is open.
+    /// Contacts at rest: closed, with no approach or separation. One that approaches is left to the first step, one
+    /// that separates is open.
     fn at_rest(
         constraints: &mut Constraints<'_, T>,
         g: &ContactJacobian<T>,
@@ -472,8 +472,8 @@ fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) ->
     Ok(())
 }
 
-/// Rounding of gaps that were computed by whoever made the mesh, over that of ours: coordinates may have gone through a file with
-/// twelve digits.
+/// Rounding of gaps that were computed by whoever made the mesh, over that of ours: coordinates may have gone through a
+/// file with twelve digits.
 const INPUT: f64 = 64.0;
 
 /// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle.

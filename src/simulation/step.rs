@@ -65,12 +65,13 @@ impl<T: Real> Simulation<'_, T> {
     fn undo(&mut self) {
         self.put_back();
         let Self { constraints, g, state, history, scheme, .. } = self;
-        // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its error.
+        // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its
+        // error.
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
 
-    /// Lets the constraints look at the motion in slot 0 of the history. Where a contact has closed, and now and then, rates
-    /// of gaps are compared with their motion.
+    /// Lets the constraints look at the motion in slot 0 of the history. Where a contact has closed, and now and then,
+    /// rates of gaps are compared with their motion.
     fn inspect(&mut self) -> Result<()> {
         const NOW_AND_THEN: u64 = 64;
         let Self { constraints, g, history, work, .. } = self;
@@ -101,7 +102,8 @@ impl<T: Real> Simulation<'_, T> {
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
         let finite = scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.prescribed, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
-        // Recovery has looked at what it wrote. Left are dofs whose velocity is differenced, and what corrections have edited.
+        // Recovery has looked at what it wrote. Left are dofs whose velocity is differenced, and what corrections have
+        // edited.
         let touched = work.buffers.has_touched() && work.projection.is_some();
         let spreads = work.buffers.spreads() || matches!(system.mass(), Mass::Consistent(_));
         let extent = match work.newton.is_some() || touched && spreads {
@@ -281,8 +283,8 @@ fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version
     }
 }
 
-/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. The rows of a scheme
-/// find v from a, which such dofs do not have; it stays zero.
+/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. The rows of a
+/// scheme find v from a, which such dofs do not have; it stays zero.
 ///
 /// `slopes` are those of the interval before the `start` of the step, the second of the `intervals`.
 fn difference<T: Real>(massless: &[usize], slopes: &[T], start: &[T], [now, before]: [f64; 2], new: &mut Motion<T>) {
@@ -332,8 +334,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
     }
 
-    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already. Says whether
-    /// curved rows fit where it ends.
+    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already. Says
+    /// whether curved rows fit where it ends.
     pub(super) fn contact(
         &mut self,
         iterate: Option<&[T]>,
@@ -378,8 +380,8 @@ pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &
     Ok(())
 }
 
-/// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities with
-/// the supports in place, and what accelerations have of the past.
+/// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities
+/// with the supports in place, and what accelerations have of the past.
 fn predict<T: Real>(
     stage: &CompiledStage<T>,
     clock: Clock,

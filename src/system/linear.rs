@@ -14,10 +14,11 @@ type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 ///
 /// A mass matrix without entries off the diagonal is recognized as lumped. Without damping nothing is paid for damping.
 ///
-/// C (gyroscopic forces) and K (circulatory ones, loads that follow the motion) need not be symmetric; a scheme that has them in its
-/// effective matrix then takes [`Lu`](crate::Lu) as its linear solver, others refuse it by [`Error::Asymmetric`]. A K that is not
-/// symmetric has no potential: [`Energy::potential`](crate::Energy) is then none, and what all of K u does is in the remainder
-/// of the energy balance. A gyroscopic C does no work, and the balance holds as with any other.
+/// C (gyroscopic forces) and K (circulatory ones, loads that follow the motion) need not be symmetric; a scheme that
+/// has them in its effective matrix then takes [`Lu`](crate::Lu) as its linear solver, others refuse it by
+/// [`Error::Asymmetric`]. A K that is not symmetric has no potential: [`Energy::potential`](crate::Energy) is then
+/// none, and what all of K u does is in the remainder of the energy balance. A gyroscopic C does no work, and the
+/// balance holds as with any other.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -80,8 +81,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an M that is not symmetric and a K
-    /// of one triangle (store a zero in the other one if that is meant), or [`Error::Mass`]
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an M that is not
+    /// symmetric and a K of one triangle (store a zero in the other one if that is meant), or [`Error::Mass`]
     /// for a diagonal mass that is negative (zero is allowed: on dofs that are fixed or
     /// driven, and elsewhere with schemes that take [dofs without mass](crate::analysis::massless_factor)).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
@@ -181,8 +182,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         Ok(self)
     }
 
-    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces a load given
-    /// before.
+    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces a load
+    /// given before.
     #[must_use]
     pub fn load(mut self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
         self.load = Some(Box::new(load));

@@ -22,20 +22,21 @@ pub struct GapJacobianError {
     pub acceleration: f64,
     /// Rows that some displacement made vanish, compared as far as they were there.
     pub rows_lost: usize,
-    /// Searches that said [`Candidates::Unchanged`] though identities or G had changed: a run would go on with the old rows.
+    /// Searches that said [`Candidates::Unchanged`] though identities or G had changed: a run would go on with the old
+    /// rows.
     pub unreported: usize,
 }
 
 /// Compares G and the gap rates of a constraint with central differences of its gap.
 ///
-/// The gap is that after a [`search`](ContactConstraint::search) at the displaced position, so the check sees what the rows
-/// are linearized from, not only the rows themselves. `step` is the size of the displacements (length): small against
-/// what changes the geometry, large against its rounding, for instance 1e-6 of an element. Rows that a displacement makes
-/// appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out, searches that keep silent about
-/// rows that have changed in [`unreported`](GapJacobianError::unreported); at edges and kinks the gap has
-/// no derivative, so check at positions that are inside of facets. Time is varied by `step` over the largest speed in
-/// `v`, without another search; for the acceleration everything moves with v, by a hundred steps. The constraint is left as
-/// after a search at (t, u, v).
+/// The gap is that after a [`search`](ContactConstraint::search) at the displaced position, so the check sees what the
+/// rows are linearized from, not only the rows themselves. `step` is the size of the displacements (length): small
+/// against what changes the geometry, large against its rounding, for instance 1e-6 of an element. Rows that a
+/// displacement makes appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out, searches
+/// that keep silent about rows that have changed in [`unreported`](GapJacobianError::unreported); at edges and kinks
+/// the gap has no derivative, so check at positions that are inside of facets. Time is varied by `step` over the
+/// largest speed in `v`, without another search; for the acceleration everything moves with v, by a hundred steps. The
+/// constraint is left as after a search at (t, u, v).
 ///
 /// # Errors
 ///

@@ -67,18 +67,18 @@ pub struct ForceMismatch {
 /// Compares K and C of a system with central differences of its force at (t, u, v), and its damping force and potential
 /// with the force.
 ///
-/// Every dof is varied, prescribed ones too, by `step` (length) in u and by `velocity_step` in v. A quotient is wrong by
-/// about step² times the third derivative of the force and by ε |f| / step, so take 1e-5 to 1e-6 (`f32`: 1e-2 to 1e-3) of
-/// what changes the force: of an element in u, and of the speeds that matter in v. Check at a state that is deformed and
-/// moves: much of a wrong tangent vanishes at rest. Outputs hold NaN before each call, so entries that are not written
-/// are found. Costs 4 n forces, 2 n energies and n² comparisons for n dofs: meant for small meshes.
+/// Every dof is varied, prescribed ones too, by `step` (length) in u and by `velocity_step` in v. A quotient is wrong
+/// by about step² times the third derivative of the force and by ε |f| / step, so take 1e-5 to 1e-6 (`f32`: 1e-2 to
+/// 1e-3) of what changes the force: of an element in u, and of the speeds that matter in v. Check at a state that is
+/// deformed and moves: much of a wrong tangent vanishes at rest. Outputs hold NaN before each call, so entries that are
+/// not written are found. Costs 4 n forces, 2 n energies and n² comparisons for n dofs: meant for small meshes.
 ///
 /// # Errors
 ///
 /// [`Error::Empty`] without dofs; [`Error::Dimension`] if u, v, the mass or the pattern do not have the size of the
-/// system; [`Error::Incompatible`] for a pattern out of order; [`Error::Asymmetric`] and [`Error::MatrixNotFinite`] for the
-/// mass; [`Error::NotFinite`] for u and v; [`Error::Parameter`] for steps that are not positive or too small to change
-/// u or v; and those of the system.
+/// system; [`Error::Incompatible`] for a pattern out of order; [`Error::Asymmetric`] and [`Error::MatrixNotFinite`] for
+/// the mass; [`Error::NotFinite`] for u and v; [`Error::Parameter`] for steps that are not positive or too small to
+/// change u or v; and those of the system.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};

@@ -8,12 +8,12 @@ use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently}
 use crate::error::Result;
 use crate::real::Real;
 
-/// Share of the smallest facet that a node may move against the other surface without being looked at: what it can pass by
-/// then is not smaller than the mesh.
+/// Share of the smallest facet that a node may move against the other surface without being looked at: what it can pass
+/// by then is not smaller than the mesh.
 const FINE: f64 = 0.125;
 
-/// The same above which it is looked at what a node that has its row has gone through, and the normal along which it was
-/// stopped: below, rows let nodes in over an edge only, and there the normal is anyone's.
+/// The same above which it is looked at what a node that has its row has gone through, and the normal along which it
+/// was stopped: below, rows let nodes in over an edge only, and there the normal is anyone's.
 const COARSE: f64 = 0.6;
 
 /// Share of a way that may go in over a convex corner and out again.
@@ -90,8 +90,8 @@ impl Crossing<'_> {
         &self.grounds[0].surface.facets()[facet]
     }
 
-    /// Says what is wrong with the way of the node, how long it is, and the gap at its start. `closed` are the flags of its
-    /// row at the start and at the end, if it has one.
+    /// Says what is wrong with the way of the node, how long it is, and the gap at its start. `closed` are the flags of
+    /// its row at the start and at the end, if it has one.
     fn look_at(
         &self,
         closed: Option<[bool; 2]>,
@@ -179,7 +179,8 @@ impl Crossing<'_> {
     }
 }
 
-/// Whether a point goes through a triangle, or a segment in the plane, from the front to the back; both move in straight lines.
+/// Whether a point goes through a triangle, or a segment in the plane, from the front to the back; both move in
+/// straight lines.
 fn pierces(
     ends: [Point; 2],
     corners: [[Point; 3]; 2],
@@ -200,7 +201,8 @@ fn pierces(
         shape.normal(&middle).map(|normal| (dot(normal, sub(p, shape.corner(0))), normal))
     };
     let (Some((before, normal)), Some((after, _))) = (height(0.0), height(1.0)) else { return false };
-    // What goes in so little, as over a convex corner, has not gone through. (A way is not shorter than its share in height.)
+    // What goes in so little, as over a convex corner, has not gone through. (A way is not shorter than its share in
+    // height.)
     if !(before >= 0.0 && after < -SHALLOW * length.min(before - after) && meets(normal)) {
         return false;
     }

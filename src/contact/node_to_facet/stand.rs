@@ -33,8 +33,8 @@ pub(super) struct Stand {
     pub(super) weights: [f64; 4],
     pub(super) normal: Point,
     pub(super) gap: f64,
-    /// How often the node has jumped since the search, and where it stood last at the two times that rows are followed to, the
-    /// newest first.
+    /// How often the node has jumped since the search, and where it stood last at the two times that rows are followed
+    /// to, the newest first.
     jumps: u8,
     seen: [Option<Seen>; 2],
 }
@@ -135,10 +135,10 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
-    /// Where the node stands at t, as the stand that follows this one; nothing if it is to stay as it is. Between two facets, or
-    /// around an edge that it touches, a node has no normal to converge to: one that has jumped too often stays. Rows are followed
-    /// to where the balance holds and to where the gap is met, later in the step, in turns; where a kink lies between the two,
-    /// the row of the later place serves both.
+    /// Where the node stands at t, as the stand that follows this one; nothing if it is to stay as it is. Between two
+    /// facets, or around an edge that it touches, a node has no normal to converge to: one that has jumped too often
+    /// stays. Rows are followed to where the balance holds and to where the gap is met, later in the step, in turns;
+    /// where a kink lies between the two, the row of the later place serves both.
     pub(super) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
         /// Cosines of the angles that are a jump and a kink (18°), and jumps that are followed.
         const TURN: f64 = 1.0 - 1e-5;
@@ -166,9 +166,9 @@ impl Stand {
     ///
     /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet's
     /// there, differentiating r · S,α = 0 gives A ξ̇ = p − g c with p_α = w · S,α, c_α = n · w,α and
-    /// A = S,α · S,β − g n · S,αβ, and the turning of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α ξ̇.
-    /// On a side or a vertex the node also turns around it: w⊥²/g. Closer than a share of the facet that turn is over
-    /// in no time, and the facet stands for the smooth surface that is meant.
+    /// A = S,α · S,β − g n · S,αβ, and the turning of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α
+    /// ξ̇. On a side or a vertex the node also turns around it: w⊥²/g. Closer than a share of the facet that turn is
+    /// over in no time, and the facet stands for the smooth surface that is meant.
     pub(super) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
         const CLOSE: f64 = 1e-3;
         let n = self.normal;

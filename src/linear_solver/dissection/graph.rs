@@ -89,7 +89,8 @@ impl Graph {
         SymbolicSparseColMatRef::new_unsorted_checked(self.size(), self.size(), &self.starts, None, &self.neighbors)
     }
 
-    /// The graph of some of the vertices; `local` has room for all of them, with `usize::MAX` everywhere, and is left so.
+    /// The graph of some of the vertices; `local` has room for all of them, with `usize::MAX` everywhere, and is left
+    /// so.
     pub(super) fn part(&self, vertices: &[usize], local: &mut [usize]) -> Self {
         let entries = vertices.iter().map(|&vertex| self.neighbors(vertex).len()).sum();
         let mut part = Self::with_capacity(vertices.len(), entries);

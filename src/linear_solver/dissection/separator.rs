@@ -178,7 +178,8 @@ pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
     mover.separator
 }
 
-/// Grows side 0 from a vertex, always by the vertex that makes its boundary lightest, until it weighs as much as the rest.
+/// Grows side 0 from a vertex, always by the vertex that makes its boundary lightest, until it weighs as much as the
+/// rest.
 pub(super) fn grow(graph: &Graph, seed: usize) -> Separator {
     let mut label = vec![1; graph.size()];
     label[seed] = BETWEEN;

@@ -101,15 +101,15 @@ impl Combination {
         }
     }
 
-    /// The step to take where `h` is asked for: explicit schemes stay a tenth below the limit of stability, at which the energy
-    /// of the shortest wave grows.
+    /// The step to take where `h` is asked for: explicit schemes stay a tenth below the limit of stability, at which
+    /// the energy of the shortest wave grows.
     pub fn step(&self, body: &Body, h: f64) -> Result<f64> {
         let explicit = self.integrator()?.tableau().stages.iter().all(|stage| stage.balance.u.z == 0.0);
         Ok(if explicit { h.min(0.9 * h / body.largest_courant(h)?) } else { h })
     }
 
-    /// The law in a scene: stiffnesses are in units of the softest diagonal entry of K at the contact dofs, and the mass of a
-    /// bipenalty is that of the step.
+    /// The law in a scene: stiffnesses are in units of the softest diagonal entry of K at the contact dofs, and the
+    /// mass of a bipenalty is that of the step.
     pub fn law(&self, body: &Body, h: f64) -> Result<ContactLaw> {
         let diagonal = body.contact.iter().map(|&dof| body.stiffness.get(dof, dof).copied().unwrap_or(0.0));
         let unit = diagonal.fold(f64::INFINITY, f64::min);

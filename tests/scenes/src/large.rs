@@ -196,8 +196,8 @@ pub struct Flight {
     pub energy_end: f64,
     /// Changes of contact.
     pub changes: u64,
-    /// Momentum along the floor's normal beside what contact and weight have given since the fifth step, when the past of
-    /// every scheme is known, over that at the start.
+    /// Momentum along the floor's normal beside what contact and weight have given since the fifth step, when the past
+    /// of every scheme is known, over that at the start.
     pub momentum: f64,
     /// Angular momentum about the center of mass before the first contact, relative deviation.
     pub angular: f64,

@@ -189,8 +189,8 @@ pub fn figures(bars: &Bars, record: &Record, h: f64) -> Figures {
 /// What is measured of the impact of bars against the exact solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Impact {
-    /// Mean error of the force over [0.8, 3.2] impact times (of the paper's bars) without the points within a step of the
-    /// jumps, and RMS error over [0.8, 3.4] with them, relative to the largest exact force.
+    /// Mean error of the force over [0.8, 3.2] impact times (of the paper's bars) without the points within a step of
+    /// the jumps, and RMS error over [0.8, 3.4] with them, relative to the largest exact force.
     pub force_l1: f64,
     pub force_l2: f64,
     /// How late the contact is pressed first, and last.
@@ -202,8 +202,8 @@ pub struct Impact {
     pub changes: usize,
 }
 
-/// Measures a run with step `h` whose forces act `load` of a step after the states before those they are recorded with: the
-/// `load` of the scheme's last stage.
+/// Measures a run with step `h` whose forces act `load` of a step after the states before those they are recorded with:
+/// the `load` of the scheme's last stage.
 pub fn impact(bars: &Bars, record: &Record, h: f64, load: f64) -> Impact {
     let until = record.t[record.t.len() - 1] + h;
     let exact = bars.exact(until);

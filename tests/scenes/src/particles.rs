@@ -255,8 +255,8 @@ pub(crate) mod tests {
         out
     }
 
-    /// The tangent along a path is that of a state if both ends are this state, and the part of the difference quotients that
-    /// it neglects vanishes with the length of the path.
+    /// The tangent along a path is that of a state if both ends are this state, and the part of the difference
+    /// quotients that it neglects vanishes with the length of the path.
     pub(crate) fn check_tangent_along(system: &mut dyn System<f64>, from: &[f64], direction: &[f64]) {
         let n = from.len();
         let mut neglected = |length: f64| {

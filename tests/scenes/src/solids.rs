@@ -91,8 +91,8 @@ impl Solid<3> {
         Self::grid(cells, material, |x| std::array::from_fn(|axis| size[axis] * x[axis]))
     }
 
-    /// A quarter of a ball of radius `radius` around (0, 0, radius), x, y ≥ 0, of elements that become smaller toward the
-    /// pole in the origin: `cells` of them along x, y and z.
+    /// A quarter of a ball of radius `radius` around (0, 0, radius), x, y ≥ 0, of elements that become smaller toward
+    /// the pole in the origin: `cells` of them along x, y and z.
     pub fn quarter_ball(radius: f64, cells: [usize; 3], finest: f64, material: Material) -> Self {
         let graded = |x: f64, ratio: f64| (ratio.powf(x) - 1.0) / (ratio - 1.0);
         // Ratio of the largest to the smallest element such that the smallest is `finest`.

@@ -1,4 +1,5 @@
-//! Bodies squeezed between walls and levers: rows that depend on one another, and that contradict each other once a wall has closed.
+//! Bodies squeezed between walls and levers: rows that depend on one another, and that contradict each other once a
+//! wall has closed.
 
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -78,8 +79,8 @@ impl Squeeze {
         Self { masses: vec![0.0206, 57.4], springs: vec![4.65], rows, h: 0.01, until: 0.0525 }
     }
 
-    /// Two to six masses, levers or ties between neighbors, and sums of rows beside the rows; masses and stiffnesses lie within
-    /// the factor `ratio`. `random` gives numbers in [0, 1).
+    /// Two to six masses, levers or ties between neighbors, and sums of rows beside the rows; masses and stiffnesses
+    /// lie within the factor `ratio`. `random` gives numbers in [0, 1).
     pub fn random(random: &mut impl FnMut() -> f64, ratio: f64, walls: Walls) -> Self {
         let mut within = |low: f64, high: f64| low + (high - low) * random();
         let size = within(2.0, 7.0) as usize;

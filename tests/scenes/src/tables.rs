@@ -51,8 +51,8 @@ pub fn conservation() -> String {
     table
 }
 
-/// Two bars of 50 elements at Courant number ½, worst of ten impact phases: force error, largest force, energy left; raw,
-/// and corrected where a correction applies.
+/// Two bars of 50 elements at Courant number ½, worst of ten impact phases: force error, largest force, energy left;
+/// raw, and corrected where a correction applies.
 pub fn contact() -> String {
     let mut table = String::from(
         "| scheme | raw: force RMS | max/F₀ | energy | corrected: force RMS | max/F₀ | energy |\n\

@@ -1,4 +1,5 @@
-//! Timing for benches: operations beside each other, their samples interleaved, ratios to the bare ones of the same run.
+//! Timing for benches: operations beside each other, their samples interleaved, ratios to the bare ones of the same
+//! run.
 
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{Automatic, Factorization, LinearSolver, Mass, Real, System, TimeIntegrator};
@@ -104,9 +105,9 @@ impl<'a> Table<'a> {
         self.rows.push(Row { name, run: Some(run), is_reference, samples: Vec::new(), ratios: Vec::new() });
     }
 
-    /// Times the references and the rows added since the last time, `calls` calls a sample, one sample of each in turn: what
-    /// else the machine does disturbs all of them. The rows are then dropped with the memory they hold, so that scenes
-    /// which do not fit beside each other are sampled one by one.
+    /// Times the references and the rows added since the last time, `calls` calls a sample, one sample of each in turn:
+    /// what else the machine does disturbs all of them. The rows are then dropped with the memory they hold, so that
+    /// scenes which do not fit beside each other are sampled one by one.
     pub fn sample(&mut self, samples: usize, calls: usize) {
         let mut live: Vec<_> = self.rows.iter_mut().filter(|row| row.run.is_some()).collect();
         let first: Vec<usize> = live.iter().map(|row| row.samples.len()).collect();
@@ -214,8 +215,8 @@ pub fn force<T: Real>(mut system: impl System<T>) -> impl FnMut() {
     }
 }
 
-/// Reads so many numbers from memory, twice: what a solve would take that does nothing else. (Upper halves of blocks are
-/// stored in a factor, and need not be read.)
+/// Reads so many numbers from memory, twice: what a solve would take that does nothing else. (Upper halves of blocks
+/// are stored in a factor, and need not be read.)
 pub fn reading<T: Real>(scalars: usize) -> impl FnMut() {
     let numbers = vec![T::one(); scalars];
     move || {

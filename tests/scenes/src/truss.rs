@@ -155,8 +155,8 @@ impl PendulumReference {
 }
 
 impl Truss<2> {
-    /// The stiff elastic pendulum of Kuhl and Crisfield (1999), without gravity: node 0 is fixed in the origin, node 1 is
-    /// the mass, at (L, 0). EA = 1e4 is soft, 1e10 stiff.
+    /// The stiff elastic pendulum of Kuhl and Crisfield (1999), without gravity: node 0 is fixed in the origin, node 1
+    /// is the mass, at (L, 0). EA = 1e4 is soft, 1e10 stiff.
     pub fn pendulum(axial: f64) -> Self {
         let mass = vec![0.0, 0.0, PendulumReference::MASS, PendulumReference::MASS];
         Self::new(vec![[0.0, 0.0], [PendulumReference::LENGTH, 0.0]], mass, &[([0, 1], axial)]).fix(vec![0, 1])
@@ -169,9 +169,9 @@ impl Truss<2> {
 }
 
 impl Truss<3> {
-    /// A free lattice mast on the plane z = 0: `bays` boxes of the given width and height with crossed diagonals on the four
-    /// sides and one diagonal in each section, all bars with the same EA and mass per length. Four nodes a section, the
-    /// lowest first.
+    /// A free lattice mast on the plane z = 0: `bays` boxes of the given width and height with crossed diagonals on the
+    /// four sides and one diagonal in each section, all bars with the same EA and mass per length. Four nodes a
+    /// section, the lowest first.
     pub fn mast(bays: usize, [width, height]: [f64; 2], axial: f64, line_density: f64) -> Self {
         let node = |section: usize, k: usize| 4 * section + k % 4;
         let mut ends = Vec::new();
@@ -254,8 +254,8 @@ impl<const D: usize> System<f64> for Truss<D> {
         weights: TangentWeights<f64>,
         out: &mut [f64],
     ) -> Result<()> {
-        // The exact derivative is EA/L³ x̄ x(to)ᵀ + N̄/L 1. What is neglected, EA/L³ x̄ (x(to) − x̄)ᵀ, is nilpotent for a bar
-        // that turns without a change of length: x̄ is then normal to x(to) − x̄.
+        // The exact derivative is EA/L³ x̄ x(to)ᵀ + N̄/L 1. What is neglected, EA/L³ x̄ (x(to) − x̄)ᵀ, is nilpotent for
+        // a bar that turns without a change of length: x̄ is then normal to x(to) − x̄.
         self.add_stiffness(weights.stiffness, out, |bar| bar.along(path));
         Ok(())
     }

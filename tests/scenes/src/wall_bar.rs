@@ -142,8 +142,8 @@ impl WallBar {
 pub struct Bounces {
     /// Energy after each of six periods over that at the start.
     pub energy: [f64; 6],
-    /// RMS error of the force in the first contact, relative to the exact one: everywhere, and away from the fronts by 0.15 s
-    /// and 0.1 s of the 0.67 s it lasts.
+    /// RMS error of the force in the first contact, relative to the exact one: everywhere, and away from the fronts by
+    /// 0.15 s and 0.1 s of the 0.67 s it lasts.
     pub force: f64,
     pub ramp: f64,
     /// Largest force of the first period over the largest exact one.
@@ -155,8 +155,8 @@ pub struct Bounces {
 }
 
 impl WallBar {
-    /// Runs the bouncing bar, whose dofs weigh as these masses, for six periods in steps of `h`; forces act `load` of a step
-    /// after the states before those they are reported with.
+    /// Runs the bouncing bar, whose dofs weigh as these masses, for six periods in steps of `h`; forces act `load` of a
+    /// step after the states before those they are reported with.
     pub fn bounces(&self, mass: &[f64], run: &mut Simulation<'_, f64>, h: f64, load: f64) -> Result<Bounces> {
         let exact = BouncingBar::doyen();
         let [t1, t2, t3, t4] = exact.events();
