@@ -3,6 +3,7 @@
 mod acceptance;
 mod active_set;
 mod gauss_seidel;
+mod many_rows;
 mod pivoting;
 mod projected_gradient;
 

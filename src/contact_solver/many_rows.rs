@@ -1,0 +1,316 @@
+//! Equality problems of many active rows, W_AA x = b, by conjugate gradients: nothing here costs the cube of their
+//! number.
+//!
+//! The preconditioner is a factorized sparse approximate inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14,
+//! 1993): H with a few entries a row, such that H W Hᵀ is near the identity. A contact feels its neighbors most, so that
+//! a row of H needs no more than the rows of W that are largest beside its own; iterations do then not grow with the
+//! number of rows.
+
+use super::ContactProblem;
+use crate::dense::dot;
+use crate::real::Real;
+
+/// Entries in a row of the approximate inverse, at most.
+const WIDTH: usize = 32;
+
+/// Iterations granted; where they do not end the dense factor takes over.
+const ITERATIONS: usize = 300;
+
+/// Times conjugate gradients begin again at the residual that rounding has left.
+const REFINEMENTS: usize = 3;
+
+/// Roundings of its own terms by which an equation may be missed.
+const ROUNDINGS: f64 = 4.0;
+
+/// W on the active rows, with the approximate inverse of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ManyRows<T> {
+    /// H by rows: where each begins, and the places (in the list of active rows) and values of its entries.
+    starts: Vec<usize>,
+    places: Vec<usize>,
+    values: Vec<T>,
+    /// 1/√W_ii of the active rows.
+    scale: Vec<T>,
+    /// How near each row before is, while a row of H is chosen.
+    near: Vec<(T, usize)>,
+    /// Lower factor of the block of W that a row of H belongs to, row by row.
+    block: Vec<T>,
+    /// Vectors of the iteration, one entry an active row: residual, preconditioned residual, H r.
+    residual: Vec<T>,
+    pushed: Vec<T>,
+    inner: Vec<T>,
+    correction: Vec<T>,
+    /// Direction and its product, one entry a row of the problem.
+    direction: Vec<T>,
+    product: Vec<T>,
+}
+
+impl<T: Real> ManyRows<T> {
+    /// Forms the approximate inverse for the active `rows` (ascending). Says whether there is one: not if some row
+    /// depends on its neighbors.
+    pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize]) -> bool {
+        let Self { starts, places, values, scale, near, block, .. } = self;
+        starts.clear();
+        places.clear();
+        values.clear();
+        scale.clear();
+        starts.push(0);
+        // What a pivot, of a block with a unit diagonal, must exceed.
+        let least = T::epsilon().sqrt();
+        for (k, &row) in rows.iter().enumerate() {
+            let own = problem.row(row);
+            if own[row] <= T::zero() || !own[row].is_finite() {
+                return false;
+            }
+            scale.push(own[row].sqrt().recip());
+            near.clear();
+            near.extend(rows[..k].iter().zip(scale.iter()).enumerate().map(|(j, (&i, &s))| ((own[i] * s).abs(), j)));
+            if near.len() >= WIDTH {
+                // The nearest; of two at the same distance the first.
+                let order = |a: &(T, usize), b: &(T, usize)| b.0.value().total_cmp(&a.0.value()).then(a.1.cmp(&b.1));
+                near.select_nth_unstable_by(WIDTH - 2, order);
+                near.truncate(WIDTH - 1);
+            }
+            near.retain(|(size, _)| *size > T::zero());
+            let first = places.len();
+            places.extend(near.iter().map(|(_, j)| *j));
+            places[first..].sort_unstable();
+            places.push(k);
+            let members = &places[first..];
+            if !factorize(members, |i, j| problem.row(rows[i])[rows[j]] * scale[i] * scale[j], least, block) {
+                return false;
+            }
+            // The last row of the inverse of L, scaled back: H_k W_block H_kᵀ = 1.
+            let size = members.len();
+            values.resize(first + size, T::zero());
+            let h = &mut values[first..];
+            h[size - 1] = T::one();
+            for i in (0..size).rev() {
+                h[i] /= block[i * size + i];
+                let value = h[i];
+                for j in 0..i {
+                    h[j] -= block[i * size + j] * value;
+                }
+            }
+            for (h, &j) in h.iter_mut().zip(members) {
+                *h *= scale[j];
+            }
+            starts.push(places.len());
+        }
+        true
+    }
+
+    /// Solves for `x`, which holds b on entry, to rounding. Returns the iterations, or nothing where they do not end.
+    pub(super) fn solve(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize], x: &mut [T]) -> Option<usize> {
+        let (count, size) = (rows.len(), problem.size());
+        for vector in [&mut self.residual, &mut self.pushed, &mut self.inner, &mut self.correction] {
+            vector.clear();
+            vector.resize(count, T::zero());
+        }
+        for vector in [&mut self.direction, &mut self.product] {
+            vector.clear();
+            vector.resize(size, T::zero());
+        }
+        let b = std::mem::take(&mut self.correction);
+        let mut b = b;
+        b.copy_from_slice(x);
+        x.fill(T::zero());
+        self.residual.copy_from_slice(&b);
+        let start = self.norm();
+        let mut iterations = 0;
+        let mut solved = start == T::zero();
+        for _ in 0..REFINEMENTS {
+            if solved {
+                break;
+            }
+            // As far as the recurrence can tell.
+            let goal = T::epsilon() * T::of(0.25) * start;
+            match self.iterate(problem, rows, x, goal, ITERATIONS - iterations) {
+                Some(spent) => iterations += spent,
+                None => break,
+            }
+            solved = self.refresh(problem, rows, &b, x);
+        }
+        self.correction = b;
+        solved.then_some(iterations)
+    }
+
+    /// The norm of the residual, rows measured by the roots of their diagonal.
+    fn norm(&self) -> T {
+        self.residual.iter().zip(&self.scale).map(|(&r, &s)| (r * s) * (r * s)).sum::<T>().sqrt()
+    }
+
+    /// Adds to x until the residual is at most `goal`.
+    fn iterate(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        rows: &[usize],
+        x: &mut [T],
+        goal: T,
+        limit: usize,
+    ) -> Option<usize> {
+        let mut before = T::zero();
+        for iteration in 0..limit {
+            if self.norm() <= goal {
+                return Some(iteration);
+            }
+            self.precondition();
+            let now = dot(&self.residual, &self.pushed);
+            let share = if iteration == 0 { T::zero() } else { now / before };
+            before = now;
+            for (&row, &z) in rows.iter().zip(&self.pushed) {
+                self.direction[row] = z + share * self.direction[row];
+            }
+            self.multiply(problem, rows);
+            let curvature = rows.iter().map(|&row| self.direction[row] * self.product[row]).sum::<T>();
+            // W is not definite along the direction, or nothing is a number.
+            let sound = curvature > T::zero() && now > T::zero();
+            if !sound {
+                return None;
+            }
+            let length = now / curvature;
+            for ((&row, x), r) in rows.iter().zip(x.iter_mut()).zip(&mut self.residual) {
+                *x += length * self.direction[row];
+                *r -= length * self.product[row];
+            }
+        }
+        None
+    }
+
+    /// Hᵀ H r.
+    fn precondition(&mut self) {
+        let Self { starts, places, values, residual, pushed, inner, .. } = self;
+        for (range, inner) in starts.windows(2).zip(inner.iter_mut()) {
+            let range = range[0]..range[1];
+            *inner = places[range.clone()].iter().zip(&values[range]).map(|(&j, &h)| h * residual[j]).sum();
+        }
+        pushed.fill(T::zero());
+        for (range, &inner) in starts.windows(2).zip(inner.iter()) {
+            let range = range[0]..range[1];
+            for (&j, &h) in places[range.clone()].iter().zip(&values[range]) {
+                pushed[j] += h * inner;
+            }
+        }
+    }
+
+    /// The product of W with the direction, in the active rows. Of W the lower triangle is read alone.
+    fn multiply(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize]) {
+        let Self { direction, product, .. } = self;
+        product.fill(T::zero());
+        for &row in rows {
+            let (left, p) = (&problem.row(row)[..=row], direction[row]);
+            let sum = dot(left, &direction[..=row]);
+            T::axpy(p, &left[..row], &mut product[..row]);
+            product[row] += sum;
+        }
+    }
+
+    /// The residual as it is; says whether every equation is met to the rounding of its terms.
+    fn refresh(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize], b: &[T], x: &[T]) -> bool {
+        let Self { direction, residual, .. } = self;
+        direction.fill(T::zero());
+        for (&row, &x) in rows.iter().zip(x) {
+            direction[row] = x;
+        }
+        let mut met = true;
+        for ((&row, &b), r) in rows.iter().zip(b).zip(residual.iter_mut()) {
+            let own = problem.row(row);
+            *r = b - dot(own, direction);
+            let terms = b.abs() + own.iter().zip(direction.iter()).map(|(w, x)| (*w * *x).abs()).sum::<T>();
+            met &= r.abs() <= T::of(ROUNDINGS) * T::epsilon() * terms;
+        }
+        direction.fill(T::zero());
+        met
+    }
+}
+
+/// Cholesky of a block with a unit diagonal into `l`, row by row; whether every pivot exceeds `least`.
+fn factorize<T: Real>(members: &[usize], entry: impl Fn(usize, usize) -> T, least: T, l: &mut Vec<T>) -> bool {
+    let size = members.len();
+    l.clear();
+    l.resize(size * size, T::zero());
+    for i in 0..size {
+        let (done, row) = l.split_at_mut(i * size);
+        let mut pivot = T::one();
+        for j in 0..i {
+            let other = &done[j * size..=j * size + j];
+            let value = (entry(members[i], members[j]) - dot(&row[..j], &other[..j])) / other[j];
+            row[j] = value;
+            pivot -= value * value;
+        }
+        let sound = pivot > least;
+        if !sound {
+            return false;
+        }
+        row[i] = pivot.sqrt();
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact_solver::Bound;
+    use crate::dense::DenseCholesky;
+
+    /// The flexibility of nodes on a square grid: falls off with their distance, as that of a body's surface.
+    fn flexibility(side: usize, range: f64) -> Vec<f64> {
+        let n = side * side;
+        let place = |i: usize| [(i % side) as f64, (i / side) as f64];
+        let unit = |i: usize| if i % 5 == 0 { 1e3 } else { 1.0 };
+        let entry = |i: usize, j: usize| {
+            let distance = (place(i)[0] - place(j)[0]).hypot(place(i)[1] - place(j)[1]);
+            unit(i) * unit(j) * (if i == j { 1.02 } else { 1.0 }) * (-distance / range).exp()
+        };
+        (0..n * n).map(|e| entry(e / n, e % n)).collect()
+    }
+
+    fn problem<'a>(w: &'a [f64], q: &'a [f64], bounds: &'a [Bound]) -> ContactProblem<'a, f64> {
+        ContactProblem { delassus: w, offset: q, bounds, tolerance: q, version: 0 }
+    }
+
+    #[test]
+    fn solves_to_rounding_in_iterations_that_do_not_grow() {
+        for range in [0.5, 2.0, 6.0] {
+            let mut most = [0; 2];
+            for (side, most) in [12, 24].into_iter().zip(&mut most) {
+                let n = side * side;
+                let (w, b) = (flexibility(side, range), (0..n).map(|i| (i as f64).sin()).collect::<Vec<_>>());
+                let bounds = vec![Bound::Free; n];
+                let problem = problem(&w, &b, &bounds);
+                let rows: Vec<usize> = (0..n).filter(|i| i % 7 != 3).collect();
+                let mut many = ManyRows::default();
+                assert!(many.prepare(&problem, &rows));
+                let mut x: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
+                *most = many.solve(&problem, &rows, &mut x).unwrap();
+                let mut factor = DenseCholesky::with_capacity(n);
+                factor.factorize(rows.len(), |i, j| w[rows[i] * n + rows[j]]).unwrap();
+                let mut direct: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
+                factor.solve(&mut direct);
+                for (k, &i) in rows.iter().enumerate() {
+                    let scale = w[i * n + i].sqrt().recip();
+                    assert!((x[k] - direct[k]).abs() < 1e-10 * scale, "{range} {side}: {} {}", x[k], direct[k]);
+                }
+            }
+            println!("{range}: {most:?}");
+            assert!(most[1] <= most[0] + 6 && most[1] < 40, "{range}: {most:?}");
+        }
+    }
+
+    #[test]
+    fn dependent_rows_are_left_to_the_dense_factor() {
+        let (side, n) = (6, 36);
+        let mut w = flexibility(side, 2.0);
+        // Row 20 is row 19 once more.
+        for j in 0..n {
+            w[20 * n + j] = w[19 * n + j];
+        }
+        for j in 0..n {
+            w[j * n + 20] = w[j * n + 19];
+        }
+        let (q, bounds, rows) = (vec![0.0; n], vec![Bound::Free; n], (0..n).collect::<Vec<_>>());
+        assert!(!ManyRows::default().prepare(&problem(&w, &q, &bounds), &rows));
+        w[5 * n + 5] = 0.0;
+        assert!(!ManyRows::default().prepare(&problem(&w, &q, &bounds), &rows));
+    }
+}
