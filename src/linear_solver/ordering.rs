@@ -68,7 +68,7 @@ pub enum Ordering {
 const WORTHWHILE: usize = 200;
 
 /// The symbolic factorization with `last` (ascending) eliminated last.
-pub(super) fn symbolic_cholesky(
+pub(crate) fn symbolic_cholesky(
     ordering: &Ordering,
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
