@@ -6,6 +6,7 @@ mod conjugate_gradients;
 mod diagonal;
 mod dissection;
 mod lu;
+mod minimum_degree;
 pub(crate) mod ordering;
 mod tridiagonal;
 
