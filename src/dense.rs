@@ -6,7 +6,7 @@
 //! contacts make the matrix semidefinite: of all solutions the one of least norm is then returned.
 
 use crate::memory::Scratch;
-use crate::real::{Real, kernels::Kernels};
+use crate::real::{Kernels, Real};
 
 /// Lower factor L of a symmetric positive semidefinite matrix, or L U of any other, kept with its memory.
 #[derive(Clone, Debug, Default)]

@@ -5,9 +5,9 @@ mod cholesky;
 mod conjugate_gradients;
 mod diagonal;
 mod dissection;
-pub(crate) mod forest;
 mod lu;
-mod ordering;
+mod minimum_degree;
+pub(crate) mod ordering;
 mod tridiagonal;
 
 pub use by_body::ByBody;

@@ -1,6 +1,7 @@
 //! Mass matrices: lumping, blending, redistribution, singular ones, the Courant numbers of a mesh, and M⁻¹ on the
 //! degrees of freedom that are free to move and have a mass.
 
+mod assembly;
 mod bipenalty;
 mod blend;
 mod courant;

@@ -1,12 +1,12 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
-use super::forest::Forest;
 use super::ordering::{self, Ordering};
 use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
+use crate::kernels::cholesky::{Columns, Factorization as Kind, Simplicial, Supernodal};
+use crate::kernels::forest::Forest;
 use crate::memory;
 use crate::real::Real;
-use crate::real::kernels::{Columns, Factorization as Kind, Simplicial, Supernodal};
 use crate::{sparse, threads};
 use faer::Par;
 use faer::dyn_stack::MemBuffer;

@@ -2,9 +2,9 @@
 
 use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
+use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Sweeps, Vectors};
 use crate::memory;
 use crate::real::Real;
-use crate::real::kernels::{Blocks, Iteration, Outcome, Sweeps, Vectors};
 use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;

@@ -6,7 +6,7 @@ mod graph;
 mod multilevel;
 mod separator;
 
-use super::ordering::minimum_degree;
+use super::minimum_degree::minimum_degree;
 use crate::error::Result;
 use faer::sparse::SymbolicSparseColMatRef;
 use graph::{Graph, Quotient};

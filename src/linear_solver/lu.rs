@@ -2,9 +2,9 @@
 
 use super::{Factorization, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
+use crate::kernels::lu::Side;
 use crate::memory;
 use crate::real::Real;
-use crate::real::lu::Side;
 use crate::sparse;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};

@@ -1,12 +1,11 @@
-//! Elimination orders: the choice between them, minimum degree, and the dofs of contact behind the others.
+//! The choice of an elimination order, with the dofs of contact behind all others.
 
 use super::dissection;
+use super::minimum_degree::{minimum_degree, out_of_memory};
 use crate::error::{Error, Result};
 use faer::Side;
-use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
@@ -68,7 +67,7 @@ pub enum Ordering {
 const WORTHWHILE: usize = 200;
 
 /// The symbolic factorization with `last` (ascending) eliminated last.
-pub(super) fn symbolic_cholesky(
+pub(crate) fn symbolic_cholesky(
     ordering: &Ordering,
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
@@ -158,10 +157,6 @@ fn by_degree(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Res
     Ok(if other.len_val() < best.len_val() { other } else { best })
 }
 
-fn out_of_memory<E>(_: E) -> Error {
-    Error::OutOfMemory { what: "a sparse Cholesky factor" }
-}
-
 fn factorize(
     pattern: SymbolicSparseColMatRef<'_, usize>,
     ordering: SymmetricOrdering<'_, usize>,
@@ -176,18 +171,6 @@ fn with_order(pattern: SymbolicSparseColMatRef<'_, usize>, order: &[usize]) -> R
         inverse[dof] = place;
     }
     factorize(pattern, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())))
-}
-
-/// Approximate minimum degree.
-pub(super) fn minimum_degree(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Vec<usize>> {
-    let n = pattern.nrows();
-    let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
-    let scratch = amd::order_maybe_unsorted_scratch::<usize>(n, pattern.row_idx().len());
-    let mut memory = MemBuffer::try_new(scratch).map_err(out_of_memory)?;
-    let stack = MemStack::new(&mut memory);
-    amd::order_maybe_unsorted(&mut order, &mut inverse, pattern, amd::Control::default(), stack)
-        .map_err(out_of_memory)?;
-    Ok(order)
 }
 
 /// The same order with the dofs of `last` behind the others.

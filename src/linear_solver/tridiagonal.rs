@@ -3,8 +3,8 @@
 use super::cholesky::negligible;
 use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
+use crate::kernels::chain::Chains;
 use crate::real::Real;
-use crate::real::chain::Chains;
 use crate::{memory, sparse};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;

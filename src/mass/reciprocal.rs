@@ -1,7 +1,7 @@
 //! Reciprocal mass matrices: a sparse M⁻¹ assembled from the elements.
 
+use super::assembly::{assembled, check_dofs};
 use super::lump::check_positive;
-use super::redistribute::{assembled, check_dofs};
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;

@@ -1,5 +1,6 @@
 //! Mass redistribution: contact dofs without mass, their mass on others.
 
+use super::assembly::{assembled, check_dofs, flags};
 use super::{InverseMass, Mass};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -475,24 +476,6 @@ fn check_takers(dof: usize, weight: f64) -> Result<()> {
     }
 }
 
-/// Refuses dofs the system does not have.
-pub(super) fn check_dofs(what: &'static str, dofs: &[usize], size: usize) -> Result<()> {
-    match dofs.iter().find(|dof| **dof >= size) {
-        Some(&dof) => Err(Error::MissingDof { what, dof, dofs: size }),
-        None => Ok(()),
-    }
-}
-
-/// Which of all dofs are listed.
-pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<Vec<bool>> {
-    check_dofs(what, list, size)?;
-    let mut flags = vec![false; size];
-    for &dof in list {
-        flags[dof] = true;
-    }
-    Ok(flags)
-}
-
 fn check_motions(motions: &[Vec<f64>], size: usize) -> Result<()> {
     let what = "motion kept by the redistribution";
     if motions.is_empty() {
@@ -510,29 +493,4 @@ fn check_motions(motions: &[Vec<f64>], size: usize) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The square matrix of these entries (row, column, value), those in the same place added in their order.
-pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
-    entries.sort_by_key(|&(row, column, _)| (column, row));
-    let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());
-    let mut last = None;
-    for (row, column, value) in entries {
-        match values.last_mut() {
-            Some(sum) if last == Some((row, column)) => *sum += value,
-            _ => {
-                rows.push(row);
-                values.push(value);
-                pointers[column + 1] += 1;
-            }
-        }
-        last = Some((row, column));
-    }
-    for column in 0..size {
-        pointers[column + 1] += pointers[column];
-    }
-    let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
-        .to_owned()
-        .map_err(|_| Error::OutOfMemory { what: "the pattern of a mass matrix" })?;
-    Ok(SparseColMat::new(pattern, values))
 }

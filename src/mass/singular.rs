@@ -1,6 +1,6 @@
 //! Singular mass matrices: assembled so that contact dofs have no mass.
 
-use super::redistribute::{assembled, check_dofs, flags};
+use super::assembly::{assembled, check_dofs, flags};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::sparse;

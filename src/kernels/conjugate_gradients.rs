@@ -1,14 +1,71 @@
 //! Preconditioned conjugate gradients on a matrix in blocks, scaled so that its diagonal blocks are identities.
 
-use super::Real;
-use super::kernels::{Blocks, Iteration, Outcome, Sweeps, Vectors};
+use crate::scalar::Scalar;
+
+/// Blocks below the diagonal of a symmetric matrix, row by row, each stored column by column.
+#[derive(Clone, Copy, Debug)]
+pub struct Blocks<'a, T> {
+    pub pointers: &'a [usize],
+    pub columns: &'a [u32],
+    pub values: &'a [T],
+}
+
+/// Preconditioners of conjugate gradients for a matrix with identities as diagonal blocks.
+#[derive(Clone, Copy, Debug)]
+pub enum Sweeps<'a, T> {
+    /// None but that scaling.
+    Nodes,
+    /// (1 + L)(1 + Lᵀ).
+    GaussSeidel,
+    /// An incomplete factor, with the inverses of its diagonal blocks.
+    Incomplete { factor: Blocks<'a, T>, inverses: &'a [T] },
+}
+
+/// Conjugate gradients for a scaled matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct Iteration<'a, T> {
+    pub lower: Blocks<'a, T>,
+    /// C⁻¹ of each diagonal block C Cᵀ of the matrix.
+    pub scaling: &'a [T],
+    pub sweeps: Sweeps<'a, T>,
+    /// Of the preconditioned residual, over that of the right-hand side.
+    pub tolerance: f64,
+    pub limit: usize,
+}
+
+/// Memory of conjugate gradients.
+#[derive(Debug)]
+pub struct Vectors<'a, T> {
+    pub x: &'a mut [T],
+    pub r: &'a mut [T],
+    pub p: &'a mut [T],
+    pub t: &'a mut [T],
+    pub q: &'a mut [T],
+}
+
+/// How conjugate gradients ended.
+#[derive(Clone, Copy, Debug)]
+pub enum Outcome {
+    Converged {
+        iterations: usize,
+    },
+    NotConverged {
+        iterations: usize,
+        residual: f64,
+    },
+    /// pᵀAp over pᵀdiag(A)p of a direction, and the dof with the smallest share in the former.
+    Indefinite {
+        curvature: f64,
+        dof: usize,
+    },
+}
 
 /// Sums side by side: one after the other would wait for each addition.
 const LANES: usize = 4;
 
 /// Σ x y in double precision: an f32 run keeps its digits, and its range, in products of long vectors.
 #[inline]
-fn dot<T: Real>(x: &[T], y: &[T]) -> f64 {
+fn dot<T: Scalar>(x: &[T], y: &[T]) -> f64 {
     let mut sums = [0.0; LANES];
     let (x_rest, y_rest) = (x.chunks_exact(LANES).remainder(), y.chunks_exact(LANES).remainder());
     for (x, y) in x.chunks_exact(LANES).zip(y.chunks_exact(LANES)) {
@@ -24,12 +81,12 @@ fn dot<T: Real>(x: &[T], y: &[T]) -> f64 {
 type Block<T, const B: usize> = [[T; B]; B];
 
 #[inline]
-fn block<T: Real, const B: usize>(values: &[T]) -> Block<T, B> {
+fn block<T: Scalar, const B: usize>(values: &[T]) -> Block<T, B> {
     std::array::from_fn(|c| std::array::from_fn(|r| values[c * B + r]))
 }
 
 #[inline]
-fn store<T: Real, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
+fn store<T: Scalar, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
     for c in 0..B {
         values[c * B..(c + 1) * B].copy_from_slice(&block[c]);
     }
@@ -38,7 +95,7 @@ fn store<T: Real, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
 /// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the place of a pivot that is
 /// not larger than what rounding leaves of its diagonal entry.
 #[inline]
-fn inverse_factor<T: Real, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B>, usize> {
+fn inverse_factor<T: Scalar, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B>, usize> {
     let mut l = [[T::zero(); B]; B];
     for c in 0..B {
         for r in c..B {
@@ -71,25 +128,25 @@ fn inverse_factor<T: Real, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B
 
 /// `L x` for a lower triangular block.
 #[inline]
-fn lower_product<T: Real, const B: usize>(l: &[T], x: [T; B]) -> [T; B] {
+fn lower_product<T: Scalar, const B: usize>(l: &[T], x: [T; B]) -> [T; B] {
     std::array::from_fn(|r| (0..=r).map(|c| l[c * B + r] * x[c]).sum())
 }
 
 /// `Lᵀ x` for a lower triangular block.
 #[inline]
-fn lower_transposed<T: Real, const B: usize>(l: &[T], x: [T; B]) -> [T; B] {
+fn lower_transposed<T: Scalar, const B: usize>(l: &[T], x: [T; B]) -> [T; B] {
     std::array::from_fn(|c| (c..B).map(|r| l[c * B + r] * x[r]).sum())
 }
 
 #[inline]
-fn node<T: Real, const B: usize>(x: &[T], node: usize) -> [T; B] {
+fn node<T: Scalar, const B: usize>(x: &[T], node: usize) -> [T; B] {
     let x = &x[node * B..(node + 1) * B];
     std::array::from_fn(|k| x[k])
 }
 
 /// Σ_J L_IJ y_J of block row I.
 #[inline]
-fn gather<T: Real, const B: usize>(lower: &Blocks<'_, T>, row: usize, y: &[T]) -> [T; B] {
+fn gather<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, row: usize, y: &[T]) -> [T; B] {
     let range = lower.pointers[row]..lower.pointers[row + 1];
     let mut sums = [[T::zero(); B]; B];
     let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
@@ -106,7 +163,7 @@ fn gather<T: Real, const B: usize>(lower: &Blocks<'_, T>, row: usize, y: &[T]) -
 
 /// `y_J += sign L_IJᵀ x` for all J of block row I.
 #[inline]
-fn scatter<T: Real, const B: usize>(lower: &Blocks<'_, T>, row: usize, x: [T; B], y: &mut [T]) {
+fn scatter<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, row: usize, x: [T; B], y: &mut [T]) {
     let range = lower.pointers[row]..lower.pointers[row + 1];
     let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
     for (&column, block) in lower.columns[range].iter().zip(blocks) {
@@ -123,7 +180,7 @@ fn scatter<T: Real, const B: usize>(lower: &Blocks<'_, T>, row: usize, x: [T; B]
 
 /// `q = (1 + L + Lᵀ) p`.
 #[inline]
-fn product<T: Real, const B: usize>(lower: &Blocks<'_, T>, p: &[T], q: &mut [T]) {
+fn product<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, p: &[T], q: &mut [T]) {
     q.copy_from_slice(p);
     for row in 0..p.len() / B {
         let sum: [T; B] = gather(lower, row, p);
@@ -136,7 +193,7 @@ fn product<T: Real, const B: usize>(lower: &Blocks<'_, T>, p: &[T], q: &mut [T])
 
 /// `x ← (1 + L)⁻¹ x`.
 #[inline]
-fn forward<T: Real, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
+fn forward<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
     for row in 0..x.len() / B {
         let sum: [T; B] = gather(lower, row, x);
         for (x, sum) in x[row * B..(row + 1) * B].iter_mut().zip(sum) {
@@ -147,7 +204,7 @@ fn forward<T: Real, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
 
 /// `x ← (1 + Lᵀ)⁻¹ x`.
 #[inline]
-fn backward<T: Real, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
+fn backward<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
     for row in (0..x.len() / B).rev() {
         let own: [T; B] = node(x, row);
         scatter::<T, B>(lower, row, own.map(|x| -x), x);
@@ -156,7 +213,7 @@ fn backward<T: Real, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
 
 /// `z = (K Kᵀ)⁻¹ r` with an incomplete factor K: blocks below the diagonal, and the inverses of those on it.
 #[inline]
-fn incomplete<T: Real, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r: &[T], z: &mut [T]) {
+fn incomplete<T: Scalar, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r: &[T], z: &mut [T]) {
     z.copy_from_slice(r);
     let nodes = r.len() / B;
     for row in 0..nodes {
@@ -176,7 +233,7 @@ fn incomplete<T: Real, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r
 /// Scales a matrix: `values` and `diagonal` hold its blocks and become C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the Cholesky
 /// factors C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
 #[inline]
-pub(super) fn scale<T: Real, const B: usize>(
+pub(crate) fn scale<T: Scalar, const B: usize>(
     (pointers, columns): (&[usize], &[u32]),
     values: &mut [T],
     diagonal: &mut [T],
@@ -207,7 +264,7 @@ pub(super) fn scale<T: Real, const B: usize>(
 /// Incomplete Cholesky factor, in the pattern, of a scaled matrix with `shift` added to its diagonal; says whether all
 /// pivots were positive.
 #[inline]
-pub(super) fn factorize<T: Real, const B: usize>(
+pub(crate) fn factorize<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,
     shift: T,
     values: &mut [T],
@@ -272,7 +329,7 @@ struct Judge {
 }
 
 impl Judge {
-    fn new<T: Real>(iteration: &Iteration<'_, T>) -> Self {
+    fn new<T: Scalar>(iteration: &Iteration<'_, T>) -> Self {
         let (rounding, limit) = (T::epsilon().value().powi(2), iteration.limit);
         Self { tolerance: iteration.tolerance, first: 0.0, length: 0.0, rounding, iterations: 0, limit }
     }
@@ -301,7 +358,7 @@ const NEGLIGIBLE: f64 = 64.0;
 
 /// Solves A x = b in place. Zero is the start.
 #[inline]
-pub(super) fn solve<T: Real, const B: usize>(
+pub(crate) fn solve<T: Scalar, const B: usize>(
     iteration: &Iteration<'_, T>,
     b: &mut [T],
     vectors: Vectors<'_, T>,
@@ -361,7 +418,7 @@ pub(super) fn solve<T: Real, const B: usize>(
 /// With the preconditioner (1 + L)(1 + Lᵀ), swept so that a step costs no more than a product (Eisenstat, 1981): in the
 /// variables (1 + Lᵀ) x the matrix is (1 + L)⁻¹ A (1 + Lᵀ)⁻¹ p = t + (1 + L)⁻¹ (p − t) with t = (1 + Lᵀ)⁻¹ p.
 #[inline]
-fn gauss_seidel<T: Real, const B: usize>(
+fn gauss_seidel<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,
     judge: &mut Judge,
     [x, r, p, t, y]: [&mut [T]; 5],
@@ -403,7 +460,7 @@ fn gauss_seidel<T: Real, const B: usize>(
 
 /// With any preconditioner.
 #[inline]
-fn preconditioned<T: Real, const B: usize>(
+fn preconditioned<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,
     judge: &mut Judge,
     [x, r, z, p, q]: [&mut [T]; 5],

@@ -4,7 +4,7 @@
 //! and a product that is fused with its sum waits half as long, on machines that have it.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
 
-use super::Real;
+use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 /// Of two chains: the entries of L below the diagonal (one for each unknown, the last one to what comes behind), 1/D,
@@ -17,7 +17,7 @@ pub struct Chains<'a, T> {
 }
 
 /// `x_k −= l_{k−1} x_{k−1}` down both chains.
-pub(super) fn forward<T: Real>(chains: Chains<'_, T>) {
+pub(crate) fn forward<T: Scalar>(chains: Chains<'_, T>) {
     match fuses() {
         true => Arch::new().dispatch(Down(chains)),
         false => down(chains, |x, l, y| x - l * y),
@@ -25,7 +25,7 @@ pub(super) fn forward<T: Real>(chains: Chains<'_, T>) {
 }
 
 /// `x_k = x_k / d_k − l_k x_{k+1}` up both chains, from the unknowns `behind` them.
-pub(super) fn backward<T: Real>(chains: Chains<'_, T>, behind: [T; 2]) {
+pub(crate) fn backward<T: Scalar>(chains: Chains<'_, T>, behind: [T; 2]) {
     match fuses() {
         true => Arch::new().dispatch(Up(chains, behind)),
         false => up(chains, behind, |x, l, y| x - l * y),
@@ -40,7 +40,7 @@ fn fuses() -> bool {
 
 struct Down<'a, T>(Chains<'a, T>);
 
-impl<T: Real> WithSimd for Down<'_, T> {
+impl<T: Scalar> WithSimd for Down<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -51,7 +51,7 @@ impl<T: Real> WithSimd for Down<'_, T> {
 
 struct Up<'a, T>(Chains<'a, T>, [T; 2]);
 
-impl<T: Real> WithSimd for Up<'_, T> {
+impl<T: Scalar> WithSimd for Up<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -62,7 +62,7 @@ impl<T: Real> WithSimd for Up<'_, T> {
 
 /// `eliminate(x, l, y)` is x − l y.
 #[inline(always)]
-fn down<T: Real>(Chains { lower, x: [x0, x1], .. }: Chains<'_, T>, eliminate: impl Fn(T, T, T) -> T) {
+fn down<T: Scalar>(Chains { lower, x: [x0, x1], .. }: Chains<'_, T>, eliminate: impl Fn(T, T, T) -> T) {
     let common = x0.len().min(x1.len());
     let [(l0, rest_l0), (l1, rest_l1)] = lower.map(|l| l.split_at(common));
     let ((x0, rest_x0), (x1, rest_x1)) = (x0.split_at_mut(common), x1.split_at_mut(common));
@@ -84,7 +84,7 @@ fn down<T: Real>(Chains { lower, x: [x0, x1], .. }: Chains<'_, T>, eliminate: im
 }
 
 #[inline(always)]
-fn up<T: Real>(
+fn up<T: Scalar>(
     Chains { lower, inverse, x: [x0, x1] }: Chains<'_, T>,
     behind: [T; 2],
     eliminate: impl Fn(T, T, T) -> T,

@@ -8,9 +8,9 @@
 //! is eliminated behind it column by column.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
-use super::Real;
-use super::kernels::{Columns, Supernodal, supernodes};
-use crate::linear_solver::forest::{Forest, Plan};
+use super::cholesky::{Columns, Supernodal, supernodes};
+use super::forest::{Forest, Plan};
+use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
@@ -19,20 +19,20 @@ const LANES: usize = 8;
 
 /// A factor and its forest.
 #[derive(Debug)]
-pub(super) struct Interior<'a, T> {
-    pub(super) factor: Supernodal<'a, T>,
-    pub(super) forest: &'a Forest,
+pub(crate) struct Interior<'a, T> {
+    pub(crate) factor: Supernodal<'a, T>,
+    pub(crate) forest: &'a Forest,
 }
 
 /// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them
 /// what its parent has to add. `b` are the entries of the right-hand side, `order` where each column finds its own.
-pub(super) fn forest_forward<T: Real>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
+pub(crate) fn forest_forward<T: Scalar>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
     forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
 }
 
 /// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry those
 /// of the roots know the solution on the rows below them.
-pub(super) fn forest_backward<T: Real>(interior: &Interior<'_, T>, w: &mut [T]) {
+pub(crate) fn forest_backward<T: Scalar>(interior: &Interior<'_, T>, w: &mut [T]) {
     backward_plan(&interior.forest.plan, interior, 0, w);
 }
 
@@ -44,7 +44,7 @@ struct Forward<'a, T> {
 }
 
 /// `w` begins with the work vector of supernode `from`.
-fn forward_plan<T: Real>(plan: &Plan, forward: &Forward<'_, T>, from: usize, w: &mut [T]) {
+fn forward_plan<T: Scalar>(plan: &Plan, forward: &Forward<'_, T>, from: usize, w: &mut [T]) {
     match plan {
         Plan::Serial(range) => forward_serial(forward, range.clone(), from, w),
         Plan::Stem(branch, stem) => {
@@ -62,7 +62,7 @@ fn forward_plan<T: Real>(plan: &Plan, forward: &Forward<'_, T>, from: usize, w: 
     }
 }
 
-fn backward_plan<T: Real>(plan: &Plan, interior: &Interior<'_, T>, from: usize, w: &mut [T]) {
+fn backward_plan<T: Scalar>(plan: &Plan, interior: &Interior<'_, T>, from: usize, w: &mut [T]) {
     match plan {
         Plan::Serial(range) => backward_serial(interior, range.clone(), from, w),
         Plan::Stem(branch, stem) => {
@@ -80,7 +80,7 @@ fn backward_plan<T: Real>(plan: &Plan, interior: &Interior<'_, T>, from: usize, 
     }
 }
 
-fn forward_serial<T: Real>(forward: &Forward<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
+fn forward_serial<T: Scalar>(forward: &Forward<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
     let Forward { interior: Interior { factor, forest }, b, order } = *forward;
     let (base, arch) = (forest.offsets[from], Arch::new());
     for s in range {
@@ -103,7 +103,7 @@ fn forward_serial<T: Real>(forward: &Forward<'_, T>, range: Range<usize>, from: 
     }
 }
 
-fn backward_serial<T: Real>(interior: &Interior<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
+fn backward_serial<T: Scalar>(interior: &Interior<'_, T>, range: Range<usize>, from: usize, w: &mut [T]) {
     let Interior { factor, forest } = interior;
     let (base, arch) = (forest.offsets[from], Arch::new());
     for s in range.rev() {
@@ -168,7 +168,7 @@ impl<'a, T> Panel<'a, T> {
     }
 }
 
-impl<T: Real> Panel<'_, T> {
+impl<T: Scalar> Panel<'_, T> {
     /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
     fn forward(&self, arch: Arch, w: &mut [T]) {
         let [eights, fours] = self.groups();
@@ -223,7 +223,7 @@ impl<T: Real> Panel<'_, T> {
 }
 
 /// Forward over `columns` for one right-hand side.
-pub(super) fn forward<T: Real>(
+pub(super) fn forward<T: Scalar>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
     Columns { values: x, skipped, scratch }: Columns<'_, T>,
@@ -244,7 +244,7 @@ pub(super) fn forward<T: Real>(
 }
 
 /// Backward over `columns` for one right-hand side; entries behind them hold the solution.
-pub(super) fn backward<T: Real>(
+pub(super) fn backward<T: Scalar>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
     Columns { values: x, skipped, scratch }: Columns<'_, T>,
@@ -270,7 +270,7 @@ struct Subtract<'a, T, const N: usize> {
     y: &'a mut [T],
 }
 
-impl<T: Real, const N: usize> WithSimd for Subtract<'_, T, N> {
+impl<T: Scalar, const N: usize> WithSimd for Subtract<'_, T, N> {
     type Output = ();
 
     #[inline(always)]
@@ -294,7 +294,7 @@ struct Dots<'a, T, const N: usize> {
     x: &'a [T],
 }
 
-impl<T: Real, const N: usize> WithSimd for Dots<'_, T, N> {
+impl<T: Scalar, const N: usize> WithSimd for Dots<'_, T, N> {
     type Output = [T; N];
 
     #[inline(always)]

@@ -1,0 +1,11 @@
+//! Loops that take the time of a run, generic over the scalar alone; `crate::real` instantiates them for `f32` and `f64`.
+
+pub(crate) mod block_sweep;
+pub(crate) mod chain;
+pub(crate) mod cholesky;
+pub(crate) mod conjugate_gradients;
+pub(crate) mod forest;
+pub(crate) mod lu;
+pub(crate) mod product;
+pub(crate) mod sweep;
+pub(crate) mod vector;

@@ -1,0 +1,212 @@
+//! Cholesky factors: how they are stored and computed, sparse and dense, and the sweeps over simplicial ones.
+
+use crate::scalar::Scalar;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::ldlt::factor::{LdltError, LdltRegularization};
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::prelude::ReborrowMut;
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
+use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
+use std::ops::Range;
+
+/// How a factor of a symmetric matrix is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Factorization {
+    /// L D Lᵀ, simplicial.
+    Ldlt,
+    /// L Lᵀ, supernodal.
+    Llt,
+}
+
+/// A simplicial L D Lᵀ in the order of elimination: each column holds 1/D, then L below it.
+#[derive(Clone, Copy, Debug)]
+pub struct Simplicial<'a, T> {
+    pub pointers: &'a [usize],
+    pub rows: &'a [usize],
+    pub values: &'a [T],
+    /// Entries left out at the front of the vectors swept.
+    pub skipped: usize,
+}
+
+/// A supernodal L Lᵀ.
+#[derive(Clone, Copy, Debug)]
+pub struct Supernodal<'a, T> {
+    pub symbolic: &'a SymbolicSupernodalCholesky<usize>,
+    pub values: &'a [T],
+}
+
+/// Right-hand sides of a supernodal sweep, in the order of elimination.
+#[derive(Debug)]
+pub struct Columns<'a, T> {
+    /// The columns one after the other, each without its first `skipped` entries.
+    pub values: &'a mut [T],
+    pub skipped: usize,
+    /// Room for the rows below any supernode, once a column.
+    pub scratch: &'a mut [T],
+}
+
+/// The supernodes that hold any of the columns.
+#[inline]
+pub(super) fn supernodes<T>(factor: &Supernodal<'_, T>, columns: &Range<usize>) -> Range<usize> {
+    let begin = &factor.symbolic.supernode_begin()[..factor.symbolic.n_supernodes()];
+    match columns.is_empty() {
+        true => 0..0,
+        false => begin.partition_point(|&b| b <= columns.start) - 1..begin.partition_point(|&b| b < columns.end),
+    }
+}
+
+/// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller.
+#[inline]
+pub(crate) fn factorize<T: Scalar>(
+    kind: Factorization,
+    symbolic: &SymbolicCholesky<usize>,
+    a: SparseColMatRef<'_, usize, T>,
+    values: &mut [T],
+    pivots: &mut [T],
+    par: Par,
+    memory: &mut MemBuffer,
+) -> Result<(), usize> {
+    let stack = MemStack::new(memory);
+    let failure = match kind {
+        Factorization::Llt => symbolic
+            .factorize_numeric_llt(values, a, Side::Lower, LltRegularization::default(), par, stack, Spec::default())
+            .err()
+            .map(|LltError::NonPositivePivot { index }| index),
+        Factorization::Ldlt => symbolic
+            .factorize_numeric_ldlt(
+                values,
+                a,
+                Side::Lower,
+                LdltRegularization::default(),
+                Par::Seq,
+                stack,
+                Spec::default(),
+            )
+            .err()
+            .map(|LdltError::ZeroPivot { index }| index),
+    };
+    let original = |k: usize| symbolic.perm().map_or(k, |p| p.arrays().0[k]);
+    if let Some(index) = failure {
+        // faer counts pivots from one in simplicial factors and from zero in supernodal ones.
+        let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
+        return Err(original(index.saturating_sub(base)));
+    }
+    // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
+    // rounding.
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(raw) => {
+            for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
+                pivots[original(k)] = values[start].clone();
+                // The sweeps multiply by 1/D.
+                values[start] = T::recip_impl(&values[start]);
+            }
+        }
+        SymbolicCholeskyRaw::Supernodal(raw) => {
+            for s in 0..raw.n_supernodes() {
+                let (start, block) = (raw.supernode_begin()[s], SupernodalLltRef::new(raw, values).supernode(s).val());
+                for j in 0..block.ncols() {
+                    pivots[original(start + j)] = T::abs2_impl(&block[(j, j)]);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Scratch for factorizing and for solving `columns` right-hand sides.
+#[inline]
+pub(crate) fn scratch<T: Scalar>(
+    kind: Factorization,
+    symbolic: &SymbolicCholesky<usize>,
+    columns: usize,
+    par: Par,
+) -> StackReq {
+    let solve = symbolic.solve_in_place_scratch::<T>(columns, Par::Seq);
+    let factorize = match kind {
+        Factorization::Llt => symbolic.factorize_numeric_llt_scratch::<T>(par, Spec::default()),
+        Factorization::Ldlt => symbolic.factorize_numeric_ldlt_scratch::<T>(Par::Seq, Spec::default()),
+    };
+    solve.or(factorize)
+}
+
+/// Solves in place for the columns of `rhs` with a supernodal factor.
+#[inline]
+pub(crate) fn supernodal_solve<T: Scalar>(
+    symbolic: &SymbolicCholesky<usize>,
+    values: &[T],
+    rhs: &mut [T],
+    columns: usize,
+    memory: &mut MemBuffer,
+) {
+    let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
+    LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(memory));
+}
+
+// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory
+// takes longer than the arithmetic.
+
+/// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
+#[inline]
+pub(crate) fn simplicial_forward<T: Scalar>(factor: &Simplicial<'_, T>, columns: Range<usize>, x: &mut [T]) {
+    let Simplicial { pointers, rows, values, skipped } = *factor;
+    let mut next = x.get(columns.start - skipped).copied().unwrap_or(T::zero());
+    for (j, range) in columns.clone().zip(pointers[columns.start..=columns.end].windows(2)) {
+        let xj = next;
+        next = x.get(j + 1 - skipped).copied().unwrap_or(T::zero());
+        let below = range[0] + 1..range[1];
+        for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
+            if i == j + 1 {
+                next -= l * xj;
+            } else {
+                x[i - skipped] -= l * xj;
+            }
+        }
+        x[j - skipped] = xj * values[range[0]];
+    }
+    if let Some(behind) = x.get_mut(columns.end - skipped) {
+        *behind = next;
+    }
+}
+
+/// The backward sweep over `columns`; entries behind them hold the solution.
+#[inline]
+pub(crate) fn simplicial_backward<T: Scalar>(factor: &Simplicial<'_, T>, columns: Range<usize>, x: &mut [T]) {
+    let Simplicial { pointers, rows, values, skipped } = *factor;
+    let mut last = x.get(columns.end - skipped).copied().unwrap_or(T::zero());
+    for (j, range) in columns.clone().zip(pointers[columns.start..=columns.end].windows(2)).rev() {
+        let below = range[0] + 1..range[1];
+        let mut sum = x[j - skipped];
+        for (&i, &l) in rows[below.clone()].iter().zip(&values[below]) {
+            sum -= l * if i == j + 1 { last } else { x[i - skipped] };
+        }
+        x[j - skipped] = sum;
+        last = sum;
+    }
+}
+
+/// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots were
+/// positive.
+#[inline]
+pub(crate) fn dense<T: Scalar>(size: usize, values: &mut [T], memory: &mut MemBuffer) -> bool {
+    let a = MatMut::from_column_major_slice_mut(values, size, size);
+    let (regularization, stack) = (LltRegularization::default(), MemStack::new(memory));
+    cholesky_in_place(a, regularization, Par::Seq, stack, Spec::default()).is_ok()
+}
+
+/// Scratch for [`dense`].
+#[inline]
+pub(crate) fn dense_scratch<T: Scalar>(size: usize) -> StackReq {
+    cholesky_in_place_scratch::<T>(size, Par::Seq, Spec::default())
+}
+
+/// Solves L Lᵀ x = b in place.
+#[inline]
+pub(crate) fn dense_solve<T: Scalar>(size: usize, values: &[T], x: &mut [T]) {
+    let l = MatRef::from_column_major_slice(values, size, size);
+    let mut x = MatMut::from_column_major_slice_mut(x, size, 1);
+    solve_lower_triangular_in_place(l, x.rb_mut(), Par::Seq);
+    solve_upper_triangular_in_place(l.transpose(), x, Par::Seq);
+}

@@ -1,0 +1,52 @@
+//! Sparse LU.
+
+use crate::scalar::Scalar;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::LuError;
+use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu};
+use faer::{Conj, MatMut, Par, Spec};
+
+/// Whether a factor solves with A or with Aᵀ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    Given,
+    Transposed,
+}
+
+/// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
+#[inline]
+pub(crate) fn factorize<T: Scalar>(
+    symbolic: &SymbolicLu<usize>,
+    a: SparseColMatRef<'_, usize, T>,
+    numeric: &mut NumericLu<usize, T>,
+    memory: &mut MemBuffer,
+) -> Result<(), LuError> {
+    symbolic.factorize_numeric_lu(numeric, a, Par::Seq, MemStack::new(memory), Spec::default()).map(|_| ())
+}
+
+/// Solves in place for the columns of `rhs`.
+#[inline]
+pub(crate) fn solve<T: Scalar>(
+    (symbolic, numeric): (&SymbolicLu<usize>, &NumericLu<usize, T>),
+    side: Side,
+    rhs: &mut [T],
+    columns: usize,
+    memory: &mut MemBuffer,
+) {
+    let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
+    let (factor, stack) = (LuRef::new_unchecked(symbolic, numeric), MemStack::new(memory));
+    match side {
+        Side::Given => factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
+        Side::Transposed => factor.solve_transpose_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
+    }
+}
+
+/// Scratch for factorizing and for solving `columns` right-hand sides.
+#[inline]
+pub(crate) fn scratch<T: Scalar>(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq {
+    let solve = symbolic
+        .solve_in_place_scratch::<T>(columns, Par::Seq)
+        .or(symbolic.solve_transpose_in_place_scratch::<T>(columns, Par::Seq));
+    solve.or(symbolic.factorize_numeric_lu_scratch::<T>(Par::Seq, Spec::default()))
+}
