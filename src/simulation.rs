@@ -1,5 +1,6 @@
 //! The simulation: one system, one integrator, contacts and correctors, advanced step by step.
 
+mod admitted;
 mod builder;
 mod constraints;
 mod contact_step;
@@ -11,20 +12,25 @@ mod massless;
 mod newton;
 mod newton_step;
 mod operator;
+mod overclosures;
+mod pairing;
 mod path;
 mod program;
 mod resample;
+pub(crate) mod results;
 mod scheme;
 mod stability;
 mod start;
 mod step;
+mod supports;
 
 pub use builder::SimulationBuilder;
-pub(crate) use constraints::{Admitted, Constraints, Overclosures};
+use constraints::Constraints;
 pub use control::StepControl;
-pub use energy::{Energy, Works};
 pub use massless::StartAdjustment;
 pub use newton::{Iteration, Newton};
+pub(crate) use overclosures::Overclosures;
+pub use results::{Energy, Outcome, Statistics, Works};
 pub use start::InitialOverclosure;
 
 use crate::contact::ContactJacobian;
@@ -47,39 +53,6 @@ use program::Program;
 use scheme::Scheme;
 use stability::StepLimit;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-
-/// Work counts since the start of a simulation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Statistics {
-    /// Accepted steps.
-    pub steps: u64,
-    /// Solves with the effective matrix, responses of contact rows not counted.
-    pub linear_solves: u64,
-    /// Iterations of Newton's method, in all stages together; none for linear systems.
-    pub newton_iterations: u64,
-    /// Effective matrices factorized.
-    pub factorizations: u64,
-    /// Contact problems solved; a stage in which nothing comes near has none.
-    pub contact_solves: u64,
-    /// Active-set iterations of all contact problems together.
-    pub contact_iterations: u64,
-    /// Contacts that closed or opened, counted at the end of each step.
-    pub contact_changes: u64,
-    /// Steps that failed or were judged too coarse, and were taken again with half the size.
-    pub refused_steps: u64,
-    /// Steps of the smallest size that were taken though they were judged too coarse.
-    pub coarse_steps: u64,
-}
-
-/// Why a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The time was reached.
-    Reached,
-    /// An observer stopped the run.
-    Stopped,
-}
 
 /// Advances a system in time; made by [`Simulation::builder`].
 ///

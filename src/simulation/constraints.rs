@@ -1,5 +1,7 @@
 //! All constraints of a simulation as one list of rows.
 
+use super::admitted::Admitted;
+use super::overclosures::Overclosures;
 use crate::contact::{
     Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE, Stride,
 };
@@ -34,47 +36,6 @@ pub(crate) struct Constraints<'a, T: Real> {
     compared: Compared<T>,
 }
 
-/// Depths at the start of a run, which are added to the gaps from then on, or for a while.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Overclosures<T> {
-    /// (constraint, feature) and what is added, ascending.
-    depths: Vec<((usize, usize), T)>,
-    start: f64,
-    /// The time over which they are removed.
-    over: Option<f64>,
-}
-
-impl<T: Real> Overclosures<T> {
-    /// From the gaps of contacts at the start; of a feature with several the deepest counts.
-    pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
-        let mut depths: Vec<((usize, usize), T)> = Vec::new();
-        for &(id, gap) in gaps {
-            let feature = (id.constraint, id.feature);
-            match depths.iter_mut().find(|(other, _)| *other == feature) {
-                Some((_, depth)) => *depth = depth.max(-gap),
-                None => depths.push((feature, -gap)),
-            }
-        }
-        depths.sort_unstable_by_key(|(feature, _)| *feature);
-        Self { depths, start, over }
-    }
-
-    /// The share that is left at t, with its first two derivatives.
-    fn share(&self, t: f64) -> [f64; 3] {
-        let Some(over) = self.over else { return [1.0, 0.0, 0.0] };
-        let x = ((t - self.start) / over).max(0.0);
-        if x >= 1.0 {
-            return [0.0; 3];
-        }
-        [1.0 - x * x * (3.0 - 2.0 * x), -6.0 * x * (1.0 - x) / over, (12.0 * x - 6.0) / (over * over)]
-    }
-
-    fn of(&self, id: ContactId) -> T {
-        let found = self.depths.binary_search_by_key(&(id.constraint, id.feature), |(feature, _)| *feature);
-        found.map_or(T::zero(), |at| self.depths[at].1)
-    }
-}
-
 /// Memory for the comparison of rates with gaps, one entry a row.
 struct Compared<T> {
     before: Vec<T>,
@@ -82,37 +43,6 @@ struct Compared<T> {
     rates: Vec<GapRates<T>>,
     /// Whether the gap has moved all the time, and the rates have said nothing.
     silent: Vec<bool>,
-}
-
-/// Which laws a scheme can serve.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Admitted {
-    pub(crate) integrator: String,
-    /// Why not laws on a predicted gap, if not.
-    pub(crate) no_prediction: Option<&'static str>,
-    /// Why not rigid ones, if not.
-    pub(crate) no_rigid: Option<&'static str>,
-    /// Why not restitution above zero, if not.
-    pub(crate) no_restitution: Option<&'static str>,
-    /// Why not those that read the gap at the start of a stage, if not, and why not the persistency switch among them.
-    pub(crate) no_start: Option<&'static str>,
-    pub(crate) no_switch: Option<&'static str>,
-}
-
-impl Admitted {
-    fn check(&self, law: ContactLaw) -> Result<()> {
-        let own = match law {
-            ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
-            ContactLaw::RateCondition => self.no_start,
-            ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
-            ContactLaw::StabilizedBipenalty { .. } => self.no_prediction,
-            _ => None,
-        };
-        match self.no_rigid.or(own).filter(|_| !law.is_compliant() || law.is_predictive()) {
-            None => Ok(()),
-            Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
-        }
-    }
 }
 
 impl<T> Compared<T> {
@@ -420,7 +350,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             part.rates(t, u, v, own);
             rest = others;
         }
-        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.over.is_some()) {
+        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
             let [_, rate, acceleration] = overclosures.share(t).map(T::of);
             for (rates, &added) in out.iter_mut().zip(&self.added) {
                 rates.rate += rate * added;

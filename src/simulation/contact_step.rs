@@ -3,7 +3,7 @@
 use super::curved_rows::{CurvedRowsWork, FOLLOWED, Miss};
 use super::operator::Operator;
 use super::program::{CompiledStage, ContactTarget};
-use super::step::finite_supports;
+use super::supports::finite_supports;
 use super::{Constraints, Statistics, Workspace};
 use crate::contact::{Candidates, ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};

@@ -1,11 +1,11 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
 
-use super::Constraints;
-use super::constraints::Overclosures;
+use super::constraints::Constraints;
 use super::finite::check_state;
 use super::massless::{self, StartAdjustment};
+use super::overclosures::Overclosures;
 use super::scheme::Scheme;
-use super::step::finite_supports;
+use super::supports::{finite_supports, put_initial_supports};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
@@ -135,7 +135,7 @@ impl<T: Real> Start<'_, T> {
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
         let mut motion = Motion { t, u, v, a: vec![T::zero(); dofs] };
-        let supports = put_supports(&mut **system, t, &mut motion.u, &mut motion.v)?;
+        let supports = put_initial_supports(&mut **system, t, &mut motion.u, &mut motion.v)?;
         for (&dof, support) in prescribed.iter().zip(&supports) {
             motion.a[dof] = support[2];
         }
@@ -440,36 +440,6 @@ impl<T: Real> StartProblem<T> {
         }
         Ok(())
     }
-}
-
-/// Puts displacements and velocities of the supports at t in place, and returns their motions.
-pub(super) fn put_supports<T: Real>(
-    system: &mut dyn System<T>,
-    t: f64,
-    u: &mut [T],
-    v: &mut [T],
-) -> Result<Vec<[T; 3]>> {
-    let prescribed = system.prescribed().to_vec();
-    let mut supports = vec![[T::zero(); 3]; prescribed.len()];
-    system.prescribed_motion(t, &mut supports);
-    finite_supports(t, &prescribed, &supports)?;
-    for (&dof, support) in prescribed.iter().zip(&supports) {
-        put(&mut u[dof], support[0], "displacement", dof)?;
-        put(&mut v[dof], support[1], "velocity", dof)?;
-    }
-    Ok(supports)
-}
-
-/// Puts a support's value where the host left zero or gave the same.
-fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) -> Result<()> {
-    let given = *place;
-    let same = (given - prescribed).abs() <= T::of(1e3) * T::epsilon() * prescribed.abs();
-    if given != T::zero() && !same {
-        let (given, prescribed) = (given.value(), prescribed.value());
-        return Err(Error::PrescribedStart { what, dof, given, prescribed });
-    }
-    *place = prescribed;
-    Ok(())
 }
 
 /// Rounding of gaps that were computed by whoever made the mesh, over that of ours: coordinates may have gone through a

@@ -7,6 +7,7 @@ use super::energy::StepBooks;
 use super::finite::{Extent, check_contacts, check_motion};
 use super::operator::Operator;
 use super::program::CompiledStage;
+use super::supports::put_supports;
 use super::{Constraints, Simulation, Statistics, Workspace};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::{ContactFailure, ContactSolver};
@@ -370,16 +371,6 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 }
 
-/// Refuses prescribed motions that are NaN or infinite.
-pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &[[T; 3]]) -> Result<()> {
-    for (&dof, support) in prescribed.iter().zip(supports) {
-        if let Some(value) = support.iter().find(|x| !x.is_finite()) {
-            return Err(Error::SupportNotFinite { t, dof, value: value.value() });
-        }
-    }
-    Ok(())
-}
-
 /// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities
 /// with the supports in place, and what accelerations have of the past.
 fn predict<T: Real>(
@@ -404,25 +395,6 @@ fn predict<T: Real>(
                 (balance.u[dof], balance.v[dof]) = (T::of(0.5) * (from + to), per_step * (to - from));
             }
         }
-    }
-    Ok(())
-}
-
-/// Puts displacements and velocities of the supports at t into a motion.
-fn put_supports<T: Real>(
-    system: &mut dyn System<T>,
-    t: f64,
-    prescribed: &[usize],
-    supports: &mut [[T; 3]],
-    motion: &mut Motion<T>,
-) -> Result<()> {
-    if prescribed.is_empty() {
-        return Ok(());
-    }
-    system.prescribed_motion(t, supports);
-    finite_supports(t, prescribed, supports)?;
-    for (&dof, support) in prescribed.iter().zip(supports.iter()) {
-        (motion.u[dof], motion.v[dof]) = (support[0], support[1]);
     }
     Ok(())
 }
