@@ -1,31 +1,34 @@
 //! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
 
 use super::admitted::admitted;
-use super::contact_step::{ContactRowsWork, InterfaceWork};
-use super::control::{Judge, StepControl};
+use super::constraints::Constraints;
 use super::energy::Ledger;
+use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
-use super::newton::Newton;
-use super::newton_step::NewtonWork;
-use super::operator::{At, TangentOf};
-use super::pairing::{check_corrections, check_lagged_damping, check_massless, check_path, damping, local_error};
+use super::newton::{Newton, NewtonWork};
+use super::pairing::{check_corrections, check_lagged_damping, check_massless, check_path, local_error};
 use super::path::PathWork;
 use super::program::{Compiler, Program};
+use super::results::Statistics;
+use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, InitialOverclosure, Start, Violation};
 use super::supports::put_initial_supports;
-use super::{Constraints, Simulation, Statistics, Workspace};
+use super::tangent::{At, TangentOf};
+use super::workspace::Workspace;
+#[cfg(doc)]
+use crate::analysis;
 use crate::contact::{ContactConstraint, ContactLaw};
 use crate::contact_solver::{ActiveSet, ContactSolver};
-use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection, PersistencyCorrection};
+use crate::corrector::{Corrector, PersistencyCorrection};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
-use crate::mass::{self, Mass};
+use crate::mass;
 use crate::real::Real;
-use crate::state::{Clock, ContactState, History, Motion, State};
-use crate::system::{self, Damping, Linearity, System, check_vector};
+use crate::state::{Clock, History, Motion, State};
+use crate::system::{self, Linearity, System, check_vector};
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
@@ -82,8 +85,19 @@ impl<T: Real> std::fmt::Debug for SimulationBuilder<'_, T> {
     }
 }
 
+impl<'a, T: Real> Simulation<'a, T> {
+    /// Begins a simulation of `system` by `integrator` with step size `h`; everything else is optional.
+    pub fn builder(
+        system: impl System<T> + 'a,
+        integrator: impl TimeIntegrator + 'a,
+        h: f64,
+    ) -> SimulationBuilder<'a, T> {
+        SimulationBuilder::new(Box::new(system), Box::new(integrator), h)
+    }
+}
+
 impl<'a, T: Real> SimulationBuilder<'a, T> {
-    pub(super) fn new(system: Box<dyn System<T> + 'a>, integrator: Box<dyn TimeIntegrator + 'a>, h: f64) -> Self {
+    fn new(system: Box<dyn System<T> + 'a>, integrator: Box<dyn TimeIntegrator + 'a>, h: f64) -> Self {
         Self {
             system,
             integrator,
@@ -360,11 +374,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
         let contact = ([rows, constraints.entries()], constraints.interface().len());
-        let mut work = workspace(&mut *system, &program, &correctors, projection, contact, slots);
+        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, contact, slots);
         if follows {
             let (name, contact) = (scheme.integrator.name(), (rows, constraints.interface()));
             work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, contact)?);
-            work.rows.on_massless = vec![false; rows];
+            work.contact.rows.on_massless = vec![false; rows];
         }
         work.massless = massless;
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
@@ -467,52 +481,6 @@ fn check_resumed<T: Real>(
         return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
     }
     Ok(())
-}
-
-/// Memory of the steps: nothing is allocated after this.
-fn workspace<T: Real>(
-    system: &mut dyn System<T>,
-    program: &Program<T>,
-    correctors: &[Box<dyn Corrector<T> + '_>],
-    projection: JumpProjection<T>,
-    ([rows, entries], interface): ([usize; 2], usize),
-    slots: usize,
-) -> Workspace<T> {
-    let dofs = system.dofs();
-    let damped = match damping(system) {
-        Damping::Present if !correctors.is_empty() => dofs,
-        _ => 0,
-    };
-    let prescribed = system.prescribed().to_vec();
-    let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
-    let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
-    let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
-    let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
-    let supports = prescribed.len();
-    let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
-    Workspace {
-        increment: vec![T::zero(); dofs],
-        balance: separate_balance.then(|| Motion::zero(dofs)),
-        supports: vec![[T::zero(); 3]; prescribed.len()],
-        balance_supports: vec![[T::zero(); 3]; prescribed.len()],
-        coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
-        prescribed,
-        massless: Vec::new(),
-        block: None,
-        newton: None,
-        trial: ContactState::with_capacity(rows),
-        shown: [Vec::new(), Vec::new()],
-        closed_at_start: Vec::with_capacity(rows),
-        was_closed: Vec::with_capacity(rows),
-        interface: InterfaceWork::new(interface),
-        rows: ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports),
-        buffers: Buffers::new(rows, damped),
-        projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
-        shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
-        projected_rows: 0,
-        backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
-        correction_energy: T::zero(),
-    }
 }
 
 /// The judge of the steps of a run that controls them.

@@ -1,5 +1,6 @@
-//! Settings of Newton's method, and what it reports of its iterations.
+//! Settings of Newton's method, what it reports of its iterations, and its memory.
 
+use super::path::PathWork;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -112,4 +113,35 @@ pub struct Iteration {
     pub residual: f64,
     /// ‖Δ‖ of the iteration over that of the whole increment so far.
     pub increment: f64,
+}
+
+/// Memory of Newton's method.
+pub(super) struct NewtonWork<T> {
+    pub(super) settings: Newton,
+    /// The whole increment of the stage so far, one a dof.
+    pub(super) d: Vec<T>,
+    /// Residual without contact forces before an iteration, and the increment of it.
+    pub(super) residual: Vec<T>,
+    pub(super) increment: Vec<T>,
+    /// The miss of gaps and contact forces after the last linearization of curved gaps, relative.
+    pub(super) unsettled: f64,
+    /// For schemes that take the force of the whole path.
+    pub(super) path: Option<PathWork<T>>,
+    pub(super) report: Vec<Iteration>,
+}
+
+impl<T: Real> NewtonWork<T> {
+    /// Memory for a system of `dofs` dofs.
+    pub(super) fn new(settings: Newton, dofs: usize, path: Option<PathWork<T>>) -> Self {
+        let zero = |size: usize| vec![T::zero(); size];
+        Self {
+            settings,
+            d: zero(dofs),
+            residual: zero(dofs),
+            increment: zero(dofs),
+            unsettled: 0.0,
+            path,
+            report: Vec::with_capacity(settings.iterations),
+        }
+    }
 }

@@ -1,9 +1,34 @@
 //! Prescribed motions: read from the host, refused if they are no numbers, put into the vectors.
 
 use crate::error::{Error, Result};
+use crate::mass::Mass;
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
+
+/// The prescribed dofs and their motions in a stage.
+pub(super) struct Supports<T> {
+    /// Ascending.
+    pub(super) dofs: Vec<usize>,
+    /// Prescribed u, v, a at the time of the state and at that of the balance.
+    pub(super) state: Vec<[T; 3]>,
+    pub(super) balance: Vec<[T; 3]>,
+    /// Whether M couples prescribed dofs with free ones.
+    pub(super) coupled_mass: bool,
+}
+
+impl<T: Real> Supports<T> {
+    /// Memory for the supports of a system.
+    pub(super) fn of(system: &dyn System<T>) -> Self {
+        let dofs = system.prescribed().to_vec();
+        Self {
+            state: vec![[T::zero(); 3]; dofs.len()],
+            balance: vec![[T::zero(); 3]; dofs.len()],
+            coupled_mass: !dofs.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
+            dofs,
+        }
+    }
+}
 
 /// Refuses prescribed motions that are NaN or infinite.
 pub(super) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &[[T; 3]]) -> Result<()> {
