@@ -6,9 +6,12 @@ use super::energy::Ledger;
 use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
 use super::newton::{Newton, NewtonWork};
-use super::pairing::{check_corrections, check_lagged_damping, check_massless, check_path, local_error};
+use super::pairing::{
+    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
+};
 use super::path::PathWork;
 use super::program::{Compiler, Program};
+use super::rate_check::RateCheck;
 use super::results::Statistics;
 use super::run::Simulation;
 use super::scheme::Scheme;
@@ -19,7 +22,9 @@ use super::tangent::{At, TangentOf};
 use super::workspace::Workspace;
 #[cfg(doc)]
 use crate::analysis;
-use crate::contact::{ContactConstraint, ContactLaw};
+use crate::contact::ContactConstraint;
+#[cfg(doc)]
+use crate::contact::ContactLaw;
 use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::{Corrector, PersistencyCorrection};
 use crate::error::{Error, Result, step_size};
@@ -29,7 +34,7 @@ use crate::mass;
 use crate::real::Real;
 use crate::state::{Clock, History, Motion, State};
 use crate::system::{self, Linearity, System, check_vector};
-use crate::tableau::{ContactLevel, StartUp, Tableau};
+use crate::tableau::StartUp;
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
 pub struct SimulationBuilder<'a, T: Real> {
@@ -345,7 +350,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             if let Some(overclosures) = &history.overclosures {
                 constraints.adjust(overclosures.clone());
             }
-            constraints.check_rates(&state.motion, history.clock.h, &g)?;
+            RateCheck::new(constraints.len()).check(&mut constraints, &state.motion, history.clock.h, &g)?;
             Begun { state, history, adjustment: None }
         } else {
             let (solver, massless) = (&mut *contact_solver, &massless[..]);
@@ -407,17 +412,6 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
-}
-
-/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
-/// known yet), on dofs with mass.
-fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
-    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
-    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
-    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
-        && constraints.capacity() > 0
-        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
-        && constraints.interface().iter().any(has_mass)
 }
 
 /// Refuses times that are none.

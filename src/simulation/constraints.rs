@@ -32,23 +32,6 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// What is added to gaps that were negative at the start, and of it what each row gets; empty without.
     overclosures: Option<Overclosures<T>>,
     added: Vec<T>,
-    /// Gaps at two times, and rates, to compare them.
-    compared: Compared<T>,
-}
-
-/// Memory for the comparison of rates with gaps, one entry a row.
-struct Compared<T> {
-    before: Vec<T>,
-    now: Vec<T>,
-    rates: Vec<GapRates<T>>,
-    /// Whether the gap has moved all the time, and the rates have said nothing.
-    silent: Vec<bool>,
-}
-
-impl<T> Compared<T> {
-    fn empty() -> Self {
-        Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new() }
-    }
 }
 
 /// The place of a dof that no constraint has announced.
@@ -103,12 +86,6 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let jacobian = ContactJacobian::with_capacity(rows, entries);
-        let compared = Compared {
-            before: vec![T::zero(); rows],
-            now: vec![T::zero(); rows],
-            rates: vec![GapRates::default(); rows],
-            silent: vec![false; rows],
-        };
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
         let constraints = Self {
             parts,
@@ -124,7 +101,6 @@ impl<'a, T: Real> Constraints<'a, T> {
             version: 0,
             overclosures: None,
             added: Vec::new(),
-            compared,
         };
         Ok((constraints, jacobian))
     }
@@ -376,63 +352,6 @@ impl<'a, T: Real> Constraints<'a, T> {
             _ => self.ids.iter().position(|other| other == id),
         };
         contacts.ids.iter().enumerate().filter_map(move |(contact, id)| row(contact, id).map(|row| (contact, row)))
-    }
-
-    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates
-    /// are zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
-    pub(crate) fn check_rates(&mut self, motion: &Motion<T>, h: f64, jacobian: &ContactJacobian<T>) -> Result<()> {
-        let mut compared = std::mem::replace(&mut self.compared, Compared::empty());
-        let result = self.compare(&mut compared, motion, h, jacobian);
-        self.compared = compared;
-        result
-    }
-
-    fn compare(
-        &mut self,
-        compared: &mut Compared<T>,
-        motion: &Motion<T>,
-        h: f64,
-        jacobian: &ContactJacobian<T>,
-    ) -> Result<()> {
-        /// Times, in shares of h: no motion of some frequency is at rest in all of them.
-        const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
-        let count = self.len();
-        let Compared { before, now, rates, silent } = compared;
-        for (row, silent) in silent[..count].iter_mut().enumerate() {
-            // A spring asks for no rates.
-            *silent = !(self.laws[row].is_compliant() && self.laws[row].inertia() == 0.0);
-        }
-        let mut first = T::zero();
-        let mut found = None;
-        for (k, share) in SHARES.into_iter().enumerate() {
-            if !silent[..count].contains(&true) {
-                break;
-            }
-            let t = motion.t + share * h;
-            std::mem::swap(before, now);
-            self.finite_gaps(t, &motion.u, now)?;
-            self.finite_rates(t, &motion.u, &motion.v, rates)?;
-            for row in 0..count {
-                let rounded = self.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
-                let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
-                silent[row] &= moves && rates[row].rate == T::zero();
-            }
-            found = silent[..count].iter().position(|silent| *silent);
-        }
-        if let Some(row) = found {
-            // (The gap at the start, again.)
-            self.finite_gaps(motion.t, &motion.u, before)?;
-            first = before[row];
-        }
-        let last = found.map_or(first, |row| now[row]);
-        match found {
-            None => Ok(()),
-            Some(row) => Err(Error::SilentMotion {
-                contact: self.ids[row],
-                t: [motion.t, motion.t + h],
-                gap: [first.value(), last.value()],
-            }),
-        }
     }
 
     /// Refuses rows that act on no free dof, and gaps that are not numbers.

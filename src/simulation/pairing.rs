@@ -1,8 +1,10 @@
-//! Whether the parts of a run go together: its scheme with dofs without mass, corrections, damping, paths, and an
-//! estimate of the local error.
+//! Whether the parts of a run go together: the scheme with dofs without mass, with corrections, damping and paths, and
+//! with an estimate of the local error.
 
+use super::constraints::Constraints;
 use super::scheme::Scheme;
 use crate::analysis::{self, LocalError};
+use crate::contact::ContactLaw;
 use crate::corrector::Corrector;
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
@@ -120,4 +122,15 @@ pub(super) fn check_lagged_damping<T: Real>(
 pub(super) fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
     let still = vec![T::zero(); system.dofs()];
     system.damping_force(&still, &still, &mut still.clone())
+}
+
+/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
+/// known yet), on dofs with mass.
+pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
+    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
+    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
+        && constraints.capacity() > 0
+        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
+        && constraints.interface().iter().any(has_mass)
 }

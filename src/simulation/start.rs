@@ -5,6 +5,7 @@ use super::finite::check_state;
 use super::massless_start::{StartAdjustment, balance_start};
 use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
+use super::rate_check::RateCheck;
 use super::scheme::Scheme;
 use super::start_problem::StartProblem;
 use super::supports::put_initial_supports;
@@ -144,7 +145,7 @@ impl<T: Real> Start<'_, T> {
         let ahead = scheme.ahead() * h;
         constraints.search(&motion, ahead, g)?;
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
-        constraints.check_rates(&motion, h, g)?;
+        RateCheck::new(constraints.len()).check(constraints, &motion, h, g)?;
         projection.reset();
         let mut contacts = ContactState::with_capacity(constraints.capacity());
         contacts.reset(&constraints.ids);

@@ -61,7 +61,7 @@ impl<T: Real> Simulation<'_, T> {
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
         if history.clock.steps % NOW_AND_THEN == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
-            constraints.check_rates(start, history.clock.h, g)?;
+            work.rate_check.check(constraints, start, history.clock.h, g)?;
         }
         constraints.inspect([start, new], closed)
     }

@@ -7,6 +7,7 @@ use super::massless::MasslessBlock;
 use super::newton::NewtonWork;
 use super::pairing::damping;
 use super::program::Program;
+use super::rate_check::RateCheck;
 use super::stage_vectors::StageVectors;
 use super::supports::Supports;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
@@ -25,6 +26,7 @@ pub(super) struct Workspace<T: Real> {
     /// For explicit schemes, if there are any.
     pub(super) block: Option<MasslessBlock<T>>,
     pub(super) correction: CorrectionWork<T>,
+    pub(super) rate_check: RateCheck<T>,
     /// v and a at the time of the new state, where the scheme stores those of another time.
     pub(super) shown: [Vec<T>; 2],
     pub(super) backup: Backup<T>,
@@ -87,6 +89,7 @@ impl<T: Real> Workspace<T> {
                 shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
                 energy: T::zero(),
             },
+            rate_check: RateCheck::new(rows),
             shown: [Vec::new(), Vec::new()],
             backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         }
