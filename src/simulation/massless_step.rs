@@ -98,11 +98,11 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if block.sorted == self.constraints.version() {
             return Ok(());
         }
-        for row in 0..self.constraints.len() {
-            on_massless[row] = self.g.acts_on(row, &block.dofs);
+        for (row, on_massless) in on_massless.iter_mut().enumerate().take(self.constraints.len()) {
+            *on_massless = self.g.acts_on(row, &block.dofs);
             let law = self.constraints.law(row);
             let rebounds = matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
-            if on_massless[row] && (rebounds || law.inertia() > 0.0) {
+            if *on_massless && (rebounds || law.inertia() > 0.0) {
                 return Err(Error::Incompatible {
                     part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),
                     reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a mass",

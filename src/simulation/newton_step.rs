@@ -179,12 +179,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             _ => self.system.force(t, &motion.u, &motion.v, increment)?,
         }
-        for &dof in prescribed.iter() {
+        for &dof in prescribed {
             increment[dof] = T::zero();
         }
         let force = norm(increment);
         self.system.mass().add_product(-T::one(), &motion.a, increment);
-        for &dof in prescribed.iter() {
+        for &dof in prescribed {
             increment[dof] = T::zero();
         }
         self.refuse_nan(increment, "the residual")?;

@@ -7,6 +7,7 @@ use super::energy::StepBooks;
 use super::finite::{Extent, check_contacts, check_motion};
 use super::judge::Verdict;
 use super::massless_step::difference;
+use super::program::CompiledStage;
 use super::run::Simulation;
 use super::stage::StageSolve;
 use super::stage_vectors::predict;
@@ -223,15 +224,7 @@ impl<T: Real> Simulation<'_, T> {
                     let mut correction = Correction {
                         h: clock.h,
                         t: new.t,
-                        scheme: Scheme {
-                            response: stage.response,
-                            acceleration: stage.acceleration,
-                            balance: stage.balance_acceleration,
-                            covector,
-                            read: &stage.read,
-                            stage: stages_before,
-                            stages: program.stages.len(),
-                        },
+                        scheme: numbers(stage, covector, [stages_before, program.stages.len()]),
                         g,
                         projection,
                         operator,
@@ -263,5 +256,22 @@ fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version
     if *known != version {
         *known = version;
         projection.reset();
+    }
+}
+
+/// The numbers of a stage that a correction needs; the stage is number `place` of `stages`.
+fn numbers<'s, T: Real>(
+    stage: &'s CompiledStage<T>,
+    covector: &'s [[f64; 3]],
+    [place, stages]: [usize; 2],
+) -> Scheme<'s> {
+    Scheme {
+        response: stage.response,
+        acceleration: stage.acceleration,
+        balance: stage.balance_acceleration,
+        covector,
+        read: &stage.read,
+        stage: place,
+        stages,
     }
 }
