@@ -43,8 +43,8 @@ pub(super) fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Ad
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
         admitted.no_prediction = Some(
-            "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty predicts; \
-             choose `CentralDifference`",
+            "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty \
+             predicts; choose `CentralDifference`",
         );
     }
     for stage in &tableau.stages {
@@ -58,8 +58,8 @@ pub(super) fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Ad
             }
             ContactLevel::Velocity { .. } => {
                 admitted.no_start = Some(
-                    "it imposes contact on velocities already; choose `ContactLaw::Rigid`, or a scheme that imposes it on \
-                     the displacements of the state",
+                    "it imposes contact on velocities already; choose `ContactLaw::Rigid`, or a scheme that imposes it \
+                     on the displacements of the state",
                 );
             }
         }
@@ -72,8 +72,8 @@ pub(super) fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Ad
         match stage.contact {
             ContactLevel::Position { .. } => {
                 admitted.no_restitution = Some(
-                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a scheme \
-                     that imposes it on velocities",
+                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a \
+                     scheme that imposes it on velocities",
                 );
                 if stage.contact_row().z == 0.0 {
                     admitted.no_rigid = Some(

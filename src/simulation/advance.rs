@@ -8,7 +8,8 @@ use crate::real::Real;
 use crate::state::resolution;
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step: with [`step_control`](super::SimulationBuilder::step_control) of whatever size succeeds.
+    /// Takes one step. Under [`step_control`](super::SimulationBuilder::step_control) it is taken with smaller sizes
+    /// until one succeeds.
     ///
     /// # Errors
     ///
@@ -25,12 +26,12 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time
-    /// that rounds to the number before `t` is `t`.
+    /// whose distance from `t` is rounding counts as `t`.
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step), and [`Error::EnergyNotFinite`] if an
-    /// observer that asks for the energy would be shown one that is no number; the step before it is taken.
+    /// observer asks for the energy, and it is NaN or infinite; the step itself has been taken.
     pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
@@ -84,7 +85,7 @@ impl<T: Real> Simulation<'_, T> {
         if !t.is_finite() {
             return self.run_until(t, observer);
         }
-        // Times closer than that are one.
+        // Times closer than this count as the same.
         let sliver = (1e-9 * nominal).max(resolution(t));
         while self.history.clock.h <= self.history.clock.until(t) + sliver.min(0.5 * self.history.clock.h) {
             if self.observed_step(observer)? == Control::Stop {

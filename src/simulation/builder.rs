@@ -251,7 +251,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
+    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection};
+    /// use contact_dynamics::Simulation;
     ///
     /// // A mass on a spring at rest, 1e-3 deep in a wall.
     /// let start = |overclosure| {

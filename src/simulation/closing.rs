@@ -1,4 +1,4 @@
-//! The end of the contact of a stage: which contacts are closed, which have opened, and what is booked for them.
+//! The end of the contact of a stage: which contacts are closed, which have opened, and their forces and impulses.
 
 use super::contact_rows::{Level, Part};
 use super::contact_step::{ContactStep, ContactWork};
@@ -9,7 +9,7 @@ use crate::state::Motion;
 
 /// Where a stage stands in its step, for the impulses of its contacts.
 pub(super) struct Booking {
-    /// Impulse of a unit multiplier in a unit of time.
+    /// Impulse of a unit multiplier over a step, divided by h.
     pub(super) impulse_weight: f64,
     /// Whether the stage is the first of its step, or the last.
     pub(super) is_first: bool,
@@ -17,7 +17,8 @@ pub(super) struct Booking {
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Decides which contacts are closed, and starts the books of the stage: reported force, impulse, corrections.
+    /// Decides which contacts are closed, and sets what the stage reports of them before corrections: force and
+    /// impulse.
     pub(super) fn close(
         &mut self,
         new: &Motion<T>,
@@ -33,7 +34,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if level.target.is_none() {
             trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
         } else {
-            // The gaps of a state are those of its own surroundings.
+            // The gaps that are reported are those at the displacements of the state.
             rows.curved.hold(g, constraints);
             constraints.follow(new.t, &new.u, g)?;
             rows.curved.release(constraints);
@@ -41,7 +42,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         rows.measure(stage, clock.h, constraints, g, new, None)?;
         if self.part != Part::All && level.target.is_some() {
-            // Rows on dofs without mass hold for the gaps of the state.
+            // Rows on dofs without mass constrain the gaps of the state.
             for row in (0..constraints.len()).filter(|&row| rows.on_massless[row]) {
                 let rate = g.product(row, &new.v) + rows.rates[row].rate;
                 let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
@@ -61,7 +62,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
-            // A compliant contact leaves no jump to correct, nor does one that moves dofs without mass.
+            // Compliant contacts, and those on dofs without mass, leave no jump to correct.
             if !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),

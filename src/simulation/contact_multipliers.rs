@@ -10,11 +10,11 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
 
-/// Times a stage is solved with another linearization of its power laws, at most.
+/// The most linearizations of power laws in a stage.
 const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Decides which rows the problem begins with, and says whether any has to press.
+    /// Decides which rows the problem begins with; says whether there is any that is violated, or an equality row.
     pub(super) fn condition(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> bool {
         let Self { stage, clock, constraints, g, part, .. } = self;
         let ContactWork { trial, rows, .. } = contact;
@@ -24,7 +24,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if law.is_compliant() {
                 let gap = rows.balance_gap[row];
                 rows.y[row] = match law.is_predictive() {
-                    // The mean gap of the coming step, less that of the last one if it was pressed.
+                    // The mean gap of the coming step, less that of the last step if this was negative.
                     true => {
                         T::of(0.5) * (rows.y[row] + gap) - (-T::of(0.5) * (gap + rows.start_gap[row])).max(T::zero())
                     }
@@ -50,7 +50,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         needed
     }
 
-    /// Solves for the multipliers, laws linearized again until they are met.
+    /// Solves for the multipliers. Nonlinear laws are linearized again until they are met.
     pub(super) fn press(&mut self, operator: &mut Operator<T>, t: f64, contact: &mut ContactWork<T>) -> Result<()> {
         let augmentations = self.constraints.laws().iter().map(ContactLaw::augmentations).max().unwrap_or(0);
         let limit = LINEARIZATIONS + augmentations;
@@ -106,8 +106,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Solves on the rows that may be active, and leaves the response in `interface.response`; whoever is pushed in by
-    /// that joins. The set only grows: this ends.
+    /// Solves on the rows in the problem, and leaves the response in `interface.response`. Rows whose gaps this
+    /// response closes join the problem, and it is solved again. As rows only join, this ends.
     pub(super) fn press_linearized(
         &mut self,
         operator: &mut Operator<T>,
@@ -178,7 +178,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Opens every row that d could press.
+    /// Sets the multipliers of all rows whose y depends on d to zero.
     pub(super) fn release(&self, contact: &mut ContactWork<T>) {
         let ContactWork { rows, trial, .. } = contact;
         for row in (0..self.constraints.len()).filter(|&row| rows.weight[row] > T::zero()) {

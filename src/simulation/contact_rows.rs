@@ -15,13 +15,13 @@ use crate::state::{Clock, Motion};
 pub(super) enum Measure {
     /// What the scheme asks for: the gap, or h times its rate.
     AsScheme,
-    /// The gap less that at the start of the stage.
+    /// The change of the gap since the start of the stage.
     Increment,
     /// h times the rate of the gap, by a scheme that asks for the gap.
     Rate,
-    /// Nothing.
+    /// Nothing: the row is open in this stage.
     Nothing,
-    /// Not known before the free motion of the stage is.
+    /// Decided once the motion of the stage without contact is known.
     Undecided,
 }
 
@@ -30,14 +30,14 @@ pub(super) enum Measure {
 pub(super) enum Part {
     /// All of them.
     All,
-    /// Those that act on dofs without mass in an explicit stage, where these follow before anything else moves.
+    /// Those that act on dofs without mass in an explicit stage: solved first, with the static balance of these dofs.
     Massless,
-    /// The others, after that.
+    /// The others, solved after that.
     Massive,
 }
 
 impl Part {
-    /// Whether a row has a part in the problem.
+    /// Whether the problem is about a row.
     pub(super) fn takes(self, on_massless: &[bool], row: usize) -> bool {
         match self {
             Self::All => true,
@@ -50,10 +50,10 @@ impl Part {
 /// Buffers of the contact problem, one entry a candidate unless said otherwise.
 pub(super) struct ContactRowsWork<T> {
     pub(super) rates: Vec<GapRates<T>>,
-    /// What complementarity holds for, as a length: gaps, or h times gap rates at velocity level.
+    /// What is complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
     pub(super) y: Vec<T>,
     pub(super) tolerance: Vec<T>,
-    /// y is linear in what contact adds to d: its weight.
+    /// The weight of d in y.
     pub(super) weight: Vec<T>,
     /// The laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
     pub(super) compliance: Vec<T>,
@@ -61,19 +61,20 @@ pub(super) struct ContactRowsWork<T> {
     /// Gaps where the balance holds, for compliant laws.
     pub(super) balance_gap: Vec<T>,
     pub(super) curved: CurvedRowsWork<T>,
-    /// What each row constrains in this stage; for rows whose law reads it the gap where the stage starts, and what of
-    /// it is none.
+    /// What each row constrains in this stage; for rows whose law reads it, the gap where the stage starts, and the gap
+    /// below which it counts as closed there.
     pub(super) measure: Vec<Measure>,
     pub(super) start_gap: Vec<T>,
     pub(super) start_tolerance: Vec<T>,
-    /// Rows that may press in this stage; at velocity level those whose gap is forecast to be closed.
+    /// Rows that may be pressed in this stage; at velocity level those whose gap is forecast to be closed.
     pub(super) enabled: Vec<bool>,
+    /// Rows in the contact problem.
     pub(super) in_problem: Vec<bool>,
     /// Rows of [`Part::Massless`]; empty where dofs without mass are solved for with the others.
     pub(super) on_massless: Vec<bool>,
     /// Rows of the problem, and its data, one entry a row of the problem.
     pub(super) problem: Vec<usize>,
-    /// Delassus operators assembled so far.
+    /// Number of Delassus operators assembled so far: the newest version.
     pub(super) versions: u64,
     pub(super) offset: Vec<T>,
     pub(super) problem_tolerance: Vec<T>,
@@ -120,7 +121,7 @@ impl<T: Real> ContactRowsWork<T> {
         }
     }
 
-    /// Takes the gaps where a stage starts, and where the rows are linearized now, if a law reads them.
+    /// Evaluates the gaps where a stage starts, if a law reads them; the rows are linearized there still.
     pub(super) fn read_start(
         &mut self,
         constraints: &mut Constraints<'_, T>,
@@ -144,14 +145,16 @@ impl<T: Real> ContactRowsWork<T> {
         Ok(())
     }
 
-    /// Says what rows constrain whose law reads the start of the stage, once y holds the gaps of its free motion.
+    /// Decides what rows constrain whose law reads the gap at the start of the stage. y holds the gaps of its motion
+    /// without contact.
     pub(super) fn decide(&mut self, constraints: &Constraints<'_, T>) {
         let Self { y, measure, start_gap, start_tolerance, .. } = self;
         for (row, measure) in measure[..constraints.len()].iter_mut().enumerate() {
             if *measure != Measure::Undecided {
                 continue;
             }
-            // At rest the gap is what the force has left of the way it prevents.
+            // A contact at rest has a gap that is small beside the way that its force prevents: that from the gap at
+            // the start to the gap of the free motion.
             let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
             *measure = match (constraints.law(row), closed) {
                 (ContactLaw::RateCondition, true) => Measure::Increment,
@@ -162,8 +165,8 @@ impl<T: Real> ContactRowsWork<T> {
         }
     }
 
-    /// Makes of the gaps in y, and of their tolerances, what rows constrain whose law reads the start of the stage.
-    /// `lacking` is the part of d that the velocities do not contain yet, on the interface.
+    /// Turns the gaps in y, and their tolerances, into what is constrained by rows whose law reads the gap at the start
+    /// of the stage. `lacking` is the part of d on the interface that the velocities do not contain yet.
     pub(super) fn measure(
         &mut self,
         stage: &CompiledStage<T>,
@@ -208,8 +211,8 @@ impl<T: Real> ContactRowsWork<T> {
         (self.measure[row] == Measure::Rate).then(|| T::of(h) * stage.recovery.weights()[1])
     }
 
-    /// Evaluates y of all rows at the target, and the tolerance for what rounding makes of it plus `approach` (a
-    /// fraction of the approach in one step).
+    /// Evaluates y of all rows at the target, and their tolerances: the rounding of y, and a fraction `approach` of the
+    /// way by which the gap changes in one step.
     pub(super) fn evaluate(
         &mut self,
         level: &Level<'_, T>,
@@ -270,7 +273,7 @@ impl<T: Real> Level<'_, T> {
     }
 }
 
-/// What of a gap counts as none beside a way of this size, made in one step: a sliver of it, and its rounding.
+/// The gap below which a contact counts as closed: 1e-10 of the way made in the step, plus its rounding.
 fn sliver<T: Real>(way: T) -> T {
     T::of(1e-10) * way + rounding(way)
 }

@@ -1,4 +1,5 @@
-//! The contact of a stage: the problem is solved, with rows that follow what comes out, until they fit.
+//! The contact of a stage: its problem is solved, and solved again with rows linearized at the result, until they fit
+//! it.
 
 use super::contact_step::{ContactStep, ContactWork};
 use super::curved_rows::{FOLLOWED, Miss};
@@ -12,8 +13,8 @@ use crate::state::Motion;
 use crate::system::System;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Finds the multipliers of the stage from d on the interface, adds their response to it, and leaves their forces
-    /// there. Motions are left as predicted. Says whether curved rows fit where d ends.
+    /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces in
+    /// `interface.forces`. Motions are left as predicted. Says whether curved rows fit the resulting d.
     pub(super) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -42,7 +43,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         result
     }
 
-    /// Solves with the rows there are, and with rows that follow what comes out, until they fit.
+    /// Solves with the rows as they are, then with rows linearized at the result, until they fit it.
     pub(super) fn settle(
         &mut self,
         operator: &mut Operator<T>,
@@ -80,8 +81,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(false)
     }
 
-    /// Evaluates what every row constrains at d without contact, with the rows there are, and applies forces of
-    /// compliant laws that do not depend on d.
+    /// Evaluates y of every row at d without contact, with the rows as they are, after the forces of compliant laws
+    /// that do not depend on d are applied.
     pub(super) fn observe(
         &mut self,
         operator: &mut Operator<T>,

@@ -1,5 +1,5 @@
-//! What contact works with in a stage: where it is imposed, what the rows constrain there, and the forces that do not
-//! depend on the unknown.
+//! The contact of a stage before its problem is solved: where it is imposed, what the rows constrain there, and the
+//! forces of compliant laws that do not depend on the unknown.
 
 use super::constraints::Constraints;
 use super::contact_rows::{ContactRowsWork, Level, Part};
@@ -37,14 +37,14 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     pub(super) g: &'s mut ContactJacobian<T>,
     pub(super) solver: &'s mut dyn ContactSolver<T>,
     pub(super) statistics: &'s mut Statistics,
-    /// The part of the unknown that motions contain already, in Newton's method: d is then measured from there, and
-    /// accelerations are complete.
+    /// In Newton's method the part of the unknown that motions contain already: d is then measured from there, and the
+    /// accelerations contain all of it.
     pub(super) iterate: Option<&'s [T]>,
     pub(super) part: Part,
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Forms what contact constrains without multipliers, and decides which rows may press.
+    /// Evaluates what contact constrains, without contact forces, and decides which rows may be pressed.
     pub(super) fn aim(
         &mut self,
         system: &mut dyn System<T>,
@@ -60,7 +60,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Some(aim) = &self.stage.contact else { return Ok(()) };
         let h = T::of(clock.h);
         let t = clock.at(aim.at);
-        // Only on the interface: nothing else is read, and far from contact a body is large.
+        // Only on the interface: nothing else is read, and most dofs are not there.
         aim.row.predict_at(past, constraints.interface(), target);
         if let Some(d) = self.iterate {
             for &dof in constraints.interface() {
@@ -90,7 +90,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         constraints.finite_gaps(t_forecast, forecast, y)?;
         constraints.finite_rates(t, &new.u, &new.v, rates)?;
         for row in 0..constraints.len() {
-            // A sliver of one step's approach counts as touching, as at position level.
+            // As at position level, a gap of 1e-10 of the way made in the step counts as touching.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
             let touching = constraints.gap_rounding(row, g.magnitude(row, forecast), y[row]) + T::of(1e-10) * approach;
             let law = constraints.law(row);
@@ -99,14 +99,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Weights of d in what rigid rows constrain, and in the displacements and accelerations of the balance.
+    /// Weights of d in y of rigid rows, and in the displacements and accelerations of the balance.
     pub(super) fn weights(&self) -> [T; 3] {
         let rigid = self.stage.contact.as_ref().map_or(self.stage.recovery.weights()[0], |target| target.row.weight);
         let [balance_u, _, balance_a] = self.stage.balanced().weights();
         [rigid, balance_u, balance_a]
     }
 
-    /// Sets the weights of d in what the rows constrain by the scheme and by compliant laws.
+    /// Sets the weights of d in y: those of the scheme, and of compliant laws.
     pub(super) fn weigh(&self, rows: &mut ContactRowsWork<T>) {
         let [rigid, balance_u, balance_a] = self.weights();
         for (row, law) in self.constraints.laws().iter().enumerate() {
@@ -119,7 +119,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Brings d on the interface into the displacements, into those of the balance, and into what contact constrains.
+    /// Adds d on the interface to the displacements, to those of the balance, and to what contact constrains.
     pub(super) fn place(&mut self, new: &mut Motion<T>, vectors: &mut StageVectors<T>, contact: &mut ContactWork<T>) {
         let dofs = self.constraints.interface();
         let ContactWork { interface, rows, .. } = contact;
@@ -142,7 +142,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         (self.clock.at(self.stage.load), motion)
     }
 
-    /// Evaluates y of all rows, as the scheme and their laws measure it, where d is placed.
+    /// Evaluates y of all rows, as the scheme and their laws define it, at the d that was [placed](Self::place).
     pub(super) fn evaluate(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let ContactWork { rows, interface, .. } = contact;
@@ -151,7 +151,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         rows.measure(stage, clock.h, constraints, g, new, Some(&interface.increment))
     }
 
-    /// Gaps where the balance holds, by the rows there are.
+    /// Evaluates the gaps where the balance holds.
     pub(super) fn balance_gaps(
         &mut self,
         new: &Motion<T>,
@@ -179,7 +179,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, constraints, g, .. } = self;
         let ContactWork { interface, rows, .. } = contact;
         let known = self.iterate.is_some() || stage.balanced().reads_past(2);
-        // g̈ at ā: the predicted part, and that of d.
+        // g̈ at ā: the predicted part, and the part of d.
         let InterfaceWork { response, increment, .. } = interface;
         for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
             *a = if known { motion.a[dof] } else { T::zero() } + balance_a * d;

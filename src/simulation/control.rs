@@ -8,7 +8,7 @@ use crate::real::Real;
 use crate::state::{History, State};
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step under control.
+    /// Takes one step, with halves of the step size as long as steps are refused.
     pub(super) fn controlled_step(&mut self) -> Result<()> {
         let mut before: Option<(State<T>, History<T>)> = None;
         let mut refusals = 0;
@@ -59,7 +59,7 @@ impl<T: Real> Simulation<'_, T> {
         self.statistics.coarse_steps += u64::from(judge.coarse);
         let (may_grow, pace) = (judge.may_grow() && !judge.coarse, &mut self.history.pace);
         if pace.advance() && may_grow {
-            // Should the larger matrix not factorize the run goes on with the smaller step.
+            // If the matrix of the larger step cannot be factorized, the run goes on with the smaller one.
             let larger = 2.0 * self.history.clock.h;
             if self.change_step_size(larger).is_ok() {
                 self.history.pace.double();
@@ -67,7 +67,7 @@ impl<T: Real> Simulation<'_, T> {
         }
     }
 
-    /// Factorizes for h what is factorized for another step size.
+    /// Compiles the programs for h again; they are compiled for `other`.
     fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
         let Self { system, scheme, program, startup, state, .. } = self;
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };

@@ -1,37 +1,39 @@
-//! Curved gaps within a stage: the gap is met where contact is imposed, the force acts along the rows where the balance
-//! holds.
+//! Curved gaps within a stage: the gap condition holds where contact is imposed, the force acts along the rows where
+//! the balance holds.
 //!
-//! Contact is solved with rows that are linear on the interface. Afterwards rows are linearized again, at the
-//! displacements that came out, and the problem is solved once more, until they fit. W = F A⁻¹ Fᵀ is made of the force
-//! rows F alone, which keeps it symmetric; gaps are evaluated as they are, so that the point that is reached is that of
-//! the unsymmetric G A⁻¹ Fᵀ.
+//! Contact is solved with linear rows on the interface. Afterwards rows are linearized again, at the resulting
+//! displacements, and the problem is solved once more, until rows and displacements fit. W = F A⁻¹ Fᵀ is made of the
+//! force rows F alone, which keeps it symmetric. Gaps are evaluated without linearization, so the iteration converges
+//! to the solution of the unsymmetric G A⁻¹ Fᵀ.
 
 use super::constraints::Constraints;
 use crate::contact::ContactJacobian;
 use crate::real::Real;
 
-/// Linearizations of curved rows in a contact problem, at most, and those after which forces that go to and fro are
-/// borne with.
+/// The most linearizations of curved rows in a contact problem.
 pub(super) const FOLLOWED: usize = 40;
+
+/// The number of linearizations after which forces may alternate by [`EDGE`].
 const LONG: usize = 12;
 
-/// The relative miss of gaps and forces at which rows fit, in roundings, and that which is accepted where it falls no
-/// more.
+/// The relative miss of gaps and forces at which rows fit, in units of the rounding.
 const FIT: f64 = 64.0;
+
+/// The relative miss that is accepted where it falls no more.
 pub(super) const NEAR: f64 = 1e-8;
 
-/// Tolerances of a gap that it may miss, where nothing gets better.
+/// The miss of a gap, in its tolerances, that is accepted where it falls no more.
 pub(super) const NOISE: f64 = 8.0;
 
-/// Share of the forces that may go to and fro: a node on an edge has the normal of either side.
+/// Share of the forces that may alternate: a node on an edge has the normal of one side or the other.
 const EDGE: f64 = 1e-5;
 
-/// By how much rows miss what was solved with them.
+/// How much the gaps and forces of rows linearized at the result differ from those that were solved for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Miss {
-    /// Of gaps, relative to what d moves them.
+    /// Difference of the gaps, relative to their change by d.
     pub(super) gap: f64,
-    /// Of forces, relative to these.
+    /// Difference of the forces, relative to the forces.
     pub(super) force: f64,
 }
 
@@ -43,7 +45,7 @@ impl Miss {
         self.gap.max(self.force)
     }
 
-    /// Whether rows fit, or nothing gets better and they nearly do, after so many passes and with this miss before.
+    /// Whether rows fit, or nearly fit and miss no less than in the pass `before`, after so many `passes`.
     pub(super) fn is_settled<T: Real>(self, passes: usize, before: Self) -> bool {
         let fit = FIT * T::epsilon().value();
         let force = if passes > LONG { EDGE } else { NEAR };
@@ -60,9 +62,9 @@ pub(super) struct CurvedRowsWork<T> {
     version: u64,
     /// Whether F is not G.
     pub(super) apart: bool,
-    /// Gaps where the balance holds, with the rows of that place; one a candidate.
+    /// Gaps where the balance holds, evaluated there; one a candidate.
     pub(super) gaps: Vec<T>,
-    /// What the rows that were solved with make of the gaps; one a candidate.
+    /// The gaps that the rows which were solved with foresee; one a candidate.
     pub(super) foreseen: Vec<T>,
     /// The miss of gaps and forces after the last linearization, relative; the row that misses its gap most, and by how
     /// much.
@@ -84,7 +86,7 @@ impl<T: Real> CurvedRowsWork<T> {
         }
     }
 
-    /// Takes the rows of the gaps for those of the forces: a stage begins.
+    /// Begins a stage: F is G.
     pub(super) fn forget(&mut self) {
         self.apart = false;
     }
@@ -94,7 +96,7 @@ impl<T: Real> CurvedRowsWork<T> {
         if self.apart { &self.rows } else { g }
     }
 
-    /// Keeps the rows of the forces where those of the gaps are about to move on.
+    /// Copies G to F before G is linearized elsewhere.
     pub(super) fn hold(&mut self, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) {
         if !self.apart && self.version != constraints.version() {
             self.version = constraints.version();
@@ -102,12 +104,12 @@ impl<T: Real> CurvedRowsWork<T> {
         }
     }
 
-    /// Says that the rows of the gaps may have moved on since [`hold`](Self::hold).
+    /// Notes whether G has changed since [`hold`](Self::hold).
     pub(super) fn release(&mut self, constraints: &Constraints<'_, T>) {
         self.apart = self.version != constraints.version();
     }
 
-    /// The version of those rows.
+    /// The version of the rows along which forces act.
     pub(super) fn version(&self, constraints: &Constraints<'_, T>) -> u64 {
         if self.apart { self.version } else { constraints.version() }
     }

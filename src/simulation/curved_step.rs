@@ -1,4 +1,4 @@
-//! Curved rows in the contact of a stage: linearized again where it ends, and how much they miss there.
+//! Curved rows in the contact of a stage: linearized again at its result, and compared with what was solved.
 
 use super::contact_rows::{ContactRowsWork, Level};
 use super::contact_step::{ContactStep, ContactWork};
@@ -13,8 +13,9 @@ use crate::real::Real;
 use crate::state::Motion;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Makes gaps at d without contact those by the force rows, along which contact will answer, from where the last
-    /// iteration of Newton's method has left them; else each iteration would begin again with what G and F differ by.
+    /// Extrapolates gaps along the force rows F, not G, from where the last iteration of Newton's method has linearized
+    /// them to d without contact: contact forces move gaps back along F. Otherwise each iteration would begin with the
+    /// difference between G and F as an error.
     pub(super) fn extrapolate(&self, new: &Motion<T>, contact: &mut ContactWork<T>) {
         let ContactWork { rows, interface, .. } = contact;
         if !rows.curved.apart {
@@ -32,7 +33,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Goes back to d without contact: what rows constrain there, from where the last linearization was made.
+    /// Goes back to d without contact, and extrapolates y to it from the newest linearization.
     pub(super) fn step_back(
         &mut self,
         operator: &mut Operator<T>,
@@ -59,7 +60,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         let forces = rows.curved.forces(self.g);
         for row in 0..self.constraints.len() {
-            // (A law that predicts reads the gap that the scheme constrains.)
+            // (A predictive law reads the gap that the scheme constrains.)
             let weight = if self.constraints.law(row).is_predictive() { rigid } else { rows.weight[row] };
             rows.y[row] += weight * forces.interface_product(row, &interface.tried);
             rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
@@ -67,7 +68,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Gaps of the balance at d, by the rows at the d that was tried.
+    /// Extrapolates the gaps of the balance to d from the d that was tried last.
     fn balance_gaps_from_tried(&self, contact: &mut ContactWork<T>) {
         let [_, balance_u, _] = self.weights();
         let ContactWork { rows, interface, .. } = contact;
@@ -80,7 +81,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         rows.keep_balance_gaps();
     }
 
-    /// Keeps what the rows of this linearization make of the gaps at the d that it has led to.
+    /// Keeps the gaps that this linearization foresees at the resulting d.
     pub(super) fn foresee(&self, needed: bool, contact: &mut ContactWork<T>) {
         let [_, balance_u, _] = self.weights();
         let ContactRowsWork { y, weight, curved, .. } = &mut contact.rows;
@@ -95,7 +96,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Linearizes the rows where d ends: G where contact is imposed, F where the balance holds. Says whether any moved.
+    /// Linearizes the rows at the resulting d: G where contact is imposed, F where the balance holds. Says whether any
+    /// has changed.
     pub(super) fn follow(
         &mut self,
         new: &mut Motion<T>,
@@ -136,8 +138,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         })
     }
 
-    /// How much gaps and forces by the rows that follow d differ from those that were solved with. Leaves y of the rows
-    /// where d is placed.
+    /// How much gaps and forces of the rows linearized at d differ from those that were solved for. Leaves y of the
+    /// rows at the d that was placed.
     pub(super) fn miss(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> Result<Miss> {
         self.evaluate(new, contact)?;
         let Self { constraints, g, part, .. } = self;
@@ -163,7 +165,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             };
             let beyond = miss - tolerance;
             if beyond > T::zero() {
-                // (Where nothing moves what is missed is noise, beside a share of tolerances.)
+                // (Where d moves nothing, the tolerance is the scale that is left.)
                 largest = largest.max((beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value());
             }
             if miss > worst.1 {

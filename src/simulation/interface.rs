@@ -4,7 +4,7 @@ use crate::real::Real;
 
 /// Vectors on the interface, one entry a dof there.
 pub(super) struct InterfaceWork<T> {
-    /// The increment d: without contact when a stage begins its contact, with it at the end.
+    /// The increment d: without contact at first, with it in the end.
     pub(super) increment: Vec<T>,
     /// Forces of contact.
     pub(super) forces: Vec<T>,

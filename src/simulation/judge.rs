@@ -62,12 +62,14 @@ impl StepControl {
 
     /// Refuses steps whose local error in any displacement is estimated at more than `tolerance` (length).
     ///
-    /// The estimate compares a step with Taylor's expansion of the state it starts from, as that was shown, scaled by
-    /// what the tableau says ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact
-    /// closes or opens it is not scaled, for the motion is not smooth there, and is about the distance that the contact
-    /// moves in the step with the velocity it lost: so uncertain is the instant of impact. Corrections do not hide it,
-    /// since velocities are compared as well. Schemes that impose contact ahead of the state show an impact one step
-    /// late, and some of first order show nothing of what they err in velocity: `build` refuses both.
+    /// The estimate is the difference between a step and Taylor's expansion of the state it starts from (v and a at the
+    /// time of the state), times a factor that follows from the tableau
+    /// ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or opens the
+    /// motion is not smooth and the factor is 1; the estimate is then about the velocity that the contact lost times
+    /// the step size, as the instant of impact is uncertain by a step. Velocities are compared as well as
+    /// displacements, so corrections do not hide an impact. Schemes that impose contact ahead of the state show an
+    /// impact one step late, and with some schemes of first order the error of the velocity does not show at all:
+    /// `build` refuses both.
     ///
     /// # Errors
     ///
@@ -102,19 +104,19 @@ pub(super) enum Verdict {
     Coarse,
 }
 
-/// What a step is judged by, and memory for it.
+/// Judges steps by the settings of the control.
 pub(super) struct Judge<T> {
     pub(super) control: StepControl,
-    /// What errors are estimated from, if they are.
+    /// The factor of the error estimate, if errors are estimated.
     pub(super) local: Option<LocalError>,
-    /// u, v and a where the step starts, as they were shown; empty if errors are not estimated.
+    /// u, v and a at the time of the state that the step starts from; empty if errors are not estimated.
     start: Motion<T>,
-    /// Whether judgement is suspended: the step cannot be smaller.
+    /// Whether steps are accepted though too coarse: they cannot be smaller.
     pub(super) suspended: bool,
-    /// The estimate of the step judged last, as a length and over the tolerance.
+    /// The estimate of the step judged last, as a length and divided by the tolerance.
     pub(super) estimate: f64,
     excess: f64,
-    /// Whether the step judged last would have been refused.
+    /// Whether the step judged last was too coarse.
     pub(super) coarse: bool,
 }
 
@@ -170,7 +172,7 @@ impl<T: Real> Judge<T> {
         largest
     }
 
-    /// Whether a step twice as large promises to be fine, with some reserve.
+    /// Whether the error of a step twice as large can be expected to be half the tolerance at most.
     pub(super) fn may_grow(&self) -> bool {
         self.local.is_none_or(|local| self.excess * f64::from(1_u32 << local.power) <= 0.5)
     }

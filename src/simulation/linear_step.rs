@@ -39,7 +39,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if T::recover(recovery.weights(), &vectors.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
             return Ok(());
         }
-        // (What has been written is undone with the step.)
+        // (The step is undone, and with it what has been written.)
         self.refuse_nan(&vectors.increment, "the increment")?;
         check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
     }

@@ -1,5 +1,4 @@
-//! Dofs without mass in explicit stages: they follow from static balance with the others and with contact, before
-//! anything else of the stage is solved.
+//! Dofs without mass, whose displacements follow from static balance with the others: their part of K, factorized.
 
 use super::operator::Operator;
 use super::program::CompiledStage;
@@ -12,20 +11,20 @@ use crate::state::Motion;
 use crate::system::{Damping, Linearity, System, TangentWeights};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat};
 
-/// The dofs b without mass of a linear system, and what of K is theirs.
+/// The dofs b without mass of a linear system, and their part of K.
 pub(super) struct MasslessBlock<T: Real> {
     /// Ascending.
     pub(super) dofs: Vec<usize>,
     pub(super) columns: Columns<T>,
     /// K_bb⁻¹, with its responses to contact.
     pub(super) operator: Operator<T>,
-    /// Where it is solved: d is the displacement itself.
+    /// The stage in which it is solved: d is the displacement itself.
     pub(super) stage: CompiledStage<T>,
     /// The dofs of the interface that have a mass, and their places there.
     pub(super) massive: Vec<(usize, usize)>,
-    /// The places of its own dofs on the interface; beyond its end for those that are not there.
+    /// The places of its own dofs on the interface; its size for those that are not on it.
     pub(super) places: Vec<usize>,
-    /// Version of the rows that have been sorted into those on massless dofs and others.
+    /// Version of the rows for which those on massless dofs have been found.
     pub(super) sorted: u64,
 }
 
@@ -37,8 +36,7 @@ pub(super) struct Columns<T> {
 }
 
 impl<T: Real> Columns<T> {
-    /// From the tangent, or for an empty pattern by one evaluation of the force a column. (The system is linear: where
-    /// the tangent is taken says nothing.)
+    /// From the tangent, or for an empty pattern by one evaluation of the force a column.
     pub(super) fn of(system: &mut dyn System<T>, dofs: &[usize], at: &Motion<T>) -> Result<Self> {
         let mut free = vec![true; system.dofs()];
         for &dof in system.prescribed() {
@@ -59,7 +57,7 @@ impl<T: Real> Columns<T> {
         let mut force = vec![T::zero(); system.dofs()];
         let (mut moved, mut u) = (force.clone(), at.u.clone());
         system.force(at.t, &u, &at.v, &mut force)?;
-        // The step is as large as what it is added to, so that the difference keeps its digits.
+        // A step as large as the displacements keeps the digits of the difference.
         let size = at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs()));
         let size = if size > T::zero() { size } else { T::one() };
         for &dof in dofs {
@@ -70,7 +68,7 @@ impl<T: Real> Columns<T> {
             let largest = moved.iter().zip(&force).fold(T::zero(), |largest, (&x, &y)| largest.max((x - y).abs()));
             let differences = moved.iter().zip(&force).map(|(&x, &y)| {
                 let difference = y - x;
-                // What is rounding of the forces is no coupling.
+                // A difference within the rounding of the forces is no coupling.
                 let known = difference.abs() > rounding(x.abs().max(y.abs())).min(rounding(largest));
                 if known { difference / step } else { T::zero() }
             });
@@ -120,7 +118,7 @@ impl<T: Real> Columns<T> {
         let own = SymbolicSparseColMat::new_checked(dofs.len(), dofs.len(), pointers, None, rows);
         let own = SparseColMat::new(own, values);
         sparse::check_symmetric("stiffness", own.as_ref())?;
-        // With its whole diagonal.
+        // The pattern with all diagonal entries.
         let sum = Combination::new(dofs.len(), &[], &[own.symbolic()])?;
         let mut values = vec![T::zero(); sum.len()];
         sum.fill(&[(T::one(), own.val())], None, &mut values);
@@ -128,16 +126,15 @@ impl<T: Real> Columns<T> {
     }
 }
 
-/// A factor of K_bb that takes vectors of the whole system, and an interface of which it knows a part: other dofs do
-/// not respond.
+/// A factor of K_bb that takes vectors of the whole system, and of its whole interface: other dofs do not respond.
 #[derive(Debug)]
 pub(super) struct Embedded<T> {
     inner: Box<dyn Factorization<T>>,
     dofs: Vec<usize>,
-    /// Where on the interface its own dofs there are, ascending, and how many are there in all.
+    /// Places on the interface of its own dofs, ascending, and the number of all dofs there.
     places: Vec<usize>,
     interface: usize,
-    /// One entry a dof of its own, and one a dof of its own on the interface.
+    /// Scratch: one entry a dof of its own, and one a dof of its own on the interface.
     vector: Vec<T>,
     on_interface: Vec<T>,
 }
@@ -240,7 +237,7 @@ impl<T: Real> Embedded<T> {
 }
 
 impl<T: Real> MasslessBlock<T> {
-    /// Refuses systems for which it cannot be made.
+    /// Factorizes K_bb. Refuses systems that are nonlinear or have damping on these dofs.
     pub(super) fn new(
         system: &mut dyn System<T>,
         integrator: &str,
@@ -253,14 +250,14 @@ impl<T: Real> MasslessBlock<T> {
         };
         if system.linearity() == Linearity::Nonlinear {
             return refuse(
-                "explicit stages find the displacements of dofs without mass by one factor of their stiffness, and the system \
-                 is nonlinear; choose an implicit scheme, or give the dofs a mass",
+                "explicit stages find the displacements of dofs without mass by one factor of their stiffness, and the \
+                 system is nonlinear; choose an implicit scheme, or give the dofs a mass",
             );
         }
         if is_damped(system, dofs) {
             return refuse(
-                "explicit stages balance dofs without mass by stiffness alone, and damping acts on them; choose damping \
-                 proportional to mass or an implicit scheme, or give the dofs a mass",
+                "explicit stages balance dofs without mass by stiffness alone, and damping acts on them; choose \
+                 damping proportional to mass or an implicit scheme, or give the dofs a mass",
             );
         }
         let columns = Columns::of(system, dofs, at)?;
@@ -283,7 +280,7 @@ pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> 
     let mut v = vec![T::zero(); system.dofs()];
     let (u, mut force) = (v.clone(), v.clone());
     for &dof in dofs {
-        // (Without a pattern, so that nothing cancels.)
+        // (Scattered values, so that nothing cancels.)
         v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
     }
     system.damping_force(&u, &v, &mut force) == Damping::Present && force.iter().any(|&force| force != T::zero())

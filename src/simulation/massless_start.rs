@@ -11,23 +11,23 @@ use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
 
-/// What a simulation has moved before its first step.
+/// How dofs without mass were moved when a simulation was built, before its first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartAdjustment<T> {
-    /// Change of the potential energy, that of the load (its force times the way) included: what the jump would have
-    /// taken from the run, not positive. None if the system has no potential.
+    /// Change of the potential energy, that of the load (minus its force times the displacement) included; not
+    /// positive. The run would have lost this energy in a jump. None if the system has no potential.
     pub energy: Option<T>,
-    /// The largest change of a displacement (length), and of which dof.
+    /// The largest change of a displacement (length).
     pub largest: T,
     /// The dof that has moved most.
     pub dof: usize,
 }
 
-/// Iterations of the balance at the start, at most: two for linear systems.
+/// The most iterations of the balance at the start. Linear systems take two.
 const ITERATIONS: usize = 30;
 
-/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method:
-/// f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that
+/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method: f_b + Gᵀ
+/// λ = 0, 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that
 /// damping acts on: their displacements are initial values of their own.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
@@ -52,8 +52,8 @@ pub(super) fn balance_start<T: Real>(
         let columns = Columns::of(system, dofs, motion)?;
         let factor = match Embedded::factorized(&columns, dofs, &interface) {
             Ok(factor) => factor,
-            // Without a definite stiffness of their own there is no balance to speak of: the step will say what it can
-            // do.
+            // Without a symmetric positive definite stiffness of their own no balance is sought. Whether the scheme can
+            // do with that, the step decides.
             Err(Error::Asymmetric { .. } | Error::Singular { .. }) => {
                 motion.u = given;
                 constraints.search(motion, ahead, g)?;
@@ -81,7 +81,8 @@ pub(super) fn balance_start<T: Real>(
             return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
         }
         let scale = largest(&motion.u).max(largest(&given));
-        // (Gaps are met within their own rounding, which coordinates may make larger than that of displacements.)
+        // (Gaps are met within their own rounding, which may be larger than that of displacements: they are computed
+        // from coordinates.)
         let settled = size <= T::of(1e3) * T::epsilon() * scale + T::of(4.0) * sliver;
         if iteration == 0 {
             if settled {
@@ -108,7 +109,7 @@ pub(super) fn balance_start<T: Real>(
 }
 
 /// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns
-/// the largest way by which gaps may be missed, as a displacement.
+/// the largest tolerance of a gap, as a displacement.
 fn press_start<T: Real>(
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -124,7 +125,7 @@ fn press_start<T: Real>(
     let tolerance: Vec<T> =
         (0..rows).map(|row| constraints.gap_rounding(row, g.magnitude(row, &motion.u), gaps[row])).collect();
     let candidates: Vec<usize> = (0..rows).filter(|&row| g.acts_on(row, dofs)).collect();
-    // What the rows ask for at d on the interface, laws linearized where the motion is.
+    // Compliance and shift of the laws, linearized at the present gaps.
     let laws: Vec<[T; 2]> = (0..rows)
         .map(|row| {
             let law = constraints.law(row);
@@ -165,6 +166,6 @@ fn press_start<T: Real>(
         }
     }
     T::axpy(T::one(), &response, on_interface);
-    // (A row of unit weights moves a dof no further than its gap.)
+    // (Rows are taken to have unit weights: a gap is then as long as the displacement that closes it.)
     Ok(problem.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
 }

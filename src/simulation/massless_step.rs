@@ -11,15 +11,15 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
 
-/// Times rows are linearized again where the dofs without mass have gone, at most.
+/// The most linearizations of rows at the displacements of the dofs without mass.
 const LINEARIZATIONS: usize = 20;
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact.
-    /// The residual in `vectors.increment` becomes that of the others in this configuration, with the forces of contact on
-    /// the dofs without mass.
+    /// The residual in `vectors.increment` becomes that of the other dofs in this configuration. Contacts on dofs
+    /// without mass may act on other dofs too: these forces are added to it.
     ///
-    /// Rows follow these dofs: an iteration of Newton's method on the gaps alone, for the balance is linear.
+    /// The balance is linear, gaps may be curved: rows are linearized again until the displacements settle.
     pub(super) fn settle(
         &mut self,
         block: &mut MasslessBlock<T>,
@@ -77,7 +77,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 self.operator.follow(self.constraints.version());
                 return self.sort_rows(block, &mut contact.rows.on_massless);
             }
-            // What is left without contact is what contact has balanced.
+            // The residual without contact is the negative of the contact forces that have balanced it.
             for (&dof, &place) in block.dofs.iter().zip(&block.places) {
                 increment[dof] = if place < interface.forces.len() { -interface.forces[place] } else { T::zero() };
             }
@@ -93,7 +93,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Says of every row whether it acts on dofs without mass, and refuses laws that ask for more than a gap there.
+    /// Finds the rows that act on dofs without mass, and refuses laws there that depend on more than the gap.
     fn sort_rows(&self, block: &mut MasslessBlock<T>, on_massless: &mut [bool]) -> Result<()> {
         if block.sorted == self.constraints.version() {
             return Ok(());
@@ -105,7 +105,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
             if *on_massless && (rebounds || law.inertia() > 0.0) {
                 return Err(Error::Incompatible {
                     part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),
-                    reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a mass",
+                    reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a \
+                             mass",
                 });
             }
         }
@@ -114,10 +115,11 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 }
 
-/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. The rows of a
-/// scheme find v from a, which such dofs do not have; it stays zero.
+/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. (The rows of a
+/// scheme find v from a, which is zero on such dofs.)
 ///
-/// `slopes` are those of the interval before the `start` of the step, the second of the `intervals`.
+/// `intervals` are the time from the `start` of the step until now, and that before it; `slopes` are the differences of
+/// the displacements over the latter, divided by it.
 pub(super) fn difference<T: Real>(
     massless: &[usize],
     slopes: &[T],

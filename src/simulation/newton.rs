@@ -61,9 +61,9 @@ impl Newton {
         Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
     }
 
-    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller or lead to a state
-    /// that the host does not admit. It costs nothing where full increments do. Slender structures converge through
-    /// larger residuals and are better left without.
+    /// Halves increments, down to an eighth, while they do not make the residual smaller, or lead to a state that the
+    /// host does not admit. It costs nothing where full increments are taken. Slender structures pass through larger
+    /// residuals before they converge, and are better solved without it.
     #[must_use]
     pub const fn line_search(self) -> Self {
         Self { line_search: true, ..self }
@@ -90,7 +90,7 @@ impl Newton {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for zero and for more than a million: what each of them did is kept.
+    /// [`Error::Parameter`] for zero and for more than a million, as memory for the report of each is reserved.
     pub fn iterations(self, iterations: usize) -> Result<Self> {
         let (name, value) = ("Newton's number of iterations", iterations as f64);
         match (1..=1_000_000).contains(&iterations) {
@@ -120,10 +120,11 @@ pub(super) struct NewtonWork<T> {
     pub(super) settings: Newton,
     /// The whole increment of the stage so far, one a dof.
     pub(super) d: Vec<T>,
-    /// Residual without contact forces before an iteration, and the increment of it.
+    /// Residual without contact forces before an iteration, and the increment of the iteration.
     pub(super) residual: Vec<T>,
     pub(super) increment: Vec<T>,
-    /// The miss of gaps and contact forces after the last linearization of curved gaps, relative.
+    /// Relative difference of gaps and contact forces from those that were solved for, after the last linearization of
+    /// curved gaps.
     pub(super) unsettled: f64,
     /// For schemes that take the force of the whole path.
     pub(super) path: Option<PathWork<T>>,

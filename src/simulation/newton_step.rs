@@ -14,7 +14,7 @@ use crate::real::Real;
 use crate::state::Motion;
 use crate::system::Path;
 
-/// The smallest share of an increment that a line search tries.
+/// The smallest share of an increment that a line search takes.
 const SHORTEST: f64 = 0.125;
 
 /// Norms at a trial state.
@@ -65,7 +65,6 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let settled = self.press(newton, new, past, vectors, contact)?;
             self.operator.finish(&mut vectors.increment, &contact.interface.increment, &contact.interface.forces)?;
             self.refuse_nan(&vectors.increment, "the increment")?;
-            // The increment, kept while `vectors.increment` becomes the residual it leaves.
             let before = Norms { residual: self.loaded_norm(&newton.residual, &contact.interface.forces), ..norms };
             let size = norm(&vectors.increment);
             let forces = &contact.interface.forces;
@@ -73,13 +72,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 if settled {
                     return Ok(());
                 }
-                // The stage is linear but for its gaps, which have been linearized that often.
+                // The stage is linear in all but its gaps, and rows did not fit after that many linearizations.
                 newton.report.clear();
                 newton.report.resize(FOLLOWED, Iteration { residual: newton.unsettled, increment: 0.0 });
                 break;
             };
             norms = found;
-            // Rows fit the whole increment.
+            // Rows were made to fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
             if self.has_converged(newton, share * size, [first, before.residual], norms, new) && settled {
                 return Ok(());
@@ -97,8 +96,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Whether an iteration of this size, which has brought the residual from `before` to what it is now (and that of
-    /// the prediction was `first`), is the last one; it is reported.
+    /// Reports an iteration whose increment has this `size`, and says whether it is the last one. `first` and `before`
+    /// are the norms of the residual of the prediction and before the iteration.
     fn has_converged(
         &self,
         newton: &mut NewtonWork<T>,
@@ -112,8 +111,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
-        // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more,
-        // or has fallen far; or no force can tell the displacements before from those after.
+        // Where forces cancel the residual has nothing to be compared with. Then increments must be small, and the
+        // residual must fall no more or have fallen far; or the increment must be below the resolution of the
+        // displacements.
         let [in_u, in_v, _] = self.stage.balanced().weights();
         let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));
@@ -121,7 +121,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first)
     }
 
-    /// Completes the prediction by accelerations.
+    /// Begins with d = 0: completes the prediction by its accelerations.
     fn begin(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -246,7 +246,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Adds contact to the increment on the interface, with rows that fit where it ends. Says whether they do.
+    /// Adds the response to contact to the increment on the interface. Says whether curved rows fit the result.
     fn press(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -264,8 +264,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         Ok(settled)
     }
 
-    /// Moves by the increment in `vectors.increment`, or by a share of it, which is returned; the residual there takes its
-    /// place. A stage that is linear in its unknown is solved by this, and nothing is returned.
+    /// Moves by the increment in `vectors.increment`, or by a share of it, which is returned; the residual there takes
+    /// its place. A stage that is linear in its unknown is solved by this, and nothing is returned.
     fn advance(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -292,7 +292,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                         return Ok(Some((share, found)));
                     }
                 }
-                // The host may admit a state that is nearer.
+                // The host may admit a state nearer to the last one.
                 Err(error) if may_shorten && error.is_recoverable() => {}
                 Err(error) => return Err(error),
             }

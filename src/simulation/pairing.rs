@@ -25,8 +25,8 @@ pub(super) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result
         }
         None if analysis::massless_follow(&scheme.tableau) => return Ok(true),
         None => {
-            "its balance does not determine the displacement of a dof without mass at the end of the step; choose central \
-             differences or an implicit scheme, or give the dof a mass"
+            "its balance does not determine the displacement of a dof without mass at the end of the step; choose \
+             central differences or an implicit scheme, or give the dof a mass"
         }
     };
     Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })

@@ -51,7 +51,7 @@ pub struct Simulation<'a, T: Real> {
     pub(super) scheme: Scheme<'a>,
     pub(super) program: Program<T>,
     pub(super) limit: StepLimit,
-    /// The one-step scheme of the first steps, dropped once the past is known.
+    /// The one-step scheme of the first steps; none once the past is known.
     pub(super) startup: Option<Program<T>>,
     pub(super) state: State<T>,
     pub(super) history: History<T>,
@@ -104,9 +104,9 @@ impl<T: Real> Simulation<'_, T> {
         &self.statistics
     }
 
-    /// What was moved when the simulation was built: dofs without mass that were not in static balance with the others,
-    /// the load and contact. Left there they would jump in the first step, and take their energy with them unseen. None
-    /// if nothing was.
+    /// How dofs without mass were moved when the simulation was built, because they were not in static balance with the
+    /// others, the load and contact. (They would have jumped in the first step, and the energy balance would not have
+    /// shown what this costs.) None if none was moved.
     pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
         self.adjustment
     }
@@ -163,11 +163,11 @@ impl<T: Real> Simulation<'_, T> {
         if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
     }
 
-    /// Calls what calls the host and changes the run. Should the host panic, state and history are put back before the
-    /// panic goes on; if somebody catches it, later calls are refused.
+    /// Runs a call that changes the run and calls the host. If the host panics, state and history are put back before
+    /// the panic goes on, and later calls are refused.
     pub(super) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
         self.check_sound()?;
-        // Nothing half done is seen: what is undone below is all that was swapped, and the rest is refused.
+        // Unwind safe: state and history are put back below, and nothing else can be used after a panic.
         match catch_unwind(AssertUnwindSafe(|| call(self))) {
             Ok(result) => result,
             Err(panic) => {
@@ -180,7 +180,7 @@ impl<T: Real> Simulation<'_, T> {
         }
     }
 
-    /// Puts state and history back to where an attempt began.
+    /// Puts state and history back to what they were when the attempt of a step began.
     pub(super) fn put_back(&mut self) {
         let Self { state, history, work, .. } = self;
         work.backup.undo(&mut history.slots);

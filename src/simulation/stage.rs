@@ -29,8 +29,8 @@ pub(super) struct StageSolve<'s, 'a, T: Real> {
 }
 
 impl<T: Real> StageSolve<'_, '_, T> {
-    /// Adds contact to the increment on the interface; `iterate` is what motions contain of the unknown already. Says
-    /// whether curved rows fit where it ends.
+    /// Adds the response to contact to the increment on the interface; `iterate` is the part of the unknown that
+    /// motions contain already. Says whether curved rows fit the result.
     pub(super) fn contact(
         &mut self,
         part: Part,
@@ -46,7 +46,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         contact.solve(&mut **system, operator, new, past, vectors, work)
     }
 
-    /// Refuses contact whose curved rows do not fit where it ends.
+    /// Refuses contact whose curved rows do not fit its result.
     pub(super) fn refuse_unsettled(&self, settled: bool, t: f64, rows: &CurvedRowsWork<T>) -> Result<()> {
         if settled {
             return Ok(());

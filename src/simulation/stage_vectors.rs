@@ -17,7 +17,7 @@ pub(super) struct StageVectors<T> {
 }
 
 /// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities
-/// with the supports in place, and what accelerations have of the past.
+/// with the supports in place, and the part of the accelerations that comes from the past.
 pub(super) fn predict<T: Real>(
     stage: &CompiledStage<T>,
     clock: Clock,
@@ -34,7 +34,8 @@ pub(super) fn predict<T: Real>(
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
         put_supports(system, clock.at(stage.load), prescribed, balance_supports, balance)?;
         if let (true, Some(start)) = (stage.along_path, past.first()) {
-            // The mean of the ends is that of the supports too: work is force times the way between them.
+            // Supports too are at the mean of both ends, and their velocity is the difference of the ends per time: the
+            // work of a step is force times this difference.
             let per_step = T::of((clock.h * (stage.end - stage.start)).recip());
             for &dof in prescribed.iter() {
                 let (from, to) = (start.u[dof], new.u[dof]);
@@ -60,8 +61,8 @@ pub(super) fn residual<T: Real>(
         _ => (&stage.recovery, supports, new),
     };
     system.force(t_balance, &motion.u, &motion.v, increment)?;
-    // ā at d = 0: the past's part on free dofs (none where the balance holds at the recovered state), and the motion of
-    // the supports.
+    // ā at d = 0: on free dofs the part that comes from the past (none where the balance holds at the recovered state),
+    // on prescribed dofs the acceleration of the supports.
     if rows.reads_past(2) || *coupled_mass {
         if !rows.reads_past(2) {
             motion.a.fill(T::zero());

@@ -47,28 +47,28 @@ impl<T: Real> Simulation<'_, T> {
     fn undo(&mut self) {
         self.put_back();
         let Self { constraints, g, state, history, scheme, .. } = self;
-        // Rows may have followed the trial: back to the state. Should this search fail, the next step fails with its
-        // error.
+        // Rows may have followed the failed step: back to the state. An error of this search is not lost, for the next
+        // step begins with the same search.
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
 
-    /// Lets the constraints look at the motion in slot 0 of the history. Where a contact has closed, and now and then,
-    /// rates of gaps are compared with their motion.
+    /// Lets the constraints inspect the motion in slot 0 of the history. When a contact has closed, and every so many
+    /// steps, gap rates are compared with the gaps.
     fn inspect(&mut self) -> Result<()> {
-        const NOW_AND_THEN: u64 = 64;
+        const EVERY: u64 = 64;
         let Self { constraints, g, history, work, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
-        // (States of the past that were edited have their displacements.)
+        // (Where correctors have edited the start of the step, it is the edited one.)
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
-        if history.clock.steps % NOW_AND_THEN == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
+        if history.clock.steps % EVERY == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
             work.rate_check.check(constraints, start, history.clock.h, g)?;
         }
         constraints.inspect([start, new], closed)
     }
 
-    /// Makes the motion in slot 0 of the history the state. An error or another verdict leaves state and history to be
-    /// undone.
+    /// Makes the motion in slot 0 of the history the state. After an error, or the verdict that the step is too coarse,
+    /// the caller undoes the step.
     fn accept(&mut self) -> Result<Verdict> {
         let Self { system, constraints, g, state, history, work, statistics, ledger, scheme, judge, .. } = self;
         let stages = work.backup.rotations;
@@ -78,8 +78,8 @@ impl<T: Real> Simulation<'_, T> {
         let finite =
             scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
-        // Recovery has looked at what it wrote. Left are dofs whose velocity is differenced, and what corrections have
-        // edited.
+        // Recovery has checked what it wrote. Still to be checked are dofs whose velocity is differenced, and what
+        // corrections have edited.
         let touched = work.correction.buffers.has_touched() && work.correction.projection.is_some();
         let spreads = work.correction.buffers.spreads() || matches!(system.mass(), Mass::Consistent(_));
         let extent = match work.newton.is_some() || touched && spreads {
@@ -116,7 +116,7 @@ impl<T: Real> Simulation<'_, T> {
         if let Some(ledger) = ledger {
             ledger.end();
         }
-        // The stages between drop out of the past.
+        // The states of the stages before the last drop out of the past.
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
@@ -151,7 +151,7 @@ impl<T: Real> Simulation<'_, T> {
     fn stages(&mut self) -> Result<()> {
         let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, .. } = self;
         let (program, start_covector) = match &mut self.startup {
-            // The covector of one state more than is known now.
+            // After the step one state more is known than now.
             Some(startup) => (startup, Some(&self.scheme.covectors[history.known])),
             None => (&mut self.program, None),
         };

@@ -1,4 +1,4 @@
-//! Prescribed motions: read from the host, refused if they are no numbers, put into the vectors.
+//! Prescribed motions: read from the host, refused if NaN or infinite, put into the vectors.
 
 use crate::error::{Error, Result};
 use crate::mass::Mass;
@@ -78,7 +78,7 @@ pub(super) fn put_initial_supports<T: Real>(
     Ok(supports)
 }
 
-/// Puts a support's value where the host left zero or gave the same.
+/// Sets an initial value to that of its support. Refuses one that the host gave otherwise, zero excepted.
 fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) -> Result<()> {
     let given = *place;
     let same = (given - prescribed).abs() <= T::of(1e3) * T::epsilon() * prescribed.abs();

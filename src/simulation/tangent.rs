@@ -35,7 +35,7 @@ pub(super) enum Tangent {
     Present,
 }
 
-/// Refuses a pattern or a mass that is not that of the build: entries would go to places of others.
+/// Refuses a pattern or a mass of another size than when the run was built: their entries would be misplaced.
 pub(super) fn check_sources<T: Real>(
     system: &dyn System<T>,
     tangent: Tangent,
@@ -53,7 +53,7 @@ pub(super) fn check_sources<T: Real>(
     combination.check(diagonal, what.into_iter().flatten())
 }
 
-/// The pattern of an effective matrix: no larger than what has a part in it.
+/// The pattern of an effective matrix, of those of K, C and M that enter it, and no larger.
 pub(super) fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Tangent, Combination)> {
     let dofs = system.dofs();
     let damped = weights[1] != 0.0 && {
@@ -73,7 +73,7 @@ pub(super) fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) ->
     let own = (tangent == Tangent::Present).then_some(system.pattern());
     let mut fixed = system.prescribed().to_vec();
     if weights[0] == 0.0 {
-        // Dofs without mass have followed before: here they do not move.
+        // Dofs without mass have been moved before: here they do not respond.
         fixed.append(&mut mass::massless(system.mass(), system.prescribed()));
         fixed.sort_unstable();
     }

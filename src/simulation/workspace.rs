@@ -23,7 +23,7 @@ pub(super) struct Workspace<T: Real> {
     pub(super) newton: Option<NewtonWork<T>>,
     /// Free dofs without mass.
     pub(super) massless: Vec<usize>,
-    /// For explicit schemes, if there are any.
+    /// For explicit schemes, if there are dofs without mass.
     pub(super) block: Option<MasslessBlock<T>>,
     pub(super) correction: CorrectionWork<T>,
     pub(super) rate_check: RateCheck<T>,
@@ -36,7 +36,7 @@ pub(super) struct Workspace<T: Real> {
 pub(super) struct CorrectionWork<T: Real> {
     pub(super) buffers: Buffers<T>,
     pub(super) projection: Option<JumpProjection<T>>,
-    /// Version of the rows that the projection knows.
+    /// Version of the rows for which the projection was made.
     pub(super) projected_rows: u64,
     /// For correctors that act on the prediction, one entry a dof.
     pub(super) shifted: Vec<T>,
@@ -45,8 +45,8 @@ pub(super) struct CorrectionWork<T: Real> {
 }
 
 impl<T: Real> Workspace<T> {
-    /// Memory for steps of a program, with `rows` contacts of `entries` weights on so many dofs of the interface, and
-    /// so many `slots` in the history.
+    /// Memory for the steps of a program, with `rows` contacts of `entries` weights in all, an `interface` of so many
+    /// dofs, and a history of so many `slots`.
     pub(super) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
