@@ -1,7 +1,7 @@
 //! Observers see every accepted step; they may stop the run, never change it.
 
 use crate::real::Real;
-use crate::simulation::{Energy, Statistics};
+use crate::simulation::results::{Energy, Statistics};
 use crate::state::State;
 
 /// Whether a run goes on.

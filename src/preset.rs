@@ -19,8 +19,8 @@ use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 /// // A bar of 50 elements falls on a floor with its first node.
 /// let (n, ea, rho_a, size, h) = (50, 900.0, 1.0, 0.2, 2e-3);
 /// let bar = |diagonal: f64, off: f64| {
-///     let entries = (0..n).flat_map(|e| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)]);
-///     let entries: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+///     let element = |e| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)];
+///     let entries: Vec<_> = (0..n).flat_map(element).map(|(i, j, x)| Triplet::new(i, j, x)).collect();
 ///     SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &entries)
 /// };
 /// let (k, m) = (bar(ea / size, -ea / size)?, bar(rho_a * size / 3.0, rho_a * size / 6.0)?);

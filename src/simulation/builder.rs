@@ -1,30 +1,40 @@
 //! Builds a simulation: checks every input, compiles the tableau, finds the initial accelerations.
 
-use super::contact_step::{ContactRowsWork, InterfaceWork};
-use super::control::{Judge, StepControl};
+use super::admitted::admitted;
+use super::constraints::Constraints;
 use super::energy::Ledger;
+use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
-use super::newton::Newton;
-use super::newton_step::NewtonWork;
-use super::operator::{At, TangentOf};
+use super::newton::{Newton, NewtonWork};
+use super::pairing::{
+    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
+};
 use super::path::PathWork;
 use super::program::{Compiler, Program};
+use super::rate_check::RateCheck;
+use super::results::Statistics;
+use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, InitialOverclosure, Start, Violation};
-use super::{Admitted, Constraints, Simulation, Statistics, Workspace};
-use crate::analysis::{self, LocalError};
-use crate::contact::{ContactConstraint, ContactLaw};
+use super::supports::put_initial_supports;
+use super::tangent::{At, TangentOf};
+use super::workspace::Workspace;
+#[cfg(doc)]
+use crate::analysis;
+use crate::contact::ContactConstraint;
+#[cfg(doc)]
+use crate::contact::ContactLaw;
 use crate::contact_solver::{ActiveSet, ContactSolver};
-use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection, PersistencyCorrection};
+use crate::corrector::{Corrector, PersistencyCorrection};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
-use crate::mass::{self, Mass};
+use crate::mass;
 use crate::real::Real;
-use crate::state::{Clock, ContactState, History, Motion, State};
-use crate::system::{self, Damping, Linearity, Path, PathForce, System, check_vector};
-use crate::tableau::{ContactLevel, StartUp, Tableau};
+use crate::state::{Clock, History, Motion, State};
+use crate::system::{self, Linearity, System, check_vector};
+use crate::tableau::StartUp;
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
 pub struct SimulationBuilder<'a, T: Real> {
@@ -80,8 +90,19 @@ impl<T: Real> std::fmt::Debug for SimulationBuilder<'_, T> {
     }
 }
 
+impl<'a, T: Real> Simulation<'a, T> {
+    /// Begins a simulation of `system` by `integrator` with step size `h`; everything else is optional.
+    pub fn builder(
+        system: impl System<T> + 'a,
+        integrator: impl TimeIntegrator + 'a,
+        h: f64,
+    ) -> SimulationBuilder<'a, T> {
+        SimulationBuilder::new(Box::new(system), Box::new(integrator), h)
+    }
+}
+
 impl<'a, T: Real> SimulationBuilder<'a, T> {
-    pub(super) fn new(system: Box<dyn System<T> + 'a>, integrator: Box<dyn TimeIntegrator + 'a>, h: f64) -> Self {
+    fn new(system: Box<dyn System<T> + 'a>, integrator: Box<dyn TimeIntegrator + 'a>, h: f64) -> Self {
         Self {
             system,
             integrator,
@@ -230,7 +251,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
+    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection};
+    /// use contact_dynamics::Simulation;
     ///
     /// // A mass on a spring at rest, 1e-3 deep in a wall.
     /// let start = |overclosure| {
@@ -311,7 +333,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_resumed(state, history, &scheme, (own, h), [dofs, massless.len()])?;
             (state.motion.t, &state.motion.u[..], &state.motion.v[..])
         } else {
-            start::put_supports(&mut *system, t, &mut u, &mut v)?;
+            put_initial_supports(&mut *system, t, &mut u, &mut v)?;
             (t, &u[..], &v[..])
         };
         let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), admitted)?;
@@ -329,7 +351,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             if let Some(overclosures) = &history.overclosures {
                 constraints.adjust(overclosures.clone());
             }
-            constraints.check_rates(&state.motion, history.clock.h, &g)?;
+            RateCheck::new(constraints.len()).check(&mut constraints, &state.motion, history.clock.h, &g)?;
             Begun { state, history, adjustment: None }
         } else {
             let (solver, massless) = (&mut *contact_solver, &massless[..]);
@@ -358,11 +380,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
         let contact = ([rows, constraints.entries()], constraints.interface().len());
-        let mut work = workspace(&mut *system, &program, &correctors, projection, contact, slots);
+        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, contact, slots);
         if follows {
             let (name, contact) = (scheme.integrator.name(), (rows, constraints.interface()));
             work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, contact)?);
-            work.rows.on_massless = vec![false; rows];
+            work.contact.rows.on_massless = vec![false; rows];
         }
         work.massless = massless;
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
@@ -391,17 +413,6 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
         })
     }
-}
-
-/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
-/// known yet), on dofs with mass.
-fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
-    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
-    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
-    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
-        && constraints.capacity() > 0
-        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
-        && constraints.interface().iter().any(has_mass)
 }
 
 /// Refuses times that are none.
@@ -467,224 +478,10 @@ fn check_resumed<T: Real>(
     Ok(())
 }
 
-/// Memory of the steps: nothing is allocated after this.
-fn workspace<T: Real>(
-    system: &mut dyn System<T>,
-    program: &Program<T>,
-    correctors: &[Box<dyn Corrector<T> + '_>],
-    projection: JumpProjection<T>,
-    ([rows, entries], interface): ([usize; 2], usize),
-    slots: usize,
-) -> Workspace<T> {
-    let dofs = system.dofs();
-    let damped = match damping(system) {
-        Damping::Present if !correctors.is_empty() => dofs,
-        _ => 0,
-    };
-    let prescribed = system.prescribed().to_vec();
-    let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
-    let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
-    let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
-    let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
-    let supports = prescribed.len();
-    let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
-    Workspace {
-        increment: vec![T::zero(); dofs],
-        balance: separate_balance.then(|| Motion::zero(dofs)),
-        supports: vec![[T::zero(); 3]; prescribed.len()],
-        balance_supports: vec![[T::zero(); 3]; prescribed.len()],
-        coupled_mass: !prescribed.is_empty() && matches!(system.mass(), Mass::Consistent(_)),
-        prescribed,
-        massless: Vec::new(),
-        block: None,
-        newton: None,
-        trial: ContactState::with_capacity(rows),
-        shown: [Vec::new(), Vec::new()],
-        closed_at_start: Vec::with_capacity(rows),
-        was_closed: Vec::with_capacity(rows),
-        interface: InterfaceWork::new(interface),
-        rows: ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports),
-        buffers: Buffers::new(rows, damped),
-        projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
-        shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
-        projected_rows: 0,
-        backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
-        correction_energy: T::zero(),
-    }
-}
-
-/// The contact laws that a scheme can serve.
-fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
-    let mut admitted = Admitted { integrator: integrator.name(), ..Admitted::default() };
-    let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
-    if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
-        admitted.no_prediction = Some(
-            "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty predicts; \
-             choose `CentralDifference`",
-        );
-    }
-    for stage in &tableau.stages {
-        match stage.contact {
-            ContactLevel::POSITION => {}
-            ContactLevel::Position { .. } => {
-                admitted.no_start = Some(
-                    "it imposes contact ahead of the state, and the gap at the start of a step says nothing of that; \
-                     choose a scheme that imposes it on the displacements of the state",
-                );
-            }
-            ContactLevel::Velocity { .. } => {
-                admitted.no_start = Some(
-                    "it imposes contact on velocities already; choose `ContactLaw::Rigid`, or a scheme that imposes it on \
-                     the displacements of the state",
-                );
-            }
-        }
-        if stage.recovery.v.z <= 0.0 {
-            admitted.no_switch = Some(
-                "its velocities do not contain the unknown, so a multiplier cannot hold the rate of a closed contact; \
-                 choose another contact law",
-            );
-        }
-        match stage.contact {
-            ContactLevel::Position { .. } => {
-                admitted.no_restitution = Some(
-                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a scheme \
-                     that imposes it on velocities",
-                );
-                if stage.contact_row().z == 0.0 {
-                    admitted.no_rigid = Some(
-                        "its displacements do not contain the unknown, so a multiplier cannot close a gap; choose a \
-                         compliant law",
-                    );
-                }
-            }
-            ContactLevel::Velocity { .. } if stage.contact_row().z == 0.0 => {
-                admitted.no_rigid = Some(
-                    "its velocities do not contain the unknown, so a multiplier cannot stop an approach; choose a \
-                     compliant law",
-                );
-            }
-            ContactLevel::Velocity { .. } => {}
-        }
-    }
-    admitted
-}
-
-/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
-/// they follow statically before the other dofs move.
-fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
-    let Some(dof) = dof else { return Ok(false) };
-    let reason = match analysis::massless_factor(&scheme.tableau) {
-        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(false),
-        Some(_) => {
-            "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
-             choose a scheme that damps high frequencies, or give the dof a mass"
-        }
-        None if analysis::massless_follow(&scheme.tableau) => return Ok(true),
-        None => {
-            "its balance does not determine the displacement of a dof without mass at the end of the step; choose central \
-             differences or an implicit scheme, or give the dof a mass"
-        }
-    };
-    Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
-}
-
-/// Refuses corrections of contact that is not imposed on the displacements of the state, and those that cannot act.
-fn check_corrections<T: Real>(
-    integrator: &dyn TimeIntegrator,
-    tableau: &Tableau,
-    system: &mut dyn System<T>,
-    correctors: &[Box<dyn Corrector<T> + '_>],
-) -> Result<()> {
-    let refuse = |corrector: &dyn Corrector<T>, reason| {
-        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
-        Err(Error::Incompatible { part, reason })
-    };
-    let Some(corrector) = correctors.first() else { return Ok(()) };
-    for stage in &tableau.stages {
-        let reason = match stage.contact {
-            ContactLevel::POSITION => continue,
-            ContactLevel::Position { .. } => {
-                "the scheme imposes contact ahead of the state, whose velocity still approaches"
-            }
-            ContactLevel::Velocity { .. } => {
-                "the scheme imposes contact on velocities, which leaves no jump to correct"
-            }
-        };
-        return refuse(&**corrector, reason);
-    }
-    let damping = damping(system);
-    for corrector in correctors {
-        let mut checked = corrector.check(tableau);
-        if damping == Damping::Present {
-            checked = checked.and_then(|()| corrector.check_damping(tableau));
-        }
-        if let Err(reason) = checked {
-            return refuse(&**corrector, reason);
-        }
-    }
-    Ok(())
-}
-
-/// Whether a system has damping.
-fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
-    let still = vec![T::zero(); system.dofs()];
-    system.damping_force(&still, &still, &mut still.clone())
-}
-
 /// The judge of the steps of a run that controls them.
 fn judge<T: Real>(control: StepControl, scheme: &Scheme<'_>, rows: usize, dofs: usize) -> Result<Judge<T>> {
     let local = control.estimates().then(|| local_error(scheme, rows)).transpose()?;
     Ok(Judge::new(control, local, dofs))
-}
-
-/// What the local error of a scheme follows from; refused where contact would not show in it.
-fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError> {
-    let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
-    let refuse = |reason| {
-        let part = format!("an estimate of the local error with {}", scheme.integrator.name());
-        Err(Error::Incompatible { part, reason })
-    };
-    if rows > 0 && ahead {
-        return refuse(
-            "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
-        );
-    }
-    match analysis::local_error(&scheme.tableau) {
-        Some(error) => Ok(error),
-        None => refuse("what it errs in velocity does not show in one step"),
-    }
-}
-
-/// Refuses systems that have neither a potential nor a force of their own for paths.
-fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_>, motion: &Motion<T>) -> Result<()> {
-    let path = Path { from: &motion.u, to: &motion.u, mean: &motion.u };
-    let own = system.force_along(motion.t, path, &motion.v, &mut vec![T::zero(); motion.u.len()])?;
-    match own == PathForce::Present || system.potential_energy(&motion.u).is_some() {
-        true => Ok(()),
-        false => Err(Error::Incompatible {
-            part: scheme.integrator.name(),
-            reason: "the system gives neither a potential energy nor a force along paths, so its energy is not defined",
-        }),
-    }
-}
-
-/// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.
-fn check_lagged_damping<T: Real>(
-    integrator: &dyn TimeIntegrator,
-    tableau: &Tableau,
-    system: &mut dyn System<T>,
-) -> Result<()> {
-    let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
-    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
-    if lags && grows() && damping(system) == Damping::Present {
-        return Err(Error::Incompatible {
-            part: integrator.name(),
-            reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
-                     size; choose a member with more numerical damping",
-        });
-    }
-    Ok(())
 }
 
 /// Sizes and supports of a host's system.

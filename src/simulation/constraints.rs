@@ -1,5 +1,7 @@
 //! All constraints of a simulation as one list of rows.
 
+use super::admitted::Admitted;
+use super::overclosures::Overclosures;
 use crate::contact::{
     Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE, Stride,
 };
@@ -30,95 +32,6 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// What is added to gaps that were negative at the start, and of it what each row gets; empty without.
     overclosures: Option<Overclosures<T>>,
     added: Vec<T>,
-    /// Gaps at two times, and rates, to compare them.
-    compared: Compared<T>,
-}
-
-/// Depths at the start of a run, which are added to the gaps from then on, or for a while.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Overclosures<T> {
-    /// (constraint, feature) and what is added, ascending.
-    depths: Vec<((usize, usize), T)>,
-    start: f64,
-    /// The time over which they are removed.
-    over: Option<f64>,
-}
-
-impl<T: Real> Overclosures<T> {
-    /// From the gaps of contacts at the start; of a feature with several the deepest counts.
-    pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
-        let mut depths: Vec<((usize, usize), T)> = Vec::new();
-        for &(id, gap) in gaps {
-            let feature = (id.constraint, id.feature);
-            match depths.iter_mut().find(|(other, _)| *other == feature) {
-                Some((_, depth)) => *depth = depth.max(-gap),
-                None => depths.push((feature, -gap)),
-            }
-        }
-        depths.sort_unstable_by_key(|(feature, _)| *feature);
-        Self { depths, start, over }
-    }
-
-    /// The share that is left at t, with its first two derivatives.
-    fn share(&self, t: f64) -> [f64; 3] {
-        let Some(over) = self.over else { return [1.0, 0.0, 0.0] };
-        let x = ((t - self.start) / over).max(0.0);
-        if x >= 1.0 {
-            return [0.0; 3];
-        }
-        [1.0 - x * x * (3.0 - 2.0 * x), -6.0 * x * (1.0 - x) / over, (12.0 * x - 6.0) / (over * over)]
-    }
-
-    fn of(&self, id: ContactId) -> T {
-        let found = self.depths.binary_search_by_key(&(id.constraint, id.feature), |(feature, _)| *feature);
-        found.map_or(T::zero(), |at| self.depths[at].1)
-    }
-}
-
-/// Memory for the comparison of rates with gaps, one entry a row.
-struct Compared<T> {
-    before: Vec<T>,
-    now: Vec<T>,
-    rates: Vec<GapRates<T>>,
-    /// Whether the gap has moved all the time, and the rates have said nothing.
-    silent: Vec<bool>,
-}
-
-/// Which laws a scheme can serve.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Admitted {
-    pub(crate) integrator: String,
-    /// Why not laws on a predicted gap, if not.
-    pub(crate) no_prediction: Option<&'static str>,
-    /// Why not rigid ones, if not.
-    pub(crate) no_rigid: Option<&'static str>,
-    /// Why not restitution above zero, if not.
-    pub(crate) no_restitution: Option<&'static str>,
-    /// Why not those that read the gap at the start of a stage, if not, and why not the persistency switch among them.
-    pub(crate) no_start: Option<&'static str>,
-    pub(crate) no_switch: Option<&'static str>,
-}
-
-impl Admitted {
-    fn check(&self, law: ContactLaw) -> Result<()> {
-        let own = match law {
-            ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
-            ContactLaw::RateCondition => self.no_start,
-            ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
-            ContactLaw::StabilizedBipenalty { .. } => self.no_prediction,
-            _ => None,
-        };
-        match self.no_rigid.or(own).filter(|_| !law.is_compliant() || law.is_predictive()) {
-            None => Ok(()),
-            Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
-        }
-    }
-}
-
-impl<T> Compared<T> {
-    fn empty() -> Self {
-        Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new() }
-    }
 }
 
 /// The place of a dof that no constraint has announced.
@@ -173,12 +86,6 @@ impl<'a, T: Real> Constraints<'a, T> {
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let jacobian = ContactJacobian::with_capacity(rows, entries);
-        let compared = Compared {
-            before: vec![T::zero(); rows],
-            now: vec![T::zero(); rows],
-            rates: vec![GapRates::default(); rows],
-            silent: vec![false; rows],
-        };
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
         let constraints = Self {
             parts,
@@ -194,7 +101,6 @@ impl<'a, T: Real> Constraints<'a, T> {
             version: 0,
             overclosures: None,
             added: Vec::new(),
-            compared,
         };
         Ok((constraints, jacobian))
     }
@@ -420,7 +326,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             part.rates(t, u, v, own);
             rest = others;
         }
-        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.over.is_some()) {
+        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
             let [_, rate, acceleration] = overclosures.share(t).map(T::of);
             for (rates, &added) in out.iter_mut().zip(&self.added) {
                 rates.rate += rate * added;
@@ -446,63 +352,6 @@ impl<'a, T: Real> Constraints<'a, T> {
             _ => self.ids.iter().position(|other| other == id),
         };
         contacts.ids.iter().enumerate().filter_map(move |(contact, id)| row(contact, id).map(|row| (contact, row)))
-    }
-
-    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates
-    /// are zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
-    pub(crate) fn check_rates(&mut self, motion: &Motion<T>, h: f64, jacobian: &ContactJacobian<T>) -> Result<()> {
-        let mut compared = std::mem::replace(&mut self.compared, Compared::empty());
-        let result = self.compare(&mut compared, motion, h, jacobian);
-        self.compared = compared;
-        result
-    }
-
-    fn compare(
-        &mut self,
-        compared: &mut Compared<T>,
-        motion: &Motion<T>,
-        h: f64,
-        jacobian: &ContactJacobian<T>,
-    ) -> Result<()> {
-        /// Times, in shares of h: no motion of some frequency is at rest in all of them.
-        const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
-        let count = self.len();
-        let Compared { before, now, rates, silent } = compared;
-        for (row, silent) in silent[..count].iter_mut().enumerate() {
-            // A spring asks for no rates.
-            *silent = !(self.laws[row].is_compliant() && self.laws[row].inertia() == 0.0);
-        }
-        let mut first = T::zero();
-        let mut found = None;
-        for (k, share) in SHARES.into_iter().enumerate() {
-            if !silent[..count].contains(&true) {
-                break;
-            }
-            let t = motion.t + share * h;
-            std::mem::swap(before, now);
-            self.finite_gaps(t, &motion.u, now)?;
-            self.finite_rates(t, &motion.u, &motion.v, rates)?;
-            for row in 0..count {
-                let rounded = self.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
-                let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
-                silent[row] &= moves && rates[row].rate == T::zero();
-            }
-            found = silent[..count].iter().position(|silent| *silent);
-        }
-        if let Some(row) = found {
-            // (The gap at the start, again.)
-            self.finite_gaps(motion.t, &motion.u, before)?;
-            first = before[row];
-        }
-        let last = found.map_or(first, |row| now[row]);
-        match found {
-            None => Ok(()),
-            Some(row) => Err(Error::SilentMotion {
-                contact: self.ids[row],
-                t: [motion.t, motion.t + h],
-                gap: [first.value(), last.value()],
-            }),
-        }
     }
 
     /// Refuses rows that act on no free dof, and gaps that are not numbers.

@@ -1,5 +1,6 @@
-//! Settings of Newton's method, and what it reports of its iterations.
+//! Settings of Newton's method, what it reports of its iterations, and its memory.
 
+use super::path::PathWork;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -60,9 +61,9 @@ impl Newton {
         Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
     }
 
-    /// Shortens increments by halves, down to an eighth, while they do not make the residual smaller or lead to a state
-    /// that the host does not admit. It costs nothing where full increments do. Slender structures converge through
-    /// larger residuals and are better left without.
+    /// Halves increments, down to an eighth, while they do not make the residual smaller, or lead to a state that the
+    /// host does not admit. It costs nothing where full increments are taken. Slender structures pass through larger
+    /// residuals before they converge, and are better solved without it.
     #[must_use]
     pub const fn line_search(self) -> Self {
         Self { line_search: true, ..self }
@@ -89,7 +90,7 @@ impl Newton {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for zero and for more than a million: what each of them did is kept.
+    /// [`Error::Parameter`] for zero and for more than a million, as memory for the report of each is reserved.
     pub fn iterations(self, iterations: usize) -> Result<Self> {
         let (name, value) = ("Newton's number of iterations", iterations as f64);
         match (1..=1_000_000).contains(&iterations) {
@@ -112,4 +113,36 @@ pub struct Iteration {
     pub residual: f64,
     /// ‖Δ‖ of the iteration over that of the whole increment so far.
     pub increment: f64,
+}
+
+/// Memory of Newton's method.
+pub(super) struct NewtonWork<T> {
+    pub(super) settings: Newton,
+    /// The whole increment of the stage so far, one a dof.
+    pub(super) d: Vec<T>,
+    /// Residual without contact forces before an iteration, and the increment of the iteration.
+    pub(super) residual: Vec<T>,
+    pub(super) increment: Vec<T>,
+    /// Relative difference of gaps and contact forces from those that were solved for, after the last linearization of
+    /// curved gaps.
+    pub(super) unsettled: f64,
+    /// For schemes that take the force of the whole path.
+    pub(super) path: Option<PathWork<T>>,
+    pub(super) report: Vec<Iteration>,
+}
+
+impl<T: Real> NewtonWork<T> {
+    /// Memory for a system of `dofs` dofs.
+    pub(super) fn new(settings: Newton, dofs: usize, path: Option<PathWork<T>>) -> Self {
+        let zero = |size: usize| vec![T::zero(); size];
+        Self {
+            settings,
+            d: zero(dofs),
+            residual: zero(dofs),
+            increment: zero(dofs),
+            unsettled: 0.0,
+            path,
+            report: Vec::with_capacity(settings.iterations),
+        }
+    }
 }

@@ -1,49 +1,20 @@
 //! A stage of a nonlinear system, solved by Newton's method.
 
-use super::Workspace;
+use super::contact_rows::Part;
+use super::contact_step::ContactWork;
 use super::curved_rows::FOLLOWED;
-use super::newton::{Iteration, Newton, TangentUpdate};
-use super::operator::{At, TangentOf};
-use super::path::{PathForm, PathWork};
+use super::newton::{Iteration, NewtonWork, TangentUpdate};
+use super::path::PathForm;
 use super::program::ScaledRows;
-use super::step::StageSolve;
+use super::stage::StageSolve;
+use super::stage_vectors::StageVectors;
+use super::tangent::{At, TangentOf};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::Path;
 
-/// Memory of Newton's method.
-pub(super) struct NewtonWork<T> {
-    settings: Newton,
-    /// The whole increment of the stage so far, one a dof.
-    d: Vec<T>,
-    /// Residual without contact forces before an iteration, and the increment of it.
-    residual: Vec<T>,
-    increment: Vec<T>,
-    /// The miss of gaps and contact forces after the last linearization of curved gaps, relative.
-    unsettled: f64,
-    /// For schemes that take the force of the whole path.
-    path: Option<PathWork<T>>,
-    pub(super) report: Vec<Iteration>,
-}
-
-impl<T: Real> NewtonWork<T> {
-    /// Memory for a system of `dofs` dofs.
-    pub(super) fn new(settings: Newton, dofs: usize, path: Option<PathWork<T>>) -> Self {
-        let zero = |size: usize| vec![T::zero(); size];
-        Self {
-            settings,
-            d: zero(dofs),
-            residual: zero(dofs),
-            increment: zero(dofs),
-            unsettled: 0.0,
-            path,
-            report: Vec::with_capacity(settings.iterations),
-        }
-    }
-}
-
-/// The smallest share of an increment that a line search tries.
+/// The smallest share of an increment that a line search takes.
 const SHORTEST: f64 = 0.125;
 
 /// Norms at a trial state.
@@ -70,53 +41,44 @@ impl<T: Real> StageSolve<'_, '_, T> {
     /// Moves the predicted motion to where the balance and the contact conditions hold, by Newton's method.
     pub(super) fn by_iteration(
         &mut self,
-        new: &mut Motion<T>,
-        past: &[Motion<T>],
-        work: &mut Workspace<T>,
-    ) -> Result<()> {
-        let Some(mut newton) = work.newton.take() else { return Ok(()) };
-        let result = self.iterate(&mut newton, new, past, work);
-        work.newton = Some(newton);
-        result
-    }
-
-    fn iterate(
-        &mut self,
         newton: &mut NewtonWork<T>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
-        work: &mut Workspace<T>,
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
     ) -> Result<()> {
-        self.begin(newton, new, past, work);
+        contact.interface.forces.fill(T::zero());
+        self.begin(newton, new, past, vectors);
         let limit = newton.settings.iterations;
-        let mut norms = self.evaluate(newton, new, past, work)?;
+        let mut norms = self.evaluate(newton, new, past, vectors, &contact.interface.forces)?;
         let first = norms.residual;
         for iteration in 0..limit {
             if self.operator.varies() && (iteration == 0 || newton.settings.tangent == TangentUpdate::Iteration) {
-                self.factorize(iteration, newton, new, past, work)?;
+                self.factorize(iteration, newton, new, past, vectors)?;
             }
-            newton.residual.copy_from_slice(&work.increment);
+            newton.residual.copy_from_slice(&vectors.increment);
             self.operator
-                .begin(&mut work.increment, &mut work.interface.increment)
+                .begin(&mut vectors.increment, &mut contact.interface.increment)
                 .map_err(|error| self.in_iteration(error, iteration))?;
             self.statistics.linear_solves += 1;
             self.statistics.newton_iterations += 1;
-            let settled = self.press(newton, new, past, work)?;
-            self.operator.finish(&mut work.increment, &work.interface.increment, &work.interface.forces)?;
-            self.refuse_nan(&work.increment, "the increment")?;
-            // The increment, kept while `work.increment` becomes the residual it leaves.
-            let before = Norms { residual: self.loaded_norm(&newton.residual, &work.interface.forces), ..norms };
-            let size = norm(&work.increment);
-            let Some(share) = self.advance(newton, new, past, work, before, &mut norms)? else {
+            let settled = self.press(newton, new, past, vectors, contact)?;
+            self.operator.finish(&mut vectors.increment, &contact.interface.increment, &contact.interface.forces)?;
+            self.refuse_nan(&vectors.increment, "the increment")?;
+            let before = Norms { residual: self.loaded_norm(&newton.residual, &contact.interface.forces), ..norms };
+            let size = norm(&vectors.increment);
+            let forces = &contact.interface.forces;
+            let Some((share, found)) = self.advance(newton, new, past, vectors, forces, before)? else {
                 if settled {
                     return Ok(());
                 }
-                // The stage is linear but for its gaps, which have been linearized that often.
+                // The stage is linear in all but its gaps, and rows did not fit after that many linearizations.
                 newton.report.clear();
                 newton.report.resize(FOLLOWED, Iteration { residual: newton.unsettled, increment: 0.0 });
                 break;
             };
-            // Rows fit the whole increment.
+            norms = found;
+            // Rows were made to fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
             if self.has_converged(newton, share * size, [first, before.residual], norms, new) && settled {
                 return Ok(());
@@ -130,12 +92,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
             iterations: newton.report.len(),
             residual: last.residual,
             increment: last.increment,
-            dof: self.worst(&work.increment, &work.interface.forces),
+            dof: self.worst(&vectors.increment, &contact.interface.forces),
         })
     }
 
-    /// Whether an iteration of this size, which has brought the residual from `before` to what it is now (and that of
-    /// the prediction was `first`), is the last one; it is reported.
+    /// Reports an iteration whose increment has this `size`, and says whether it is the last one. `first` and `before`
+    /// are the norms of the residual of the prediction and before the iteration.
     fn has_converged(
         &self,
         newton: &mut NewtonWork<T>,
@@ -149,8 +111,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
-        // Where forces cancel there is nothing to compare with: increments are small, and the residual falls no more,
-        // or has fallen far; or no force can tell the displacements before from those after.
+        // Where forces cancel the residual has nothing to be compared with. Then increments must be small, and the
+        // residual must fall no more or have fallen far; or the increment must be below the resolution of the
+        // displacements.
         let [in_u, in_v, _] = self.stage.balanced().weights();
         let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));
@@ -158,22 +121,29 @@ impl<T: Real> StageSolve<'_, '_, T> {
         met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first)
     }
 
-    /// Completes the prediction by accelerations.
-    fn begin(&mut self, newton: &mut NewtonWork<T>, new: &mut Motion<T>, past: &[Motion<T>], work: &mut Workspace<T>) {
+    /// Begins with d = 0: completes the prediction by its accelerations.
+    fn begin(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+    ) {
         newton.d.fill(T::zero());
         newton.report.clear();
-        work.interface.forces.fill(T::zero());
+        let StageVectors { balance, supports, .. } = vectors;
+        let prescribed = &supports.dofs;
         let complete = |rows: &ScaledRows<T>, a: &mut [T], supports: &[[T; 3]]| {
             if !rows.reads_past(2) {
                 a.fill(T::zero());
             }
-            for (&dof, support) in work.prescribed.iter().zip(supports) {
+            for (&dof, support) in prescribed.iter().zip(supports) {
                 a[dof] = support[2];
             }
         };
-        complete(&self.stage.recovery, &mut new.a, &work.supports);
-        if let (Some(rows), Some(balance)) = (&self.stage.balance, work.balance.as_mut()) {
-            complete(rows, &mut balance.a, &work.balance_supports);
+        complete(&self.stage.recovery, &mut new.a, &supports.state);
+        if let (Some(rows), Some(balance)) = (&self.stage.balance, balance.as_mut()) {
+            complete(rows, &mut balance.a, &supports.balance);
         }
         if self.stage.along_path
             && let (Some(path), Some(from)) = (&mut newton.path, past.first())
@@ -190,15 +160,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Leaves f − M ā at the trial motion in `work.increment`.
+    /// Leaves f − M ā at the trial motion in `vectors.increment`.
     fn evaluate(
         &mut self,
         newton: &mut NewtonWork<T>,
         new: &Motion<T>,
         past: &[Motion<T>],
-        work: &mut Workspace<T>,
+        vectors: &mut StageVectors<T>,
+        forces: &[T],
     ) -> Result<Norms> {
-        let Workspace { increment, balance, prescribed, interface, .. } = work;
+        let StageVectors { increment, balance, supports } = vectors;
+        let prescribed = &supports.dofs;
         let t = self.clock.at(self.stage.load);
         let motion = self.balanced(new, balance.as_ref());
         match (&mut newton.path, past.first()) {
@@ -207,17 +179,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             _ => self.system.force(t, &motion.u, &motion.v, increment)?,
         }
-        for &dof in prescribed.iter() {
+        for &dof in prescribed {
             increment[dof] = T::zero();
         }
         let force = norm(increment);
         self.system.mass().add_product(-T::one(), &motion.a, increment);
-        for &dof in prescribed.iter() {
+        for &dof in prescribed {
             increment[dof] = T::zero();
         }
         self.refuse_nan(increment, "the residual")?;
-        let residual = self.loaded_norm(increment, &interface.forces);
-        Ok(Norms { residual, force, contact: norm(&interface.forces) })
+        let residual = self.loaded_norm(increment, forces);
+        Ok(Norms { residual, force, contact: norm(forces) })
     }
 
     /// A residual with the contact forces added.
@@ -247,9 +219,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton: &NewtonWork<T>,
         new: &Motion<T>,
         past: &[Motion<T>],
-        work: &Workspace<T>,
+        vectors: &StageVectors<T>,
     ) -> Result<()> {
-        let motion = self.balanced(new, work.balance.as_ref());
+        let motion = self.balanced(new, vectors.balance.as_ref());
         let of = match (&newton.path, past.first()) {
             (Some(path), Some(from)) if self.stage.along_path => match path.form {
                 PathForm::Own => TangentOf::Path(Path { from: &from.u, to: &new.u, mean: &motion.u }),
@@ -274,63 +246,63 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Adds contact to the increment on the interface, with rows that fit where it ends. Says whether they do.
+    /// Adds the response to contact to the increment on the interface. Says whether curved rows fit the result.
     fn press(
         &mut self,
         newton: &mut NewtonWork<T>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
-        work: &mut Workspace<T>,
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
     ) -> Result<bool> {
-        work.interface.forces.fill(T::zero());
-        if self.constraints.len() == 0 || !T::all_finite(&work.interface.increment) {
+        contact.interface.forces.fill(T::zero());
+        if self.constraints.len() == 0 || !T::all_finite(&contact.interface.increment) {
             return Ok(true);
         }
-        let settled = self.contact(Some(&newton.d), new, past, work)?;
-        newton.unsettled = work.rows.curved.miss;
+        let settled = self.contact(Part::All, Some(&newton.d), new, past, vectors, contact)?;
+        newton.unsettled = contact.rows.curved.miss;
         Ok(settled)
     }
 
-    /// Moves by the increment in `work.increment`, or by a share of it, which is returned; the residual there takes its
-    /// place. A stage that is linear in its unknown is solved by this, and nothing is returned.
+    /// Moves by the increment in `vectors.increment`, or by a share of it, which is returned; the residual there takes
+    /// its place. A stage that is linear in its unknown is solved by this, and nothing is returned.
     fn advance(
         &mut self,
         newton: &mut NewtonWork<T>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
-        work: &mut Workspace<T>,
+        vectors: &mut StageVectors<T>,
+        forces: &[T],
         before: Norms,
-        norms: &mut Norms,
-    ) -> Result<Option<f64>> {
-        std::mem::swap(&mut newton.increment, &mut work.increment);
-        self.shift(T::one(), newton, new, work);
+    ) -> Result<Option<(f64, Norms)>> {
+        std::mem::swap(&mut newton.increment, &mut vectors.increment);
+        self.shift(T::one(), newton, new, vectors);
         if !self.operator.varies() {
             return Ok(None);
         }
         let [force, _] = newton.settings.bounds::<T>();
         let mut share = 1.0;
         loop {
-            let found = self.evaluate(newton, new, past, work);
+            let found = self.evaluate(newton, new, past, vectors, forces);
             let may_shorten = newton.settings.line_search && share > SHORTEST;
             match found {
                 Ok(found) => {
-                    *norms = found;
                     let falls = found.residual <= (1.0 - 1e-4 * share) * before.residual;
                     if !may_shorten || falls || found.residual <= force * found.scale() {
-                        return Ok(Some(share));
+                        return Ok(Some((share, found)));
                     }
                 }
-                // The host may admit a state that is nearer.
+                // The host may admit a state nearer to the last one.
                 Err(error) if may_shorten && error.is_recoverable() => {}
                 Err(error) => return Err(error),
             }
             share *= 0.5;
-            self.shift(-T::of(share), newton, new, work);
+            self.shift(-T::of(share), newton, new, vectors);
         }
     }
 
     /// Adds a share of the increment to everything that contains the unknown.
-    fn shift(&self, share: T, newton: &mut NewtonWork<T>, new: &mut Motion<T>, work: &mut Workspace<T>) {
+    fn shift(&self, share: T, newton: &mut NewtonWork<T>, new: &mut Motion<T>, vectors: &mut StageVectors<T>) {
         let NewtonWork { d, increment, .. } = newton;
         T::axpy(share, increment, d);
         let add = |rows: &ScaledRows<T>, motion: &mut Motion<T>| {
@@ -340,7 +312,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             T::axpy(share * a, increment, &mut motion.a);
         };
         add(&self.stage.recovery, new);
-        if let (Some(rows), Some(balance)) = (&self.stage.balance, &mut work.balance) {
+        if let (Some(rows), Some(balance)) = (&self.stage.balance, &mut vectors.balance) {
             add(rows, balance);
         }
     }

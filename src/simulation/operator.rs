@@ -1,19 +1,21 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 
+use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::contact::ContactJacobian;
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
-use crate::mass::{self, Mass};
+use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
-use crate::system::{Damping, Linearity, Path, System, TangentWeights};
+use crate::system::{Linearity, System, TangentWeights};
 use faer::sparse::SymbolicSparseColMatRef;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
-/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A step is
-/// begun, which gives the solution on the interface, and finished with the values there after contact.
+/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A solve has two
+/// halves: [`begin`](Self::begin) gives the solution on the interface, [`finish`](Self::finish) takes the values there
+/// after contact.
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
     /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
@@ -50,8 +52,7 @@ enum ContactPath {
     Apart,
 }
 
-/// Fill beyond that of a free order, above which a matrix that is factorized again and again is not ordered for
-/// contact.
+/// Fill over that of a free order beyond which a matrix that is factorized often is not ordered for contact.
 const DEAR: f64 = 1.25;
 
 /// The Delassus operator of some rows, kept until they or their responses change.
@@ -75,35 +76,6 @@ impl<T: Real> Delassus<T> {
             version: 0,
         })
     }
-}
-
-/// Where a tangent is taken.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct At<'m, T> {
-    pub(crate) t: f64,
-    pub(crate) u: &'m [T],
-    pub(crate) v: &'m [T],
-    pub(crate) of: TangentOf<'m, T>,
-}
-
-/// The force that a tangent belongs to.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum TangentOf<'m, T> {
-    /// That of the motion.
-    State,
-    /// The system's own of a path.
-    Path(Path<'m, T>),
-    /// Simpson's mean over a path with this end, in whose middle the motion is.
-    Simpson { end: &'m [T] },
-}
-
-/// Whether K and C have a part in an effective matrix.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Tangent {
-    /// Only M: an explicit stage without damping.
-    Absent,
-    /// w_ū K + w_v̄/h C in the pattern of the effective matrix.
-    Present,
 }
 
 impl<T: Real> Operator<T> {
@@ -147,12 +119,12 @@ impl<T: Real> Operator<T> {
             full,
         };
         match operator.factorize(system, h, at) {
-            // Another state, or a smaller step, may do: the step will say.
+            // Another state, or a smaller step, may have a definite matrix; if not, the step fails with this error.
             Err(Error::Singular { .. }) if operator.varies() => return Ok(operator),
             other => other?,
         }
         if !operator.full.is_empty() {
-            // Memory for that many columns is allocated now.
+            // The solver allocates memory for that many columns now, not in a step.
             operator.factor.solve(&mut operator.full)?;
         }
         Ok(operator)
@@ -205,7 +177,8 @@ impl<T: Real> Operator<T> {
                 TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
                 TangentOf::Path(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
                 TangentOf::Simpson { end } => {
-                    // ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', twice: as ∂f/∂u' of the middle is half of that there.
+                    // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which that of the middle
+                    // term counts half: ⅔ K in the middle and ⅓ K at the end.
                     let third = weights.stiffness / T::of(3.0);
                     at_end.resize(part.len(), T::zero());
                     let of_end = TangentWeights { stiffness: third, damping: T::zero() };
@@ -224,7 +197,7 @@ impl<T: Real> Operator<T> {
             (Mass::Consistent(mass), Tangent::Present) => combination.fill(&[own, (inertia, mass.val())], None, values),
             (Mass::Consistent(mass), Tangent::Absent) => combination.fill(&[(inertia, mass.val())], None, values),
         }
-        // The factorization takes the most memory of a build: what is not read again goes before.
+        // The factorization takes the most memory of a build: what is not read again is freed before.
         if *tangent == Tangent::Absent || *linearity == Linearity::Linear {
             *part = Vec::new();
         }
@@ -241,7 +214,7 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    // Where the solver iterates, what solves with A can fail: nothing is kept then that was not solved for.
+    // Solves fail where the solver iterates. Responses count as computed only after a solve that succeeded.
 
     /// Begins `A d = r` with r in `increment`, and writes d on the interface.
     pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) -> Result<()> {
@@ -255,8 +228,8 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    /// Finishes what [`begin`](Self::begin) began: `increment` becomes d with contact `forces` on the interface, which
-    /// have changed d there to `on_interface`.
+    /// Finishes what [`begin`](Self::begin) began: `increment` becomes d on all dofs. `forces` are those of contact on
+    /// the interface, `on_interface` is d there with them.
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
@@ -294,7 +267,7 @@ impl<T: Real> Operator<T> {
     pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         let mut rest = rows;
         while let Some(&first) = rest.first() {
-            // Rows that follow one another go together.
+            // Consecutive rows are solved for together.
             let count = (0..rest.len().min(COLUMNS)).take_while(|&k| rest[k] == first + k && !self.computed[first + k]);
             let end = first + count.count();
             let size = self.interface.len();
@@ -376,22 +349,8 @@ impl<T: Real> Operator<T> {
     }
 }
 
-/// Refuses a pattern or a mass that is not that of the build: entries would go to places of others.
-fn check_sources<T: Real>(system: &dyn System<T>, tangent: Tangent, combination: &Combination) -> Result<()> {
-    let (mass, diagonal) = match system.mass() {
-        Mass::Lumped(mass) => (None, mass.len()),
-        Mass::Consistent(mass) => (Some(mass.val().len()), system.dofs()),
-    };
-    let own = (tangent == Tangent::Present).then(|| system.pattern().row_idx().len());
-    let what = [
-        own.map(|found| ("the pattern of the tangent (entries)", found)),
-        mass.map(|found| ("the mass matrix (entries)", found)),
-    ];
-    combination.check(diagonal, what.into_iter().flatten())
-}
-
-/// Analyzes with the interface last, or freely: where the solver does not condense, and where a matrix that varies
-/// would cost much more to factorize than a few full solves.
+/// Analyzes with the interface eliminated last, if the solver condenses; in a free order if a matrix that varies would
+/// otherwise be much dearer to factorize.
 fn analyze<T: Real>(
     solver: &dyn LinearSolver<T>,
     pattern: SymbolicSparseColMatRef<'_, usize>,
@@ -430,7 +389,7 @@ fn respond<T: Real>(
     full: &mut [T],
     forces: &mut [T],
 ) -> Result<()> {
-    // What only responds on the interface needs no full solve, whether a step condenses or not.
+    // A condensation answers on the interface without a full solve, whether steps condense or not.
     if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
         condensed.solve(forces);
         return Ok(());
@@ -452,52 +411,4 @@ fn respond<T: Real>(
         }
     }
     Ok(())
-}
-
-/// The pattern of an effective matrix: no larger than what has a part in it.
-fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Tangent, Combination)> {
-    let dofs = system.dofs();
-    let damped = weights[1] != 0.0 && {
-        let mut force = vec![T::zero(); dofs];
-        let still = vec![T::zero(); dofs];
-        system.damping_force(&still, &still, &mut force) == Damping::Present
-    };
-    let tangent = match weights[0] != 0.0 || damped {
-        true => Tangent::Present,
-        false => Tangent::Absent,
-    };
-    // Damping proportional to a lumped mass leaves an explicit scheme its diagonal.
-    let diagonal = tangent == Tangent::Present
-        && weights[0] == 0.0
-        && system.linearity() == Linearity::Linear
-        && has_diagonal_damping(system)?;
-    let own = (tangent == Tangent::Present).then_some(system.pattern());
-    let mut fixed = system.prescribed().to_vec();
-    if weights[0] == 0.0 {
-        // Dofs without mass have followed before: here they do not move.
-        fixed.append(&mut mass::massless(system.mass(), system.prescribed()));
-        fixed.sort_unstable();
-    }
-    let combination = match system.mass() {
-        Mass::Lumped(_) if diagonal => Combination::diagonal(dofs, &fixed, &[system.pattern()])?,
-        Mass::Lumped(_) => Combination::new(dofs, &fixed, own.as_slice())?,
-        Mass::Consistent(mass) => {
-            let sources: Vec<_> = own.into_iter().chain([mass.symbolic()]).collect();
-            Combination::new(dofs, &fixed, &sources)?
-        }
-    };
-    Ok((tangent, combination))
-}
-
-/// Whether C has no entry off the diagonal.
-fn has_diagonal_damping<T: Real>(system: &mut dyn System<T>) -> Result<bool> {
-    let mut values = vec![T::zero(); system.pattern().row_idx().len()];
-    let still = vec![T::zero(); system.dofs()];
-    system.tangent(0.0, &still, &still, TangentWeights { stiffness: T::zero(), damping: T::one() }, &mut values)?;
-    let pattern = system.pattern();
-    let on_diagonal = |column: usize| {
-        let rows = pattern.row_idx_of_col_raw(column).iter().zip(&values[pattern.col_range(column)]);
-        rows.into_iter().all(|(&row, &value)| row == column || value == T::zero())
-    };
-    Ok((0..pattern.ncols()).all(on_diagonal))
 }

@@ -1,6 +1,7 @@
 //! A tableau compiled for one system and one step size: scaled coefficients, and which operator each stage solves with.
 
-use super::operator::{At, Operator};
+use super::operator::Operator;
+use super::tangent::At;
 use crate::error::Result;
 use crate::linear_solver::LinearSolver;
 use crate::real::Real;

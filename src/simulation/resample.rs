@@ -1,11 +1,13 @@
 //! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
 
-use super::operator::{At, TangentOf};
+use super::constraints::Constraints;
+use super::past::taylor;
 use super::program::Compiler;
+use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
-use super::start::{self, Begun, Start, Violation, taylor};
-use super::{Constraints, Simulation};
+use super::start::{self, Begun, Start, Violation};
+use super::tangent::{At, TangentOf};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};

@@ -1,0 +1,95 @@
+//! Which contact laws a scheme can serve, and why not the others.
+
+use crate::contact::ContactLaw;
+use crate::error::{Error, Result};
+use crate::integrator::TimeIntegrator;
+use crate::tableau::{ContactLevel, Tableau};
+
+/// Which laws a scheme can serve.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Admitted {
+    pub(crate) integrator: String,
+    /// Why not laws on a predicted gap, if not.
+    pub(crate) no_prediction: Option<&'static str>,
+    /// Why not rigid ones, if not.
+    pub(crate) no_rigid: Option<&'static str>,
+    /// Why not restitution above zero, if not.
+    pub(crate) no_restitution: Option<&'static str>,
+    /// Why not those that read the gap at the start of a stage, if not, and why not the persistency switch among them.
+    pub(crate) no_start: Option<&'static str>,
+    pub(crate) no_switch: Option<&'static str>,
+}
+
+impl Admitted {
+    /// Refuses a law that the scheme cannot serve.
+    pub(super) fn check(&self, law: ContactLaw) -> Result<()> {
+        let own = match law {
+            ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
+            ContactLaw::RateCondition => self.no_start,
+            ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
+            ContactLaw::StabilizedBipenalty { .. } => self.no_prediction,
+            _ => None,
+        };
+        match self.no_rigid.or(own).filter(|_| !law.is_compliant() || law.is_predictive()) {
+            None => Ok(()),
+            Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
+        }
+    }
+}
+
+/// The contact laws that a scheme can serve.
+pub(super) fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
+    let mut admitted = Admitted { integrator: integrator.name(), ..Admitted::default() };
+    let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
+    if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
+        admitted.no_prediction = Some(
+            "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty \
+             predicts; choose `CentralDifference`",
+        );
+    }
+    for stage in &tableau.stages {
+        match stage.contact {
+            ContactLevel::POSITION => {}
+            ContactLevel::Position { .. } => {
+                admitted.no_start = Some(
+                    "it imposes contact ahead of the state, and the gap at the start of a step says nothing of that; \
+                     choose a scheme that imposes it on the displacements of the state",
+                );
+            }
+            ContactLevel::Velocity { .. } => {
+                admitted.no_start = Some(
+                    "it imposes contact on velocities already; choose `ContactLaw::Rigid`, or a scheme that imposes it \
+                     on the displacements of the state",
+                );
+            }
+        }
+        if stage.recovery.v.z <= 0.0 {
+            admitted.no_switch = Some(
+                "its velocities do not contain the unknown, so a multiplier cannot hold the rate of a closed contact; \
+                 choose another contact law",
+            );
+        }
+        match stage.contact {
+            ContactLevel::Position { .. } => {
+                admitted.no_restitution = Some(
+                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a \
+                     scheme that imposes it on velocities",
+                );
+                if stage.contact_row().z == 0.0 {
+                    admitted.no_rigid = Some(
+                        "its displacements do not contain the unknown, so a multiplier cannot close a gap; choose a \
+                         compliant law",
+                    );
+                }
+            }
+            ContactLevel::Velocity { .. } if stage.contact_row().z == 0.0 => {
+                admitted.no_rigid = Some(
+                    "its velocities do not contain the unknown, so a multiplier cannot stop an approach; choose a \
+                     compliant law",
+                );
+            }
+            ContactLevel::Velocity { .. } => {}
+        }
+    }
+    admitted
+}

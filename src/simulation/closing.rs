@@ -1,0 +1,86 @@
+//! The end of the contact of a stage: which contacts are closed, which have opened, and their forces and impulses.
+
+use super::contact_rows::{Level, Part};
+use super::contact_step::{ContactStep, ContactWork};
+use crate::corrector::{Buffers, Gaps};
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::Motion;
+
+/// Where a stage stands in its step, for the impulses of its contacts.
+pub(super) struct Booking {
+    /// Impulse of a unit multiplier over a step, divided by h.
+    pub(super) impulse_weight: f64,
+    /// Whether the stage is the first of its step, or the last.
+    pub(super) is_first: bool,
+    pub(super) is_last: bool,
+}
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Decides which contacts are closed, and sets what the stage reports of them before corrections: force and
+    /// impulse.
+    pub(super) fn close(
+        &mut self,
+        new: &Motion<T>,
+        booking: &Booking,
+        massless: &[usize],
+        buffers: &mut Buffers<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, .. } = self;
+        let ContactWork { trial, rows, was_closed, closed_at_start, .. } = contact;
+        let level = Level { target: stage.contact.as_ref(), clock: *clock };
+        rows.evaluate(&level, constraints, g, new, 1e-10)?;
+        if level.target.is_none() {
+            trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
+        } else {
+            // The gaps that are reported are those at the displacements of the state.
+            rows.curved.hold(g, constraints);
+            constraints.follow(new.t, &new.u, g)?;
+            rows.curved.release(constraints);
+            constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
+        }
+        rows.measure(stage, clock.h, constraints, g, new, None)?;
+        if self.part != Part::All && level.target.is_some() {
+            // Rows on dofs without mass constrain the gaps of the state.
+            for row in (0..constraints.len()).filter(|&row| rows.on_massless[row]) {
+                let rate = g.product(row, &new.v) + rows.rates[row].rate;
+                let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
+                (rows.y[row], rows.enabled[row]) = (trial.gap[row], true);
+                rows.tolerance[row] = rounded + T::of(1e-10 * clock.h) * rate.abs();
+            }
+        }
+        was_closed.clear();
+        was_closed.extend_from_slice(&trial.closed);
+        buffers.closed.clear();
+        buffers.opened.clear();
+        buffers.released.clear();
+        let impulse_weight = T::of(clock.h * booking.impulse_weight);
+        for (row, &was_closed) in was_closed.iter().enumerate() {
+            let raw = trial.lambda_raw[row];
+            let law = constraints.law(row);
+            let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
+            let closed = raw > T::zero() || touching || law.is_equality();
+            trial.closed[row] = closed;
+            // Compliant contacts, and those on dofs without mass, leave no jump to correct.
+            if !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
+                match (closed, was_closed) {
+                    (true, _) => buffers.closed.push(row),
+                    (false, true) => buffers.opened.push(row),
+                    (false, false) => {}
+                }
+                if booking.is_last && !closed && (was_closed || closed_at_start[row]) {
+                    buffers.released.push(row);
+                }
+            }
+            if closed && !was_closed && !closed_at_start[row] {
+                trial.dissipated[row] = T::zero();
+            }
+            trial.lambda[row] = raw;
+            (trial.lambda_v[row], trial.lambda_a[row]) = (T::zero(), T::zero());
+            let before = if booking.is_first { T::zero() } else { trial.impulse[row] };
+            trial.impulse[row] = before + impulse_weight * raw;
+        }
+        Ok(())
+    }
+}

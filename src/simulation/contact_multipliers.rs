@@ -1,0 +1,188 @@
+//! The contact problem of a stage: which rows take part, and their multipliers.
+
+use super::contact_rows::{ContactRowsWork, Measure};
+use super::contact_step::{ContactStep, ContactWork};
+use super::operator::Operator;
+use crate::contact::ContactLaw;
+use crate::contact_solver::{ContactFailure, ContactProblem};
+use crate::corrector::{Gaps, contact_error};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::Motion;
+
+/// The most linearizations of power laws in a stage.
+const LINEARIZATIONS: usize = 100;
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Decides which rows the problem begins with; says whether there is any that is violated, or an equality row.
+    pub(super) fn condition(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> bool {
+        let Self { stage, clock, constraints, g, part, .. } = self;
+        let ContactWork { trial, rows, .. } = contact;
+        let mut needed = false;
+        for row in 0..constraints.len() {
+            let law = constraints.law(row);
+            if law.is_compliant() {
+                let gap = rows.balance_gap[row];
+                rows.y[row] = match law.is_predictive() {
+                    // The mean gap of the coming step, less that of the last step if this was negative.
+                    true => {
+                        T::of(0.5) * (rows.y[row] + gap) - (-T::of(0.5) * (gap + rows.start_gap[row])).max(T::zero())
+                    }
+                    false => gap,
+                };
+                rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
+                let depth = (-rows.y[row]).max(rows.tolerance[row]);
+                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
+            } else {
+                (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
+                let own = rows.own_weight(stage, clock.h, row).filter(|_| part.takes(&rows.on_massless, row));
+                rows.weight[row] = own.unwrap_or(rows.weight[row]);
+                rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
+            }
+            let coupled = rows.weight[row] > T::zero();
+            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || law.is_equality();
+            rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
+            if coupled && !rows.in_problem[row] {
+                trial.lambda_raw[row] = T::zero();
+            }
+            needed |= coupled && violated;
+        }
+        needed
+    }
+
+    /// Solves for the multipliers. Nonlinear laws are linearized again until they are met.
+    pub(super) fn press(&mut self, operator: &mut Operator<T>, t: f64, contact: &mut ContactWork<T>) -> Result<()> {
+        let augmentations = self.constraints.laws().iter().map(ContactLaw::augmentations).max().unwrap_or(0);
+        let limit = LINEARIZATIONS + augmentations;
+        for pass in 0..limit {
+            self.press_linearized(operator, t, contact)?;
+            let ContactWork { rows, trial, interface, .. } = &mut *contact;
+            let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, curved, .. } = rows;
+            let forces = curved.forces(self.g);
+            // The laws at the solution.
+            let (mut worst, mut again) = ((0, T::zero()), false);
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                let law = self.constraints.law(row);
+                match law {
+                    ContactLaw::PowerLaw { .. } => {
+                        let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
+                        let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
+                        let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
+                        let miss = (lambda - law.force(gap)).abs() * slope;
+                        if miss > tolerance[row] + rounded * depth {
+                            again = true;
+                            if miss > worst.1 {
+                                worst = (row, miss);
+                            }
+                        }
+                        (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
+                    }
+                    _ if pass < law.augmentations() => {
+                        again = true;
+                        (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
+                    }
+                    _ => {}
+                }
+            }
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                trial.lambda_raw[row] = lambda;
+            }
+            if !again {
+                for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                    if !lambda.is_finite() {
+                        let (contact, value) = (self.constraints.ids[row], lambda.value());
+                        return Err(Error::ContactNotFinite { t, what: "the multiplier", contact, value });
+                    }
+                    forces.interface_scatter(row, lambda, &mut interface.forces);
+                }
+                T::axpy(T::one(), &interface.response, &mut interface.increment);
+                return Ok(());
+            }
+            if pass + 1 == limit {
+                let failure = ContactFailure::NotConverged { iterations: pass, row: worst.0, residual: worst.1 };
+                return Err(contact_error(t, failure, |row| self.constraints.ids[row]));
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves on the rows in the problem, and leaves the response in `interface.response`. Rows whose gaps this
+    /// response closes join the problem, and it is solved again. As rows only join, this ends.
+    pub(super) fn press_linearized(
+        &mut self,
+        operator: &mut Operator<T>,
+        t: f64,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { constraints, g, solver, statistics, .. } = self;
+        let ContactWork { rows, trial, interface, .. } = contact;
+        let ContactRowsWork {
+            y,
+            tolerance,
+            weight,
+            compliance,
+            shift,
+            enabled,
+            in_problem,
+            problem,
+            versions,
+            offset,
+            curved,
+            ..
+        } = rows;
+        let forces = curved.forces(g);
+        let (bounds, multipliers, problem_tolerance) =
+            (&mut rows.bounds, &mut rows.multipliers, &mut rows.problem_tolerance);
+        let count = constraints.len();
+        loop {
+            problem.clear();
+            problem.extend((0..count).filter(|&row| in_problem[row]));
+            for buffer in [&mut *offset, &mut *problem_tolerance, &mut *multipliers] {
+                buffer.clear();
+            }
+            bounds.clear();
+            // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
+            for &j in problem.iter() {
+                offset.push((y[j] + shift[j]) / weight[j]);
+                problem_tolerance.push(tolerance[j] / weight[j]);
+                multipliers.push(trial.lambda_raw[j]);
+                bounds.push(constraints.law(j).into());
+            }
+            let compliance_of = |k: usize| compliance[problem[k]] / weight[problem[k]];
+            let (delassus, version) = operator.delassus(forces, problem, compliance_of, versions)?;
+            let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance, version };
+            let solved = solver.solve(&data, multipliers);
+            statistics.contact_solves += 1;
+            statistics.contact_iterations +=
+                solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))? as u64;
+            interface.response.fill(T::zero());
+            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                if lambda != T::zero() {
+                    T::axpy(lambda, operator.response(row), &mut interface.response);
+                }
+            }
+            let mut grown = false;
+            for row in 0..count {
+                if enabled[row] && !in_problem[row] && weight[row] > T::zero() {
+                    let pushed = y[row] + weight[row] * forces.interface_product(row, &interface.response);
+                    if pushed < -tolerance[row] {
+                        (in_problem[row], grown) = (true, true);
+                        let depth = (-pushed).max(tolerance[row]);
+                        (compliance[row], shift[row]) = constraints.law(row).linearized(depth, T::zero());
+                    }
+                }
+            }
+            if !grown {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Sets the multipliers of all rows whose y depends on d to zero.
+    pub(super) fn release(&self, contact: &mut ContactWork<T>) {
+        let ContactWork { rows, trial, .. } = contact;
+        for row in (0..self.constraints.len()).filter(|&row| rows.weight[row] > T::zero()) {
+            trial.lambda_raw[row] = T::zero();
+        }
+    }
+}

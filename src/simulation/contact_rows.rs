@@ -1,0 +1,279 @@
+//! What each contact row constrains in a stage, and the buffers of the contact problem.
+
+use super::constraints::Constraints;
+use super::curved_rows::CurvedRowsWork;
+use super::program::{CompiledStage, ContactTarget};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact_solver::Bound;
+use crate::corrector::{Gaps, rounding};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::{Clock, Motion};
+
+/// What a row constrains in a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    /// What the scheme asks for: the gap, or h times its rate.
+    AsScheme,
+    /// The change of the gap since the start of the stage.
+    Increment,
+    /// h times the rate of the gap, by a scheme that asks for the gap.
+    Rate,
+    /// Nothing: the row is open in this stage.
+    Nothing,
+    /// Decided once the motion of the stage without contact is known.
+    Undecided,
+}
+
+/// Which rows a contact problem is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// All of them.
+    All,
+    /// Those that act on dofs without mass in an explicit stage: solved first, with the static balance of these dofs.
+    Massless,
+    /// The others, solved after that.
+    Massive,
+}
+
+impl Part {
+    /// Whether the problem is about a row.
+    pub(super) fn takes(self, on_massless: &[bool], row: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Massless => on_massless[row],
+            Self::Massive => !on_massless[row],
+        }
+    }
+}
+
+/// Buffers of the contact problem, one entry a candidate unless said otherwise.
+pub(super) struct ContactRowsWork<T> {
+    pub(super) rates: Vec<GapRates<T>>,
+    /// What is complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
+    pub(super) y: Vec<T>,
+    pub(super) tolerance: Vec<T>,
+    /// The weight of d in y.
+    pub(super) weight: Vec<T>,
+    /// The laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
+    pub(super) compliance: Vec<T>,
+    pub(super) shift: Vec<T>,
+    /// Gaps where the balance holds, for compliant laws.
+    pub(super) balance_gap: Vec<T>,
+    pub(super) curved: CurvedRowsWork<T>,
+    /// What each row constrains in this stage; for rows whose law reads it, the gap where the stage starts, and the gap
+    /// below which it counts as closed there.
+    pub(super) measure: Vec<Measure>,
+    pub(super) start_gap: Vec<T>,
+    pub(super) start_tolerance: Vec<T>,
+    /// Rows that may be pressed in this stage; at velocity level those whose gap is forecast to be closed.
+    pub(super) enabled: Vec<bool>,
+    /// Rows in the contact problem.
+    pub(super) in_problem: Vec<bool>,
+    /// Rows of [`Part::Massless`]; empty where dofs without mass are solved for with the others.
+    pub(super) on_massless: Vec<bool>,
+    /// Rows of the problem, and its data, one entry a row of the problem.
+    pub(super) problem: Vec<usize>,
+    /// Number of Delassus operators assembled so far: the newest version.
+    pub(super) versions: u64,
+    pub(super) offset: Vec<T>,
+    pub(super) problem_tolerance: Vec<T>,
+    pub(super) bounds: Vec<Bound>,
+    pub(super) multipliers: Vec<T>,
+    /// What contact constrains, and where the gap is forecast, one entry a dof; empty for schemes that impose contact
+    /// on the displacements of the new state.
+    pub(super) target: Vec<T>,
+    pub(super) forecast: Vec<T>,
+    /// Prescribed motions at the time of either.
+    pub(super) supports: Vec<[T; 3]>,
+}
+
+impl<T: Real> ContactRowsWork<T> {
+    /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of
+    /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed ones.
+    pub(super) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
+        let reserved = || Vec::with_capacity(rows);
+        let zero = || vec![T::zero(); rows];
+        Self {
+            rates: vec![GapRates::default(); rows],
+            y: zero(),
+            tolerance: zero(),
+            weight: zero(),
+            compliance: zero(),
+            shift: zero(),
+            balance_gap: zero(),
+            curved: CurvedRowsWork::new(rows, entries),
+            measure: vec![Measure::AsScheme; rows],
+            start_gap: zero(),
+            start_tolerance: zero(),
+            enabled: vec![true; rows],
+            in_problem: vec![false; rows],
+            on_massless: Vec::new(),
+            problem: Vec::with_capacity(rows),
+            versions: 0,
+            offset: reserved(),
+            problem_tolerance: reserved(),
+            bounds: Vec::with_capacity(rows),
+            multipliers: reserved(),
+            target: vec![T::zero(); target_dofs],
+            forecast: vec![T::zero(); forecast_dofs],
+            supports: vec![[T::zero(); 3]; supports],
+        }
+    }
+
+    /// Evaluates the gaps where a stage starts, if a law reads them; the rows are linearized there still.
+    pub(super) fn read_start(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        past: &[Motion<T>],
+        h: f64,
+    ) -> Result<()> {
+        let Self { measure, start_gap, start_tolerance, rates, curved, .. } = self;
+        curved.forget();
+        measure.fill(Measure::AsScheme);
+        let reads = constraints.reads_start() || constraints.laws().iter().any(ContactLaw::is_predictive);
+        let (Some(start), true) = (past.first(), reads) else { return Ok(()) };
+        constraints.finite_gaps(start.t, &start.u, start_gap)?;
+        constraints.finite_rates(start.t, &start.u, &start.v, rates)?;
+        for row in (0..constraints.len()).filter(|&row| constraints.law(row).reads_start()) {
+            let approach = T::of(h) * (g.product(row, &start.v) + rates[row].rate).abs();
+            let rounded = constraints.gap_rounding(row, g.magnitude(row, &start.u), start_gap[row]);
+            start_tolerance[row] = rounded + sliver(approach);
+            measure[row] = Measure::Undecided;
+        }
+        Ok(())
+    }
+
+    /// Decides what rows constrain whose law reads the gap at the start of the stage. y holds the gaps of its motion
+    /// without contact.
+    pub(super) fn decide(&mut self, constraints: &Constraints<'_, T>) {
+        let Self { y, measure, start_gap, start_tolerance, .. } = self;
+        for (row, measure) in measure[..constraints.len()].iter_mut().enumerate() {
+            if *measure != Measure::Undecided {
+                continue;
+            }
+            // A contact at rest has a gap that is small beside the way that its force prevents: that from the gap at
+            // the start to the gap of the free motion.
+            let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
+            *measure = match (constraints.law(row), closed) {
+                (ContactLaw::RateCondition, true) => Measure::Increment,
+                (ContactLaw::RateCondition, false) => Measure::Nothing,
+                (ContactLaw::PersistencySwitch, true) => Measure::Rate,
+                _ => Measure::AsScheme,
+            };
+        }
+    }
+
+    /// Turns the gaps in y, and their tolerances, into what is constrained by rows whose law reads the gap at the start
+    /// of the stage. `lacking` is the part of d on the interface that the velocities do not contain yet.
+    pub(super) fn measure(
+        &mut self,
+        stage: &CompiledStage<T>,
+        h: f64,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        new: &Motion<T>,
+        lacking: Option<&[T]>,
+    ) -> Result<()> {
+        if !constraints.reads_start() {
+            return Ok(());
+        }
+        let Self { rates, y, tolerance, measure, start_gap, .. } = self;
+        constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
+        let (h, weight) = (T::of(h), stage.recovery.weights()[1]);
+        for row in 0..constraints.len() {
+            match measure[row] {
+                Measure::AsScheme | Measure::Nothing | Measure::Undecided => {}
+                Measure::Increment => y[row] -= start_gap[row],
+                Measure::Rate => {
+                    let [part, size] = lacking.map_or([T::zero(); 2], |d| {
+                        [weight * g.interface_product(row, d), weight * g.interface_magnitude(row, d)]
+                    });
+                    let own = rates[row].rate;
+                    y[row] = h * (g.product(row, &new.v) + part + own);
+                    // Velocities that are differences of displacements have the rounding of those.
+                    let known = if stage.recovery.subtracts(1) { g.magnitude(row, &new.u) } else { T::zero() };
+                    tolerance[row] = rounding(known + h * (g.magnitude(row, &new.v) + size + own.abs()));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the gaps of the balance, to which the inertia of compliant laws is added next.
+    pub(super) fn keep_balance_gaps(&mut self) {
+        self.curved.foreseen.copy_from_slice(&self.balance_gap);
+    }
+
+    /// The weight of d in what a row constrains, if it is not that of the scheme.
+    pub(super) fn own_weight(&self, stage: &CompiledStage<T>, h: f64, row: usize) -> Option<T> {
+        (self.measure[row] == Measure::Rate).then(|| T::of(h) * stage.recovery.weights()[1])
+    }
+
+    /// Evaluates y of all rows at the target, and their tolerances: the rounding of y, and a fraction `approach` of the
+    /// way by which the gap changes in one step.
+    pub(super) fn evaluate(
+        &mut self,
+        level: &Level<'_, T>,
+        constraints: &mut Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        new: &Motion<T>,
+        approach: f64,
+    ) -> Result<()> {
+        let Self { rates, y, tolerance, target, .. } = self;
+        let h = level.clock.h;
+        let (t, values) = level.place(new, target);
+        if level.is_velocity() {
+            constraints.finite_rates(t, &new.u, &new.v, rates)?;
+            for row in 0..constraints.len() {
+                y[row] = g.product(row, values) + T::of(h) * rates[row].rate;
+                if !y[row].is_finite() {
+                    let (contact, value) = (constraints.ids[row], y[row].value());
+                    return Err(Error::ContactNotFinite { t, what: "the gap rate", contact, value });
+                }
+            }
+        } else {
+            constraints.finite_gaps(t, values, y)?;
+        }
+        for row in 0..constraints.len() {
+            tolerance[row] = match level.is_velocity() {
+                true => rounding(g.magnitude(row, values) + y[row].abs()),
+                false => constraints.gap_rounding(row, g.magnitude(row, values), y[row]),
+            };
+        }
+        if approach > 0.0 {
+            constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
+            for row in 0..constraints.len() {
+                let rate = g.product(row, &new.v) + rates[row].rate;
+                tolerance[row] += T::of(approach * h) * rate.abs();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a stage imposes contact.
+pub(super) struct Level<'s, T> {
+    pub(super) target: Option<&'s ContactTarget<T>>,
+    pub(super) clock: Clock,
+}
+
+impl<T: Real> Level<'_, T> {
+    pub(super) fn is_velocity(&self) -> bool {
+        self.target.is_some_and(|target| target.forecast.is_some())
+    }
+
+    /// Time and values that contact constrains.
+    pub(super) fn place<'v>(&self, new: &'v Motion<T>, target: &'v [T]) -> (f64, &'v [T]) {
+        match self.target {
+            None => (new.t, &new.u),
+            Some(rows) => (self.clock.at(rows.at), target),
+        }
+    }
+}
+
+/// The gap below which a contact counts as closed: 1e-10 of the way made in the step, plus its rounding.
+fn sliver<T: Real>(way: T) -> T {
+    T::of(1e-10) * way + rounding(way)
+}

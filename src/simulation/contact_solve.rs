@@ -1,0 +1,109 @@
+//! The contact of a stage: its problem is solved, and solved again with rows linearized at the result, until they fit
+//! it.
+
+use super::contact_step::{ContactStep, ContactWork};
+use super::curved_rows::{FOLLOWED, Miss};
+use super::interface::{advance, keep, restore};
+use super::operator::Operator;
+use super::stage_vectors::StageVectors;
+use crate::contact::Candidates;
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::Motion;
+use crate::system::System;
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces in
+    /// `interface.forces`. Motions are left as predicted. Says whether curved rows fit the resulting d.
+    pub(super) fn solve(
+        &mut self,
+        system: &mut dyn System<T>,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<bool> {
+        let dofs = self.constraints.interface();
+        keep(dofs, &new.u, &mut contact.interface.displacement);
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &vectors.balance) {
+            keep(dofs, &balance.u, &mut contact.interface.balance);
+        }
+        contact.interface.free.copy_from_slice(&contact.interface.increment);
+        self.aim(system, new, past, &vectors.supports.dofs, contact)?;
+        let result = self.settle(operator, new, past, vectors, contact);
+        let (dofs, interface) = (self.constraints.interface(), &contact.interface);
+        restore(dofs, &interface.displacement, &mut new.u);
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &mut vectors.balance) {
+            restore(dofs, &interface.balance, &mut balance.u);
+        }
+        if let Some(target) = &self.stage.contact {
+            advance(dofs, &interface.target, target.row.weight, &interface.increment, &mut contact.rows.target);
+        }
+        result
+    }
+
+    /// Solves with the rows as they are, then with rows linearized at the result, until they fit it.
+    pub(super) fn settle(
+        &mut self,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<bool> {
+        let mut miss = Miss::ALL;
+        for pass in 0..FOLLOWED {
+            match pass {
+                0 => self.observe(operator, new, past, vectors, contact)?,
+                _ => self.step_back(operator, new, vectors, contact)?,
+            }
+            let needed = self.condition(new, contact);
+            match needed {
+                true => self.press(operator, new.t, contact)?,
+                false => self.release(contact),
+            }
+            if self.constraints.is_affine() {
+                return Ok(true);
+            }
+            self.foresee(needed, contact);
+            if self.follow(new, vectors, contact)? == Candidates::Unchanged {
+                contact.rows.curved.miss = 0.0;
+                return Ok(true);
+            }
+            operator.follow(contact.rows.curved.version(self.constraints));
+            let before = std::mem::replace(&mut miss, self.miss(new, contact)?);
+            contact.rows.curved.miss = miss.largest();
+            if miss.is_settled::<T>(pass + 1, before) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Evaluates y of every row at d without contact, with the rows as they are, after the forces of compliant laws
+    /// that do not depend on d are applied.
+    pub(super) fn observe(
+        &mut self,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        self.weigh(&mut contact.rows);
+        self.place(new, vectors, contact);
+        if self.constraints.has_compliant() {
+            self.balance_gaps(new, vectors, contact)?;
+            self.add_inertia(new, vectors, contact)?;
+            if self.press_without_coupling(operator, contact)? {
+                self.place(new, vectors, contact);
+                self.balance_gaps(new, vectors, contact)?;
+                self.add_inertia(new, vectors, contact)?;
+            }
+        }
+        self.evaluate(new, contact)?;
+        self.extrapolate(new, contact);
+        self.restitution(past, &mut contact.rows)
+    }
+}

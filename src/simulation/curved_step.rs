@@ -1,0 +1,181 @@
+//! Curved rows in the contact of a stage: linearized again at its result, and compared with what was solved.
+
+use super::contact_rows::{ContactRowsWork, Level};
+use super::contact_step::{ContactStep, ContactWork};
+use super::curved_rows::{Miss, NEAR, NOISE};
+use super::interface::keep;
+use super::operator::Operator;
+use super::stage_vectors::StageVectors;
+use crate::contact::{Candidates, ContactJacobian};
+use crate::corrector::{Gaps, rounding};
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::Motion;
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Extrapolates gaps along the force rows F, not G, from where the last iteration of Newton's method has linearized
+    /// them to d without contact: contact forces move gaps back along F. Otherwise each iteration would begin with the
+    /// difference between G and F as an error.
+    pub(super) fn extrapolate(&self, new: &Motion<T>, contact: &mut ContactWork<T>) {
+        let ContactWork { rows, interface, .. } = contact;
+        if !rows.curved.apart {
+            return;
+        }
+        let level = Level { target: self.stage.contact.as_ref(), clock: self.clock };
+        let (_, values) = level.place(new, &rows.target);
+        let way = self.constraints.interface().iter().zip(&interface.followed);
+        for ((&dof, &from), way) in way.zip(&mut interface.tried) {
+            *way = values[dof] - from;
+        }
+        for row in 0..self.constraints.len() {
+            let along = |g: &ContactJacobian<T>| g.interface_product(row, &interface.tried);
+            rows.y[row] += along(&rows.curved.rows) - along(self.g);
+        }
+    }
+
+    /// Goes back to d without contact, and extrapolates y to it from the newest linearization.
+    pub(super) fn step_back(
+        &mut self,
+        operator: &mut Operator<T>,
+        new: &Motion<T>,
+        vectors: &StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let interface = &mut contact.interface;
+        interface.tried.copy_from_slice(&interface.increment);
+        interface.increment.copy_from_slice(&interface.free);
+        interface.forces.fill(T::zero());
+        if self.constraints.has_compliant() {
+            self.balance_gaps_from_tried(contact);
+            self.add_inertia(new, vectors, contact)?;
+            if self.press_without_coupling(operator, contact)? {
+                self.balance_gaps_from_tried(contact);
+                self.add_inertia(new, vectors, contact)?;
+            }
+        }
+        let [rigid, ..] = self.weights();
+        let ContactWork { rows, interface, .. } = contact;
+        for (tried, &d) in interface.tried.iter_mut().zip(&interface.increment) {
+            *tried = d - *tried;
+        }
+        let forces = rows.curved.forces(self.g);
+        for row in 0..self.constraints.len() {
+            // (A predictive law reads the gap that the scheme constrains.)
+            let weight = if self.constraints.law(row).is_predictive() { rigid } else { rows.weight[row] };
+            rows.y[row] += weight * forces.interface_product(row, &interface.tried);
+            rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
+        }
+        Ok(())
+    }
+
+    /// Extrapolates the gaps of the balance to d from the d that was tried last.
+    fn balance_gaps_from_tried(&self, contact: &mut ContactWork<T>) {
+        let [_, balance_u, _] = self.weights();
+        let ContactWork { rows, interface, .. } = contact;
+        let forces = rows.curved.forces(self.g);
+        for row in 0..self.constraints.len() {
+            let way =
+                forces.interface_product(row, &interface.increment) - forces.interface_product(row, &interface.tried);
+            rows.balance_gap[row] = rows.curved.gaps[row] + balance_u * way;
+        }
+        rows.keep_balance_gaps();
+    }
+
+    /// Keeps the gaps that this linearization foresees at the resulting d.
+    pub(super) fn foresee(&self, needed: bool, contact: &mut ContactWork<T>) {
+        let [_, balance_u, _] = self.weights();
+        let ContactRowsWork { y, weight, curved, .. } = &mut contact.rows;
+        for row in 0..self.constraints.len() {
+            let compliant = self.constraints.law(row).is_compliant();
+            let (start, weight) = if compliant { (curved.foreseen[row], balance_u) } else { (y[row], weight[row]) };
+            let way = match needed {
+                true => curved.forces(self.g).interface_product(row, &contact.interface.response),
+                false => T::zero(),
+            };
+            curved.foreseen[row] = start + weight * way;
+        }
+    }
+
+    /// Linearizes the rows at the resulting d: G where contact is imposed, F where the balance holds. Says whether any
+    /// has changed.
+    pub(super) fn follow(
+        &mut self,
+        new: &mut Motion<T>,
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<Candidates> {
+        let level = Level { target: self.stage.contact.as_ref(), clock: self.clock };
+        if level.is_velocity() {
+            return Ok(Candidates::Unchanged);
+        }
+        self.place(new, vectors, contact);
+        let version = self.constraints.version();
+        let elsewhere = self.stage.balance.is_some() || self.stage.contact.is_some();
+        let (t, balanced) = self.balanced(new, vectors.balance.as_ref());
+        let curved = &mut contact.rows.curved;
+        let compliant = self.constraints.has_compliant();
+        if elsewhere {
+            self.constraints.follow(t, &balanced.u, self.g)?;
+            if compliant {
+                self.constraints.finite_gaps(t, &balanced.u, &mut curved.gaps)?;
+            }
+            curved.apart = false;
+            curved.hold(self.g, self.constraints);
+        }
+        let (at, values) = level.place(new, &contact.rows.target);
+        self.constraints.follow(at, values, self.g)?;
+        keep(self.constraints.interface(), values, &mut contact.interface.followed);
+        let curved = &mut contact.rows.curved;
+        if compliant && !elsewhere {
+            self.constraints.finite_gaps(t, &new.u, &mut curved.gaps)?;
+        }
+        if elsewhere {
+            curved.release(self.constraints);
+        }
+        Ok(match self.constraints.version() == version {
+            true => Candidates::Unchanged,
+            false => Candidates::Changed,
+        })
+    }
+
+    /// How much gaps and forces of the rows linearized at d differ from those that were solved for. Leaves y of the
+    /// rows at the d that was placed.
+    pub(super) fn miss(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> Result<Miss> {
+        self.evaluate(new, contact)?;
+        let Self { constraints, g, part, .. } = self;
+        let ContactWork { rows, trial, interface, .. } = contact;
+        let forces = rows.curved.forces(g);
+        let (mut worst, mut largest) = ((0, T::zero()), 0.0_f64);
+        interface.response.fill(T::zero());
+        for row in (0..constraints.len()).filter(|&row| part.takes(&rows.on_massless, row)) {
+            let (law, lambda) = (constraints.law(row), trial.lambda_raw[row]);
+            forces.interface_scatter(row, lambda, &mut interface.response);
+            let mut scale = rows.weight[row].abs() * forces.interface_magnitude(row, &interface.increment);
+            let (mut y, mut tolerance) = (rows.y[row], rows.tolerance[row]);
+            if law.is_compliant() {
+                y = rows.curved.gaps[row];
+                tolerance = constraints.gap_rounding(row, g.magnitude(row, &new.u), y);
+                scale = scale.max(y.abs());
+            }
+            let pressed = lambda > T::zero() || law.is_equality();
+            let miss = match pressed {
+                true => (y - rows.curved.foreseen[row]).abs(),
+                false if rows.enabled[row] => -y,
+                false => T::zero(),
+            };
+            let beyond = miss - tolerance;
+            if beyond > T::zero() {
+                // (Where d moves nothing, the tolerance is the scale that is left.)
+                largest = largest.max((beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value());
+            }
+            if miss > worst.1 {
+                worst = (row, miss);
+            }
+        }
+        let moved = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| (new - old).value().powi(2));
+        let size = interface.forces.iter().map(|force| force.value().powi(2)).sum::<f64>();
+        let force = if size > 0.0 { (moved.sum::<f64>() / size).sqrt() } else { 0.0 };
+        rows.curved.worst = worst;
+        Ok(Miss { gap: largest, force })
+    }
+}

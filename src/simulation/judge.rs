@@ -1,0 +1,179 @@
+//! Settings of the step-size control, and the judgement of a step: fine enough, or too coarse.
+
+use crate::analysis::LocalError;
+use crate::error::{Error, Result, positive};
+use crate::real::Real;
+use crate::state::{Motion, State};
+
+/// How a run changes its step size by itself.
+///
+/// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a
+/// smaller one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is
+/// taken again with half the size; after two steps that went well the size doubles where that meets the nominal grid
+/// again, so every nominal time is met. If doubling fails at once, it waits twice as long the next time.
+///
+/// Two judgements may be added: an estimate of the [local error](Self::local_error), and a limit to the
+/// [contacts that change](Self::contact_changes) in a step. At the smallest size a judgement refuses nothing: the step
+/// is taken and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
+/// [`Error::StepRefused`], and the run is as it was before the step, with the step size it had.
+///
+/// Changes of the step size allocate, factorize, and resample the past of multistep schemes
+/// ([`set_step_size`](crate::Simulation::set_step_size)).
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation, StepControl};
+///
+/// // A mass flies at a wall; far from it large steps will do.
+/// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Newmark::trapezoidal(), 0.1)
+///     .velocity(vec![-1.0])
+///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.03))
+///     .corrector(PersistencyCorrection::new())
+///     .step_control(StepControl::halving(1e-4)?.local_error(1e-3)?)
+///     .build()?;
+/// let mut smallest = 0.1_f64;
+/// run.run_until(2.0, &mut |step: &contact_dynamics::StepView<'_, f64>| {
+///     smallest = smallest.min(step.h);
+///     contact_dynamics::Control::Continue
+/// })?;
+/// // The impact is met by steps in which the mass travels no more than the tolerance; the others are large again.
+/// assert!(smallest <= 1e-3 && run.step_size() == 0.1);
+/// assert!(run.statistics().steps < 60 && run.statistics().refused_steps >= 7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepControl {
+    pub(super) smallest: f64,
+    tolerance: Option<f64>,
+    changes: Option<usize>,
+}
+
+impl StepControl {
+    /// Halving of refused steps down to `smallest` (time), not below.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn halving(smallest: f64) -> Result<Self> {
+        positive("the smallest step size", smallest)?;
+        Ok(Self { smallest, tolerance: None, changes: None })
+    }
+
+    /// Refuses steps whose local error in any displacement is estimated at more than `tolerance` (length).
+    ///
+    /// The estimate is the difference between a step and Taylor's expansion of the state it starts from (v and a at the
+    /// time of the state), times a factor that follows from the tableau
+    /// ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or opens the
+    /// motion is not smooth and the factor is 1; the estimate is then about the velocity that the contact lost times
+    /// the step size, as the instant of impact is uncertain by a step. Velocities are compared as well as
+    /// displacements, so corrections do not hide an impact. Schemes that impose contact ahead of the state show an
+    /// impact one step late, and with some schemes of first order the error of the velocity does not show at all:
+    /// `build` refuses both.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn local_error(self, tolerance: f64) -> Result<Self> {
+        positive("the tolerance of the local error", tolerance)?;
+        Ok(Self { tolerance: Some(tolerance), ..self })
+    }
+
+    /// Refuses steps in which more than `limit` contacts close or open.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for zero.
+    pub fn contact_changes(self, limit: usize) -> Result<Self> {
+        match limit {
+            0 => Err(Error::Parameter { name: "the limit of contact changes", value: 0.0, range: "1 or more" }),
+            limit => Ok(Self { changes: Some(limit), ..self }),
+        }
+    }
+
+    pub(super) fn estimates(&self) -> bool {
+        self.tolerance.is_some()
+    }
+}
+
+/// What became of a step that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    Accepted,
+    /// It was judged too coarse, and undone.
+    Coarse,
+}
+
+/// Judges steps by the settings of the control.
+pub(super) struct Judge<T> {
+    pub(super) control: StepControl,
+    /// The factor of the error estimate, if errors are estimated.
+    pub(super) local: Option<LocalError>,
+    /// u, v and a at the time of the state that the step starts from; empty if errors are not estimated.
+    start: Motion<T>,
+    /// Whether steps are accepted though too coarse: they cannot be smaller.
+    pub(super) suspended: bool,
+    /// The estimate of the step judged last, as a length and divided by the tolerance.
+    pub(super) estimate: f64,
+    excess: f64,
+    /// Whether the step judged last was too coarse.
+    pub(super) coarse: bool,
+}
+
+impl<T: Real> Judge<T> {
+    pub(super) fn new(control: StepControl, local: Option<LocalError>, dofs: usize) -> Self {
+        let start = Motion::zero(if local.is_some() { dofs } else { 0 });
+        Self { control, local, start, suspended: false, estimate: 0.0, excess: 0.0, coarse: false }
+    }
+
+    /// Remembers the state that a step starts from.
+    pub(super) fn begin(&mut self, state: &State<T>) {
+        if self.local.is_some() {
+            self.start.u.copy_from_slice(state.displacement());
+            self.start.v.copy_from_slice(state.velocity());
+            self.start.a.copy_from_slice(state.acceleration());
+        }
+    }
+
+    /// Judges a step that ends with u and v after `changes` of contact.
+    pub(super) fn judge(&mut self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64, changes: usize) -> Verdict {
+        self.excess = 0.0;
+        if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
+            let factor = if changes > 0 { 1.0 } else { local.factor };
+            self.estimate = factor * self.distance([u, v], prescribed, h);
+            self.excess = self.estimate / tolerance;
+        }
+        // Written so that NaN is refused.
+        let fine = self.excess <= 1.0 && self.control.changes.is_none_or(|limit| changes <= limit);
+        self.coarse = !fine;
+        match fine || self.suspended {
+            true => Verdict::Accepted,
+            false => Verdict::Coarse,
+        }
+    }
+
+    /// Largest distance of the free dofs from Taylor's expansion, in u and in h v.
+    fn distance(&self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64) -> f64 {
+        let Motion { u: u0, v: v0, a: a0, .. } = &self.start;
+        let mut prescribed = prescribed.iter().peekable();
+        let mut largest = 0.0_f64;
+        for dof in 0..u.len() {
+            if prescribed.next_if(|&&other| other == dof).is_some() {
+                continue;
+            }
+            let (rate, acceleration) = (v0[dof].value(), a0[dof].value());
+            let in_u = (u[dof] - u0[dof]).value() - h * (rate + 0.5 * h * acceleration);
+            let in_v = h * ((v[dof] - v0[dof]).value() - h * acceleration);
+            let distance = in_u.abs().max(in_v.abs());
+            if distance > largest || distance.is_nan() {
+                largest = distance;
+            }
+        }
+        largest
+    }
+
+    /// Whether the error of a step twice as large can be expected to be half the tolerance at most.
+    pub(super) fn may_grow(&self) -> bool {
+        self.local.is_none_or(|local| self.excess * f64::from(1_u32 << local.power) <= 0.5)
+    }
+}

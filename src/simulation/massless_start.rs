@@ -1,0 +1,171 @@
+//! Dofs without mass at the start of a run: brought into static balance with the others, the load and contact.
+
+use super::constraints::Constraints;
+use super::massless::{Columns, Embedded, is_damped};
+use super::operator::Operator;
+use crate::contact::{Candidates, ContactJacobian};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::corrector::{Gaps, contact_error};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::Motion;
+use crate::system::System;
+
+/// How dofs without mass were moved when a simulation was built, before its first step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartAdjustment<T> {
+    /// Change of the potential energy, that of the load (minus its force times the displacement) included; not
+    /// positive. The run would have lost this energy in a jump. None if the system has no potential.
+    pub energy: Option<T>,
+    /// The largest change of a displacement (length).
+    pub largest: T,
+    /// The dof that has moved most.
+    pub dof: usize,
+}
+
+/// The most iterations of the balance at the start. Linear systems take two.
+const ITERATIONS: usize = 30;
+
+/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method: f_b + Gᵀ
+/// λ = 0, 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that
+/// damping acts on: their displacements are initial values of their own.
+pub(super) fn balance_start<T: Real>(
+    system: &mut dyn System<T>,
+    solver: &mut dyn ContactSolver<T>,
+    (constraints, g): (&mut Constraints<'_, T>, &mut ContactJacobian<T>),
+    motion: &mut Motion<T>,
+    dofs: &[usize],
+    [h, ahead]: [f64; 2],
+) -> Result<Option<StartAdjustment<T>>> {
+    if dofs.is_empty() || is_damped(system, dofs) {
+        return Ok(None);
+    }
+    let t = motion.t;
+    let given = motion.u.clone();
+    let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+    let interface = constraints.interface().to_vec();
+    let mut residual = vec![T::zero(); motion.u.len()];
+    let (mut on_interface, mut forces) = (vec![T::zero(); interface.len()], vec![T::zero(); interface.len()]);
+    let mut first = T::zero();
+    for iteration in 0..ITERATIONS {
+        system.force(t, &motion.u, &motion.v, &mut residual)?;
+        let columns = Columns::of(system, dofs, motion)?;
+        let factor = match Embedded::factorized(&columns, dofs, &interface) {
+            Ok(factor) => factor,
+            // Without a symmetric positive definite stiffness of their own no balance is sought. Whether the scheme can
+            // do with that, the step decides.
+            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => {
+                motion.u = given;
+                constraints.search(motion, ahead, g)?;
+                return Ok(None);
+            }
+            Err(other) => return Err(other),
+        };
+        let mut operator = Operator::of_part(Box::new(factor), constraints.capacity(), &interface)?;
+        operator.begin(&mut residual, &mut on_interface)?;
+        let sliver = press_start(
+            solver,
+            (&mut *constraints, &*g),
+            &mut operator,
+            motion,
+            dofs,
+            [&mut on_interface, &mut forces],
+        )?;
+        operator.finish(&mut residual, &on_interface, &forces)?;
+        let size = dofs.iter().fold(T::zero(), |size, &dof| {
+            let d = residual[dof].abs();
+            if d > size || d.is_nan() { d } else { size }
+        });
+        if !size.is_finite() {
+            let (dof, value) = (dofs[0], size.value());
+            return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
+        }
+        let scale = largest(&motion.u).max(largest(&given));
+        // (Gaps are met within their own rounding, which may be larger than that of displacements: they are computed
+        // from coordinates.)
+        let settled = size <= T::of(1e3) * T::epsilon() * scale + T::of(4.0) * sliver;
+        if iteration == 0 {
+            if settled {
+                return Ok(None);
+            }
+            first = size;
+        }
+        for &dof in dofs {
+            motion.u[dof] += residual[dof];
+        }
+        let moved = constraints.follow(t, &motion.u, g)?;
+        if settled || moved == Candidates::Unchanged && size <= T::of(1e-12) * first {
+            let moves = |dof: usize| motion.u[dof] - given[dof];
+            let &dof =
+                dofs.iter().max_by(|&&i, &&j| moves(i).abs().value().total_cmp(&moves(j).abs().value())).unwrap_or(&0);
+            let energies = [system.potential_energy(&given), system.potential_energy(&motion.u)];
+            system.external_load(t, &mut residual);
+            let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
+            let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
+            return Ok(Some(StartAdjustment { energy, largest: moves(dof).abs(), dof }));
+        }
+    }
+    Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: dofs[0] })
+}
+
+/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns
+/// the largest tolerance of a gap, as a displacement.
+fn press_start<T: Real>(
+    solver: &mut dyn ContactSolver<T>,
+    (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
+    operator: &mut Operator<T>,
+    motion: &Motion<T>,
+    dofs: &[usize],
+    [on_interface, forces]: [&mut Vec<T>; 2],
+) -> Result<T> {
+    let (t, rows) = (motion.t, constraints.len());
+    let (mut gaps, mut versions) = (vec![T::zero(); rows], 0);
+    constraints.finite_gaps(t, &motion.u, &mut gaps)?;
+    forces.fill(T::zero());
+    let tolerance: Vec<T> =
+        (0..rows).map(|row| constraints.gap_rounding(row, g.magnitude(row, &motion.u), gaps[row])).collect();
+    let candidates: Vec<usize> = (0..rows).filter(|&row| g.acts_on(row, dofs)).collect();
+    // Compliance and shift of the laws, linearized at the present gaps.
+    let laws: Vec<[T; 2]> = (0..rows)
+        .map(|row| {
+            let law = constraints.law(row);
+            let depth = (-gaps[row]).max(tolerance[row]);
+            let (compliance, shift) = law.linearized(depth, T::zero());
+            if law.is_compliant() { [compliance, shift] } else { [T::zero(); 2] }
+        })
+        .collect();
+    let free: Vec<T> = (0..rows).map(|row| gaps[row] + g.interface_product(row, on_interface) + laws[row][1]).collect();
+    let mut problem: Vec<usize> = Vec::new();
+    let mut response = vec![T::zero(); on_interface.len()];
+    loop {
+        let pushed = |&row: &usize| {
+            let y = free[row] + g.interface_product(row, &response);
+            !problem.contains(&row) && (y < -tolerance[row] || constraints.law(row).is_equality())
+        };
+        let joining: Vec<usize> = candidates.iter().copied().filter(pushed).collect();
+        if joining.is_empty() {
+            break;
+        }
+        problem.extend(joining);
+        problem.sort_unstable();
+        let pick = |values: &[T]| -> Vec<T> { problem.iter().map(|&row| values[row]).collect() };
+        let (offset, rounded) = (pick(&free), pick(&tolerance));
+        let bounds: Vec<Bound> = problem.iter().map(|&row| constraints.law(row).into()).collect();
+        let (delassus, version) = operator.delassus(g, &problem, |k| laws[problem[k]][0], &mut versions)?;
+        let data = ContactProblem { delassus, offset: &offset, bounds: &bounds, tolerance: &rounded, version };
+        let mut lambda = vec![T::zero(); problem.len()];
+        solver.reserve(problem.len());
+        solver
+            .solve(&data, &mut lambda)
+            .map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))?;
+        response.fill(T::zero());
+        forces.fill(T::zero());
+        for (&row, &lambda) in problem.iter().zip(&lambda) {
+            T::axpy(lambda, operator.response(row), &mut response);
+            g.interface_scatter(row, lambda, forces);
+        }
+    }
+    T::axpy(T::one(), &response, on_interface);
+    // (Rows are taken to have unit weights: a gap is then as long as the displacement that closes it.)
+    Ok(problem.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
+}

@@ -1,0 +1,51 @@
+//! Bodies that overlap when a run starts: the depths, and what is left of them later.
+
+use crate::contact::ContactId;
+use crate::real::Real;
+
+/// Depths at the start of a run, which are added to the gaps from then on, or for a while.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Overclosures<T> {
+    /// (constraint, feature) and what is added, ascending.
+    depths: Vec<((usize, usize), T)>,
+    start: f64,
+    /// The time over which they are removed.
+    over: Option<f64>,
+}
+
+impl<T: Real> Overclosures<T> {
+    /// From the gaps of contacts at the start; of a feature with several the deepest counts.
+    pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
+        let mut depths: Vec<((usize, usize), T)> = Vec::new();
+        for &(id, gap) in gaps {
+            let feature = (id.constraint, id.feature);
+            match depths.iter_mut().find(|(other, _)| *other == feature) {
+                Some((_, depth)) => *depth = depth.max(-gap),
+                None => depths.push((feature, -gap)),
+            }
+        }
+        depths.sort_unstable_by_key(|(feature, _)| *feature);
+        Self { depths, start, over }
+    }
+
+    /// Whether the depths are removed in time.
+    pub(super) fn vary(&self) -> bool {
+        self.over.is_some()
+    }
+
+    /// The share that is left at t, with its first two derivatives.
+    pub(super) fn share(&self, t: f64) -> [f64; 3] {
+        let Some(over) = self.over else { return [1.0, 0.0, 0.0] };
+        let x = ((t - self.start) / over).max(0.0);
+        if x >= 1.0 {
+            return [0.0; 3];
+        }
+        [1.0 - x * x * (3.0 - 2.0 * x), -6.0 * x * (1.0 - x) / over, (12.0 * x - 6.0) / (over * over)]
+    }
+
+    /// The depth of a contact.
+    pub(super) fn of(&self, id: ContactId) -> T {
+        let found = self.depths.binary_search_by_key(&(id.constraint, id.feature), |(feature, _)| *feature);
+        found.map_or(T::zero(), |at| self.depths[at].1)
+    }
+}

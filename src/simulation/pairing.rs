@@ -1,0 +1,136 @@
+//! Whether the parts of a run go together: the scheme with dofs without mass, with corrections, damping and paths, and
+//! with an estimate of the local error.
+
+use super::constraints::Constraints;
+use super::scheme::Scheme;
+use crate::analysis::{self, LocalError};
+use crate::contact::ContactLaw;
+use crate::corrector::Corrector;
+use crate::error::{Error, Result};
+use crate::integrator::TimeIntegrator;
+use crate::real::Real;
+use crate::state::Motion;
+use crate::system::{Damping, Path, PathForce, System};
+use crate::tableau::{ContactLevel, Tableau};
+
+/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
+/// they follow statically before the other dofs move.
+pub(super) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
+    let Some(dof) = dof else { return Ok(false) };
+    let reason = match analysis::massless_factor(&scheme.tableau) {
+        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(false),
+        Some(_) => {
+            "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
+             choose a scheme that damps high frequencies, or give the dof a mass"
+        }
+        None if analysis::massless_follow(&scheme.tableau) => return Ok(true),
+        None => {
+            "its balance does not determine the displacement of a dof without mass at the end of the step; choose \
+             central differences or an implicit scheme, or give the dof a mass"
+        }
+    };
+    Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
+}
+
+/// Refuses corrections of contact that is not imposed on the displacements of the state, and those that cannot act.
+pub(super) fn check_corrections<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    system: &mut dyn System<T>,
+    correctors: &[Box<dyn Corrector<T> + '_>],
+) -> Result<()> {
+    let refuse = |corrector: &dyn Corrector<T>, reason| {
+        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
+    let Some(corrector) = correctors.first() else { return Ok(()) };
+    for stage in &tableau.stages {
+        let reason = match stage.contact {
+            ContactLevel::POSITION => continue,
+            ContactLevel::Position { .. } => {
+                "the scheme imposes contact ahead of the state, whose velocity still approaches"
+            }
+            ContactLevel::Velocity { .. } => {
+                "the scheme imposes contact on velocities, which leaves no jump to correct"
+            }
+        };
+        return refuse(&**corrector, reason);
+    }
+    let damping = damping(system);
+    for corrector in correctors {
+        let mut checked = corrector.check(tableau);
+        if damping == Damping::Present {
+            checked = checked.and_then(|()| corrector.check_damping(tableau));
+        }
+        if let Err(reason) = checked {
+            return refuse(&**corrector, reason);
+        }
+    }
+    Ok(())
+}
+
+/// What the local error of a scheme follows from; refused where contact would not show in it.
+pub(super) fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError> {
+    let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
+    let refuse = |reason| {
+        let part = format!("an estimate of the local error with {}", scheme.integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
+    if rows > 0 && ahead {
+        return refuse(
+            "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
+        );
+    }
+    match analysis::local_error(&scheme.tableau) {
+        Some(error) => Ok(error),
+        None => refuse("what it errs in velocity does not show in one step"),
+    }
+}
+
+/// Refuses systems that have neither a potential nor a force of their own for paths.
+pub(super) fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_>, motion: &Motion<T>) -> Result<()> {
+    let path = Path { from: &motion.u, to: &motion.u, mean: &motion.u };
+    let own = system.force_along(motion.t, path, &motion.v, &mut vec![T::zero(); motion.u.len()])?;
+    match own == PathForce::Present || system.potential_energy(&motion.u).is_some() {
+        true => Ok(()),
+        false => Err(Error::Incompatible {
+            part: scheme.integrator.name(),
+            reason: "the system gives neither a potential energy nor a force along paths, so its energy is not defined",
+        }),
+    }
+}
+
+/// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.
+pub(super) fn check_lagged_damping<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    system: &mut dyn System<T>,
+) -> Result<()> {
+    let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
+    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
+    if lags && grows() && damping(system) == Damping::Present {
+        return Err(Error::Incompatible {
+            part: integrator.name(),
+            reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
+                     size; choose a member with more numerical damping",
+        });
+    }
+    Ok(())
+}
+
+/// Whether a system has damping.
+pub(super) fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
+    let still = vec![T::zero(); system.dofs()];
+    system.damping_force(&still, &still, &mut still.clone())
+}
+
+/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
+/// known yet), on dofs with mass.
+pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
+    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
+    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
+        && constraints.capacity() > 0
+        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
+        && constraints.interface().iter().any(has_mass)
+}

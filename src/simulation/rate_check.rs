@@ -1,0 +1,80 @@
+//! A comparison of gap rates with the gaps: a constraint that moves must say so in its rates.
+
+use super::constraints::Constraints;
+use crate::contact::{ContactJacobian, GapRates};
+use crate::corrector::Gaps;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::state::Motion;
+
+/// Memory for the comparison, one entry a row.
+pub(super) struct RateCheck<T> {
+    /// Gaps at two times.
+    before: Vec<T>,
+    now: Vec<T>,
+    rates: Vec<GapRates<T>>,
+    /// Whether the gap has moved all the time, and the rates have been zero.
+    silent: Vec<bool>,
+}
+
+impl<T: Real> RateCheck<T> {
+    /// Memory for `rows` rows.
+    pub(super) fn new(rows: usize) -> Self {
+        Self {
+            before: vec![T::zero(); rows],
+            now: vec![T::zero(); rows],
+            rates: vec![GapRates::default(); rows],
+            silent: vec![false; rows],
+        }
+    }
+
+    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates
+    /// are zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
+    pub(super) fn check(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        motion: &Motion<T>,
+        h: f64,
+        jacobian: &ContactJacobian<T>,
+    ) -> Result<()> {
+        /// Times, in shares of h: no motion of some frequency is at rest in all of them.
+        const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
+        let count = constraints.len();
+        let Self { before, now, rates, silent } = self;
+        for (row, silent) in silent[..count].iter_mut().enumerate() {
+            // A spring asks for no rates.
+            *silent = !(constraints.law(row).is_compliant() && constraints.law(row).inertia() == 0.0);
+        }
+        let mut first = T::zero();
+        let mut found = None;
+        for (k, share) in SHARES.into_iter().enumerate() {
+            if !silent[..count].contains(&true) {
+                break;
+            }
+            let t = motion.t + share * h;
+            std::mem::swap(before, now);
+            constraints.finite_gaps(t, &motion.u, now)?;
+            constraints.finite_rates(t, &motion.u, &motion.v, rates)?;
+            for row in 0..count {
+                let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
+                let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
+                silent[row] &= moves && rates[row].rate == T::zero();
+            }
+            found = silent[..count].iter().position(|silent| *silent);
+        }
+        if let Some(row) = found {
+            // (The gap at the start, again.)
+            constraints.finite_gaps(motion.t, &motion.u, before)?;
+            first = before[row];
+        }
+        let last = found.map_or(first, |row| now[row]);
+        match found {
+            None => Ok(()),
+            Some(row) => Err(Error::SilentMotion {
+                contact: constraints.ids[row],
+                t: [motion.t, motion.t + h],
+                gap: [first.value(), last.value()],
+            }),
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! A run: its parts, what is read of it, and how it is put back after a failed step.
+
+use super::constraints::Constraints;
+use super::energy::{self, Ledger};
+use super::judge::Judge;
+use super::massless_start::StartAdjustment;
+use super::newton::Iteration;
+use super::operator::Operator;
+use super::program::Program;
+use super::results::{Energy, Statistics};
+use super::scheme::Scheme;
+use super::stability::StepLimit;
+use super::workspace::Workspace;
+use crate::contact::ContactJacobian;
+use crate::contact_solver::ContactSolver;
+use crate::corrector::Corrector;
+use crate::error::{Error, Result};
+use crate::linear_solver::LinearSolver;
+use crate::real::Real;
+use crate::state::{History, State};
+use crate::system::System;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// Advances a system in time; made by [`Simulation::builder`].
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{Composite, LinearRows, LinearSystem, PersistencyCorrection, Simulation};
+///
+/// // A ball of unit mass flies with speed 2 toward a wall 1 away.
+/// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Composite, 0.01)
+///     .velocity(vec![-2.0])
+///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.0))
+///     .corrector(PersistencyCorrection::with_history_projection())
+///     .build()?;
+/// run.run_until(1.0, &mut ())?;
+/// // A rigid ball loses its velocity: contact without a rebound law is plastic.
+/// assert!((run.state().displacement()[0] + 1.0).abs() < 1e-12);
+/// assert!(run.state().velocity()[0].abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Simulation<'a, T: Real> {
+    pub(super) system: Box<dyn System<T> + 'a>,
+    pub(super) constraints: Constraints<'a, T>,
+    /// The rows of G of all constraints.
+    pub(super) g: ContactJacobian<T>,
+    pub(super) contact_solver: Box<dyn ContactSolver<T> + 'a>,
+    pub(super) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
+    pub(super) linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    pub(super) scheme: Scheme<'a>,
+    pub(super) program: Program<T>,
+    pub(super) limit: StepLimit,
+    /// The one-step scheme of the first steps; none once the past is known.
+    pub(super) startup: Option<Program<T>>,
+    pub(super) state: State<T>,
+    pub(super) history: History<T>,
+    pub(super) work: Workspace<T>,
+    pub(super) ledger: Option<Ledger<T>>,
+    /// For runs that control their step size.
+    pub(super) judge: Option<Judge<T>>,
+    pub(super) adjustment: Option<StartAdjustment<T>>,
+    pub(super) statistics: Statistics,
+    /// Whether a callback of the host has panicked.
+    pub(super) poisoned: bool,
+}
+
+impl<T: Real> std::fmt::Debug for Simulation<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Simulation")
+            .field("integrator", &self.scheme.integrator.name())
+            .field("dofs", &self.system.dofs())
+            .field("constraints", &self.constraints)
+            .field("correctors", &self.correctors)
+            .field("time", &self.state.motion.t)
+            .field("statistics", &self.statistics)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<T: Real> Simulation<'_, T> {
+    /// The state at the end of the last step.
+    pub fn state(&self) -> &State<T> {
+        &self.state
+    }
+
+    /// The past states that later steps read.
+    pub fn history(&self) -> &History<T> {
+        &self.history
+    }
+
+    /// Time at the end of the last step.
+    pub fn time(&self) -> f64 {
+        self.history.clock.at(0.0)
+    }
+
+    /// Gaps at the end of the last step, one a candidate.
+    pub fn gaps(&self) -> &[T] {
+        &self.state.contacts.gap
+    }
+
+    /// Work counts.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// How dofs without mass were moved when the simulation was built, because they were not in static balance with the
+    /// others, the load and contact. (They would have jumped in the first step, and the energy balance would not have
+    /// shown what this costs.) None if none was moved.
+    pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
+        self.adjustment
+    }
+
+    /// Number of scalars in the factors of the effective matrices.
+    pub fn factor_size(&self) -> usize {
+        self.program.operators.iter().map(Operator::stored_values).sum()
+    }
+
+    /// The system.
+    pub fn system(&self) -> &dyn System<T> {
+        &*self.system
+    }
+
+    /// The iterations of Newton's method in the stage that was solved last, also if it failed; empty for linear systems
+    /// and for stages that are linear in their unknown.
+    ///
+    /// ```
+    /// # use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// # use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// # let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// # let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1).build()?;
+    /// run.step()?;
+    /// for iteration in run.convergence() {
+    ///     println!("{:.1e} {:.1e}", iteration.residual, iteration.increment);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn convergence(&self) -> &[Iteration] {
+        self.work.newton.as_ref().map_or(&[], |newton| &newton.report)
+    }
+
+    /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme
+    /// conserves.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the direction has the wrong length.
+    pub fn momentum(&self, direction: &[T]) -> Result<T> {
+        self.check_sound()?;
+        let dofs = self.system.dofs();
+        if direction.len() != dofs {
+            return Err(Error::Dimension { what: "the direction", expected: dofs, found: direction.len() });
+        }
+        let history = &self.history;
+        let sum = self.scheme.momentum(&self.state.motion, &history.slots[1..history.known], history.clock.h);
+        let mut product = vec![T::zero(); dofs];
+        self.system.mass().add_product(T::one(), &sum, &mut product);
+        Ok(product.iter().zip(direction).map(|(&p, &d)| p * d).sum())
+    }
+
+    /// Refuses to go on after a panic of the host.
+    pub(super) fn check_sound(&self) -> Result<()> {
+        if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
+    }
+
+    /// Runs a call that changes the run and calls the host. If the host panics, state and history are put back before
+    /// the panic goes on, and later calls are refused.
+    pub(super) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
+        self.check_sound()?;
+        // Unwind safe: state and history are put back below, and nothing else can be used after a panic.
+        match catch_unwind(AssertUnwindSafe(|| call(self))) {
+            Ok(result) => result,
+            Err(panic) => {
+                self.poisoned = true;
+                if self.work.backup.underway {
+                    self.put_back();
+                }
+                resume_unwind(panic)
+            }
+        }
+    }
+
+    /// Puts state and history back to what they were when the attempt of a step began.
+    pub(super) fn put_back(&mut self) {
+        let Self { state, history, work, .. } = self;
+        work.backup.undo(&mut history.slots);
+        std::mem::swap(&mut state.motion, &mut history.slots[0]);
+        work.backup.underway = false;
+    }
+
+    /// Kinetic and elastic energy of the state, and the balance if the builder asked for it.
+    pub fn energy(&mut self) -> Energy<T> {
+        energy::energy(&mut *self.system, &self.state, self.ledger.as_ref())
+    }
+
+    /// Forces of the supports on the system, one a prescribed dof: R = M a − f(t, u, v) − Gᵀ λ.
+    ///
+    /// # Errors
+    ///
+    /// The host's own.
+    pub fn reactions(&mut self) -> Result<Vec<T>> {
+        self.check_sound()?;
+        energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g))
+    }
+}

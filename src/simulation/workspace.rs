@@ -1,0 +1,97 @@
+//! Memory of the steps: nothing in it changes a result, and nothing is allocated after it.
+
+use super::contact_rows::ContactRowsWork;
+use super::contact_step::ContactWork;
+use super::interface::InterfaceWork;
+use super::massless::MasslessBlock;
+use super::newton::NewtonWork;
+use super::pairing::damping;
+use super::program::Program;
+use super::rate_check::RateCheck;
+use super::stage_vectors::StageVectors;
+use super::supports::Supports;
+use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::real::Real;
+use crate::state::{ContactState, Motion};
+use crate::system::{Damping, System};
+
+/// Memory of a step.
+pub(super) struct Workspace<T: Real> {
+    pub(super) vectors: StageVectors<T>,
+    pub(super) contact: ContactWork<T>,
+    /// For nonlinear systems.
+    pub(super) newton: Option<NewtonWork<T>>,
+    /// Free dofs without mass.
+    pub(super) massless: Vec<usize>,
+    /// For explicit schemes, if there are dofs without mass.
+    pub(super) block: Option<MasslessBlock<T>>,
+    pub(super) correction: CorrectionWork<T>,
+    pub(super) rate_check: RateCheck<T>,
+    /// v and a at the time of the new state, where the scheme stores those of another time.
+    pub(super) shown: [Vec<T>; 2],
+    pub(super) backup: Backup<T>,
+}
+
+/// Memory of the corrections.
+pub(super) struct CorrectionWork<T: Real> {
+    pub(super) buffers: Buffers<T>,
+    pub(super) projection: Option<JumpProjection<T>>,
+    /// Version of the rows for which the projection was made.
+    pub(super) projected_rows: u64,
+    /// For correctors that act on the prediction, one entry a dof.
+    pub(super) shifted: Vec<T>,
+    /// Change of kinetic energy by corrections in this step.
+    pub(super) energy: T,
+}
+
+impl<T: Real> Workspace<T> {
+    /// Memory for the steps of a program, with `rows` contacts of `entries` weights in all, an `interface` of so many
+    /// dofs, and a history of so many `slots`.
+    pub(super) fn new(
+        system: &mut dyn System<T>,
+        program: &Program<T>,
+        correctors: &[Box<dyn Corrector<T> + '_>],
+        projection: JumpProjection<T>,
+        ([rows, entries], interface): ([usize; 2], usize),
+        slots: usize,
+    ) -> Self {
+        let dofs = system.dofs();
+        let damped = match damping(system) {
+            Damping::Present if !correctors.is_empty() => dofs,
+            _ => 0,
+        };
+        let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+        let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
+        let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
+        let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
+        let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
+        let supports = Supports::of(system);
+        Self {
+            contact: ContactWork {
+                interface: InterfaceWork::new(interface),
+                rows: ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len()),
+                trial: ContactState::with_capacity(rows),
+                closed_at_start: Vec::with_capacity(rows),
+                was_closed: Vec::with_capacity(rows),
+            },
+            vectors: StageVectors {
+                increment: vec![T::zero(); dofs],
+                balance: separate_balance.then(|| Motion::zero(dofs)),
+                supports,
+            },
+            newton: None,
+            massless: Vec::new(),
+            block: None,
+            correction: CorrectionWork {
+                buffers: Buffers::new(rows, damped),
+                projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
+                projected_rows: 0,
+                shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
+                energy: T::zero(),
+            },
+            rate_check: RateCheck::new(rows),
+            shown: [Vec::new(), Vec::new()],
+            backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
+        }
+    }
+}
