@@ -16,6 +16,7 @@ pub use node_to_facet::{Facet, NodeToFacet};
 pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 
+pub use crate::contact_id::ContactId;
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
@@ -40,23 +41,6 @@ fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> 
     match nodes.iter().find(|&&node| node >= count) {
         Some(&found) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found }),
         None => Ok(()),
-    }
-}
-
-/// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ContactId {
-    /// Index of the constraint in the simulation.
-    pub constraint: usize,
-    /// Feature of the body (a node, a row), given by the constraint.
-    pub feature: usize,
-    /// The candidate opposite of it, given by the constraint.
-    pub candidate: usize,
-}
-
-impl std::fmt::Display for ContactId {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{}.{}", self.constraint, self.feature, self.candidate)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The one error type of the crate: every variant carries the numbers and says what to mend.
 
-use crate::contact::ContactId;
-use crate::contact_solver::ContactFailure;
+use crate::contact_failure::ContactFailure;
+use crate::contact_id::ContactId;
+use crate::real::Real;
 
 /// What went wrong, where, and with which numbers.
 ///
@@ -519,7 +520,7 @@ struct InStep {
 
 /// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot
 /// hold.
-pub(crate) fn step_size<T: crate::real::Real>(h: f64) -> Result<()> {
+pub(crate) fn step_size<T: Real>(h: f64) -> Result<()> {
     let fits = |x: f64| T::of(x).is_normal();
     match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {
         true => Ok(()),

@@ -3,7 +3,7 @@
 
 use super::JumpProjection;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
@@ -808,28 +808,4 @@ impl<T: Real> Correction<'_, T> {
 /// What rounding makes of a sum whose terms have this magnitude.
 pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
     T::of(64.0) * T::epsilon() * magnitude
-}
-
-/// The error of a contact whose bodies' response to a force is not a number.
-pub(crate) fn no_response(t: f64, contact: crate::contact::ContactId) -> Error {
-    Error::ContactNotFinite { t, what: "the response G M⁻¹ Gᵀ", contact, value: f64::NAN }
-}
-
-/// The error of a contact problem that failed at time t.
-pub(crate) fn contact_error<T: Real>(
-    t: f64,
-    failure: ContactFailure<T>,
-    id: impl Fn(usize) -> crate::contact::ContactId,
-) -> Error {
-    match failure {
-        ContactFailure::Contradictory { row, other, residual } => {
-            Error::ContradictoryContacts { t, contact: id(row), other: id(other), violation: residual.value() }
-        }
-        ContactFailure::NotConverged { iterations, row, residual } => {
-            Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
-        }
-        ContactFailure::Unsymmetric { row, other } => {
-            Error::UnsymmetricContacts { t, contact: id(row), other: id(other) }
-        }
-    }
 }
