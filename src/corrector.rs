@@ -9,10 +9,11 @@ mod prediction;
 mod release;
 mod zero_acceleration;
 
+pub(crate) use crate::contact::{ErasedGaps, Gaps, rounding};
 pub(crate) use crate::contact_solver::{contact_error, no_response};
 pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
-pub(crate) use correction::{Backup, Buffers, Erased, ErasedGaps, Gaps, Scheme, rounding};
+pub(crate) use correction::{Backup, Buffers, Erased, Scheme};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};

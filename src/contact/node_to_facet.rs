@@ -6,10 +6,8 @@ mod search;
 mod stand;
 mod surface;
 
-use super::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh, positive,
-};
-use crate::error::{Error, Result};
+use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use geometry::{Point, Shape};
 use search::{Bounds, Neighborhood, overhang};

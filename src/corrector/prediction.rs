@@ -1,9 +1,8 @@
 //! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the
 //! contact conditions.
 
-use super::correction::{ErasedGaps, rounding};
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ContactLaw};
+use crate::contact::{ContactId, ContactJacobian, ContactLaw, ErasedGaps, rounding};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error};
 use crate::error::Result;
 use crate::real::Real;
