@@ -9,17 +9,21 @@ mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
 mod rows;
+#[cfg(feature = "search")]
+mod surface;
 
 pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps, rounding};
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]
-pub use node_to_facet::{Facet, NodeToFacet};
+pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
+#[cfg(feature = "search")]
+pub use surface::Facet;
 
 pub use crate::contact_id::ContactId;
 use crate::error::{Error, Result};
