@@ -1,22 +1,32 @@
 //! Contact constraints: where the gap is, which way it pushes, under which law.
 
 mod gap_function;
+mod gaps;
 mod law;
 mod linear_rows;
 #[cfg(feature = "search")]
 mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
+mod rows;
+#[cfg(feature = "search")]
+mod surface;
 
 pub use gap_function::GapFunction;
+pub(crate) use gaps::{ErasedGaps, Gaps, rounding};
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]
-pub use node_to_facet::{Facet, NodeToFacet};
+pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
+pub(crate) use rows::NO_RESPONSE;
+pub use rows::{ContactJacobian, GapRates};
+#[cfg(feature = "search")]
+pub use surface::Facet;
 
-use crate::error::{Error, Result, positive};
+pub use crate::contact_id::ContactId;
+use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not
@@ -41,32 +51,6 @@ fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> 
         Some(&found) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found }),
         None => Ok(()),
     }
-}
-
-/// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ContactId {
-    /// Index of the constraint in the simulation.
-    pub constraint: usize,
-    /// Feature of the body (a node, a row), given by the constraint.
-    pub feature: usize,
-    /// The candidate opposite of it, given by the constraint.
-    pub candidate: usize,
-}
-
-impl std::fmt::Display for ContactId {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{}.{}", self.constraint, self.feature, self.candidate)
-    }
-}
-
-/// The parts of the gap rates that do not come from v and a: ġ = G v + `rate`, g̈ = G a + `acceleration`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GapRates<T> {
-    /// ∂g/∂t at fixed u (length/time).
-    pub rate: T,
-    /// Ġ v + ∂ġ/∂t at fixed u, v, a (length/time²).
-    pub acceleration: T,
 }
 
 /// A constraint `g(t, u) ≥ 0` (or = 0) on the displacements, with as many rows as it has candidates.
@@ -276,134 +260,4 @@ pub enum Candidates {
     Unchanged,
     /// Other candidates or other rows.
     Changed,
-}
-
-/// The rows of G, stored row by row.
-///
-/// ```
-/// use contact_dynamics::contact::ContactJacobian;
-/// let mut g = ContactJacobian::default();
-/// g.push(&[(0, -1.0), (2, 1.0)]); // g = u2 − u0
-/// assert_eq!(g.product(0, &[1.0, 5.0, 4.0]), 3.0);
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactJacobian<T> {
-    pointers: Vec<usize>,
-    dofs: Vec<usize>,
-    weights: Vec<T>,
-    /// For each entry the place of its dof on the interface, once it is known; `NO_RESPONSE` on prescribed dofs.
-    places: Vec<usize>,
-}
-
-/// The place of dofs that are no part of the interface.
-pub(crate) const NO_RESPONSE: usize = usize::MAX;
-
-impl<T> Default for ContactJacobian<T> {
-    fn default() -> Self {
-        Self { pointers: vec![0], dofs: Vec::new(), weights: Vec::new(), places: Vec::new() }
-    }
-}
-
-impl<T: Real> ContactJacobian<T> {
-    pub(crate) fn with_capacity(rows: usize, entries: usize) -> Self {
-        let mut pointers = Vec::with_capacity(rows + 1);
-        pointers.push(0);
-        let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        Self { pointers, dofs, weights: Vec::with_capacity(entries), places }
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.pointers.truncate(1);
-        self.dofs.clear();
-        self.weights.clear();
-        self.places.clear();
-    }
-
-    /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
-    pub(crate) fn locate(&mut self, places: &[usize]) {
-        self.places.clear();
-        self.places.extend(self.dofs.iter().map(|&dof| places[dof]));
-    }
-
-    /// Appends a row of (dof, weight) pairs.
-    pub fn push(&mut self, entries: &[(usize, T)]) {
-        for &(dof, weight) in entries {
-            self.dofs.push(dof);
-            self.weights.push(weight);
-        }
-        self.pointers.push(self.dofs.len());
-    }
-
-    /// Becomes a copy of another one, in the memory there is.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.pointers.clone_from(&other.pointers);
-        self.dofs.clone_from(&other.dofs);
-        self.weights.clone_from(&other.weights);
-        self.places.clone_from(&other.places);
-    }
-
-    /// Appends the rows of another one.
-    pub(crate) fn append(&mut self, other: &Self) {
-        let before = self.dofs.len();
-        self.dofs.extend_from_slice(&other.dofs);
-        self.weights.extend_from_slice(&other.weights);
-        self.pointers.extend(other.pointers[1..].iter().map(|end| before + end));
-    }
-
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.pointers.len() - 1
-    }
-
-    /// The (dof, weight) pairs of a row.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
-        let range = self.pointers[row]..self.pointers[row + 1];
-        self.dofs[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
-    }
-
-    /// `G_row · x`.
-    pub fn product(&self, row: usize, x: &[T]) -> T {
-        self.row(row).map(|(dof, weight)| weight * x[dof]).sum()
-    }
-
-    /// Whether a row acts on any of the dofs given (ascending).
-    pub(crate) fn acts_on(&self, row: usize, dofs: &[usize]) -> bool {
-        self.row(row).any(|(dof, weight)| weight != T::zero() && dofs.binary_search(&dof).is_ok())
-    }
-
-    /// `Σ_j |G_row,j| |x_j|`: the scale of the rounding in [`product`](Self::product).
-    pub(crate) fn magnitude(&self, row: usize, x: &[T]) -> T {
-        self.row(row).map(|(dof, weight)| (weight * x[dof]).abs()).sum()
-    }
-
-    /// The (place on the interface, weight) pairs of a row, without prescribed dofs.
-    fn located(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
-        let range = self.pointers[row]..self.pointers[row + 1];
-        let entries = self.places[range.clone()].iter().copied().zip(self.weights[range].iter().copied());
-        entries.filter(|&(place, _)| place != NO_RESPONSE)
-    }
-
-    /// `G_row · x` for x on the interface.
-    pub(crate) fn interface_product(&self, row: usize, x: &[T]) -> T {
-        self.located(row).map(|(place, weight)| weight * x[place]).sum()
-    }
-
-    /// `Σ_j |G_row,j| |x_j|` for x on the interface.
-    pub(crate) fn interface_magnitude(&self, row: usize, x: &[T]) -> T {
-        self.located(row).map(|(place, weight)| (weight * x[place]).abs()).sum()
-    }
-
-    /// `x += c G_rowᵀ` for x on the interface.
-    pub(crate) fn interface_scatter(&self, row: usize, c: T, x: &mut [T]) {
-        for (place, weight) in self.located(row) {
-            x[place] += c * weight;
-        }
-    }
-
-    /// `x += c G_rowᵀ`.
-    pub(crate) fn scatter(&self, row: usize, c: T, x: &mut [T]) {
-        for (dof, weight) in self.row(row) {
-            x[dof] += c * weight;
-        }
-    }
 }

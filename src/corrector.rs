@@ -1,5 +1,6 @@
 //! Correctors: what must be mended so that velocity and acceleration agree with the contact.
 
+mod buffers;
 mod contact_implicit;
 mod correction;
 mod jump_projection;
@@ -9,9 +10,13 @@ mod prediction;
 mod release;
 mod zero_acceleration;
 
+pub(crate) use crate::contact::{ErasedGaps, Gaps, rounding};
+pub(crate) use crate::contact_solver::{contact_error, no_response};
+pub(crate) use crate::state::Backup;
+pub(crate) use buffers::Buffers;
 pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
-pub(crate) use correction::{Backup, Buffers, Erased, ErasedGaps, Gaps, Scheme, contact_error, no_response, rounding};
+pub(crate) use correction::{Erased, Scheme};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};

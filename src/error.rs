@@ -1,7 +1,11 @@
 //! The one error type of the crate: every variant carries the numbers and says what to mend.
 
-use crate::contact::ContactId;
-use crate::contact_solver::ContactFailure;
+mod check;
+
+pub(crate) use check::{positive, step_size};
+
+use crate::contact_failure::ContactFailure;
+use crate::contact_id::ContactId;
 
 /// What went wrong, where, and with which numbers.
 ///
@@ -500,14 +504,6 @@ pub enum Error {
 /// Result with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Refuses lengths, times, stiffnesses and the like that are not positive and finite.
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(value),
-        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
-    }
-}
-
 /// What a host says of a state, with the step that it belongs to.
 #[derive(Debug, thiserror::Error)]
 #[error("step from t = {t:e} with h = {h:e}: {source}")]
@@ -515,20 +511,6 @@ struct InStep {
     t: f64,
     h: f64,
     source: Box<dyn std::error::Error + Send + Sync>,
-}
-
-/// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot
-/// hold.
-pub(crate) fn step_size<T: crate::real::Real>(h: f64) -> Result<()> {
-    let fits = |x: f64| T::of(x).is_normal();
-    match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {
-        true => Ok(()),
-        false => Err(Error::Parameter {
-            name: "the step size h",
-            value: h,
-            range: "positive and finite, with h² and 1/h² in the range of the scalar; choose another unit of time",
-        }),
-    }
 }
 
 impl Error {

@@ -8,6 +8,8 @@ struct Readme;
 
 pub mod analysis;
 pub mod contact;
+mod contact_failure;
+mod contact_id;
 pub mod contact_solver;
 pub mod corrector;
 mod dense;

@@ -1,7 +1,7 @@
 //! Gaps that are any function of some displacements.
 
-use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, positive};
-use crate::error::{Error, Result};
+use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
 type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a>;

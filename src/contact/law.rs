@@ -1,7 +1,6 @@
 //! Contact laws: how force and gap of one row belong together.
 
-use super::positive;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
 /// The law of one contact row: its force λ ≥ 0 (compression) given its gap g.

@@ -1,138 +1,14 @@
 //! Contact of the nodes of one deforming surface with the facets of another.
 
-mod geometry;
+mod candidates;
 mod passage;
-mod search;
-mod stand;
-mod surface;
+mod rows;
 
-use super::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh, positive,
-};
-use crate::error::{Error, Result};
+use super::surface::{Facet, Neighborhood, Point, Shape, Surface, overhang};
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
-use geometry::{Point, Shape};
-use search::{Bounds, Neighborhood, overhang};
-use stand::{Ground, Stand};
-use surface::Surface;
-
-/// A facet of a surface: the numbers of its 2, 3 or 4 nodes.
-///
-/// Its normal points out of the body: a segment (two dimensions) is walked with the body on the left, a triangle or a
-/// bilinear quadrilateral (three dimensions) goes counter-clockwise if seen from outside.
-///
-/// ```
-/// use contact_dynamics::contact::Facet;
-/// let mixed = [Facet::from([0, 1, 2]), Facet::from([1, 3, 4, 2])];
-/// assert_eq!(mixed[1].nodes(), [1, 3, 4, 2]);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Facet {
-    nodes: [usize; 4],
-    count: usize,
-}
-
-impl From<[usize; 2]> for Facet {
-    fn from([i, j]: [usize; 2]) -> Self {
-        Self { nodes: [i, j, j, j], count: 2 }
-    }
-}
-
-impl From<[usize; 3]> for Facet {
-    fn from([i, j, k]: [usize; 3]) -> Self {
-        Self { nodes: [i, j, k, k], count: 3 }
-    }
-}
-
-impl From<[usize; 4]> for Facet {
-    fn from(nodes: [usize; 4]) -> Self {
-        Self { nodes, count: 4 }
-    }
-}
-
-impl Facet {
-    /// The nodes in the order given.
-    pub fn nodes(&self) -> &[usize] {
-        &self.nodes[..self.count]
-    }
-
-    fn shape(&self, positions: &[Point]) -> Shape {
-        Shape::new(self.nodes.map(|node| positions[node]), self.count)
-    }
-}
-
-/// The rows that a search found, where they are linearized.
-#[derive(Debug)]
-struct Rows<T> {
-    jacobian: ContactJacobian<T>,
-    /// (node, pass)
-    identities: Vec<(usize, usize)>,
-    stands: Vec<Stand>,
-    /// Displacements there, one an entry of G.
-    displacements: Vec<T>,
-}
-
-impl<T: Real> Rows<T> {
-    fn with_capacity(rows: usize, entries: usize) -> Self {
-        Self {
-            jacobian: ContactJacobian::with_capacity(rows, entries),
-            identities: Vec::with_capacity(rows),
-            stands: Vec::with_capacity(rows),
-            displacements: Vec::with_capacity(entries),
-        }
-    }
-
-    fn clear(&mut self) {
-        self.jacobian.clear();
-        self.identities.clear();
-        self.stands.clear();
-        self.displacements.clear();
-    }
-
-    /// Appends the row of a node on the vertices of a facet.
-    fn push<'a>(
-        &mut self,
-        (node, pass): (usize, usize),
-        stand: Stand,
-        vertices: &[usize],
-        dofs: impl Fn(usize) -> &'a [usize],
-        u: &[T],
-    ) {
-        let entries = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(stand.weights.map(|w| -w)));
-        for (node, share) in entries {
-            for (&dof, &component) in dofs(node).iter().zip(&stand.normal) {
-                let weight = T::of(share * component);
-                if weight != T::zero() {
-                    self.jacobian.dofs.push(dof);
-                    self.jacobian.weights.push(weight);
-                    self.displacements.push(u[dof]);
-                }
-            }
-        }
-        self.jacobian.pointers.push(self.jacobian.dofs.len());
-        self.identities.push((node, pass));
-        self.stands.push(stand);
-    }
-
-    /// Appends a row as another list has it.
-    fn keep(&mut self, other: &Self, row: usize) {
-        let range = other.jacobian.pointers[row]..other.jacobian.pointers[row + 1];
-        self.jacobian.dofs.extend_from_slice(&other.jacobian.dofs[range.clone()]);
-        self.jacobian.weights.extend_from_slice(&other.jacobian.weights[range.clone()]);
-        self.displacements.extend_from_slice(&other.displacements[range]);
-        self.jacobian.pointers.push(self.jacobian.dofs.len());
-        self.identities.push(other.identities[row]);
-        self.stands.push(other.stands[row]);
-    }
-
-    /// The gap of a row at u.
-    fn gap(&self, row: usize, u: &[T]) -> T {
-        let Self { jacobian, stands, displacements, .. } = self;
-        let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];
-        let moved = jacobian.row(row).zip(start).map(|((dof, weight), &start)| weight * (u[dof] - start));
-        T::of(stands[row].gap) + moved.sum()
-    }
-}
+use rows::Rows;
 
 /// One direction of contact: nodes against a surface.
 #[derive(Debug)]
@@ -470,35 +346,6 @@ impl<T: Real> NodeToFacet<T> {
         T::epsilon().value().sqrt()
     }
 
-    /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
-    fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
-        let Self { dimension, coordinates, dofs, positions, built_at, bodies, .. } = self;
-        let (mut boxes, mut motions) = ([Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
-        for ((body, bounds), motion) in bodies.iter().zip(&mut boxes).zip(&mut motions) {
-            for &node in body {
-                let mut x = coordinates[node];
-                for (x, &dof) in x.iter_mut().zip(&dofs[node][..*dimension]) {
-                    *x += u[dof].value();
-                    if !x.is_finite() {
-                        let what = "the displacement of a contact surface (by dof)";
-                        return Err(Error::NotFinite { what, index: dof, value: u[dof].value() });
-                    }
-                }
-                positions[node] = x;
-                bounds.include(x);
-                if let Some(&before) = built_at.get(node) {
-                    motion.include(geometry::sub(x, before));
-                }
-            }
-        }
-        Ok((boxes, motions))
-    }
-
-    /// The boxes of the velocities of the two bodies.
-    fn speeds(&self, v: &[T]) -> [Bounds; 2] {
-        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.vector(node, v))))
-    }
-
     /// The entries of a vector of the system that belong to a node.
     fn vector(&self, node: usize, x: &[T]) -> Point {
         let mut vector = [0.0; 3];
@@ -506,102 +353,6 @@ impl<T: Real> NodeToFacet<T> {
             *component = x[dof].value();
         }
         vector
-    }
-
-    /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
-    fn update_lists(&mut self, [one, other]: &[Bounds; 2], range: f64) {
-        if !self.built_at.is_empty() && range + one.spread(other) <= self.listed {
-            return;
-        }
-        self.listed = range + self.skin.unwrap_or(0.5 * range);
-        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
-        for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
-            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.listed);
-        }
-        self.built_at.clone_from(&self.positions);
-        self.rebuilds += 1;
-    }
-
-    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body
-    /// makes with its velocities in theirs within the time `ahead`.
-    fn find_rows(&mut self, pass: usize, (near, speeds): (&Bounds, &Bounds), u: &[T], v: &[T], ahead: f64) {
-        let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
-        self.find_rows_and(pass, (near, speeds), u, v, ahead, &mut clearance);
-        self.passes[pass].clearance = clearance;
-    }
-
-    fn find_rows_and(
-        &mut self,
-        pass: usize,
-        (near, speeds): (&Bounds, &Bounds),
-        u: &[T],
-        v: &[T],
-        ahead: f64,
-        clearance: &mut [f64],
-    ) {
-        let Self { surface, own_surface, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
-        let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
-            return;
-        };
-        for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
-            if !near.contains(positions[node]) {
-                continue;
-            }
-            let mut velocity = [0.0; 3];
-            for (component, &dof) in velocity.iter_mut().zip(&dofs[node][..*dimension]) {
-                *component = v[dof].value();
-            }
-            let way = ahead * Bounds::of_points([velocity]).farthest(speeds);
-            let (distance, stand) = ground.clearance(place, *reach + way);
-            *clearance = distance;
-            let Some(stand) = stand else { continue };
-            let vertices = ground.surface.facets()[stand.facet].nodes();
-            if !partners.is_empty() {
-                let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
-                let on = on.map(|(&vertex, _)| vertex);
-                match pass {
-                    0 => partners[node] = on,
-                    _ if on.is_some_and(|vertex| partners[vertex] == Some(node)) => continue,
-                    _ => {}
-                }
-            }
-            found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
-        }
-    }
-
-    /// The rows there are, where their nodes stand now; `motions` are those since the lists were built.
-    fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
-        /// Gap, in shares of the reach, above which a row surely does not press.
-        const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, positions, passes, rows, found, dimension, dofs, .. } = self;
-        for (row, &(node, pass)) in rows.identities.iter().enumerate() {
-            let old = rows.stands[row];
-            let ground = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding());
-            // The list of the node has all facets as near as this.
-            let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
-                Bounds::of_points([geometry::sub(positions[node], before)]).spread(&motions[1 - pass])
-            });
-            let known = self.listed - moved;
-            let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
-                let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
-                Some((stand, ground.surface.facets()[stand.facet].nodes()))
-            });
-            match stand {
-                Some((stand, vertices)) => match old.followed_by(stand, t) {
-                    Some(stand) => {
-                        found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
-                    }
-                    None => found.keep(rows, row),
-                },
-                // There is nothing near that it could press on.
-                None if known > 0.0 && rows.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
-                None => {
-                    let contact = ContactId { constraint: 0, feature: node, candidate: pass };
-                    return Err(Error::ContactLost { t, contact });
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Position and velocity of a node.
@@ -613,20 +364,6 @@ impl<T: Real> NodeToFacet<T> {
         }
         motion
     }
-}
-
-/// What the nodes of a pass stand on.
-fn ground<'a>(
-    pass: usize,
-    passes: &'a [Pass],
-    surface: &'a Surface,
-    own_surface: Option<&'a Surface>,
-    positions: &'a [Point],
-    rounding: f64,
-) -> Option<Ground<'a>> {
-    let Pass { nodes, neighborhood, .. } = &passes[pass];
-    let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, positions, rounding })
 }
 
 fn component<T: Real>(x: &[T], i: usize) -> f64 {

@@ -3,9 +3,9 @@
 use super::obstacle::{dot, minus};
 use super::{
     Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, LARGEST_MISS, LARGEST_TURN,
-    Obstacle, STEEP, Stride, check_mesh, positive, press_differently,
+    Obstacle, STEEP, Stride, check_mesh, press_differently,
 };
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
 /// Translation of an obstacle at t, its velocity and its acceleration.

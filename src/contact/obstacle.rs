@@ -1,7 +1,6 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
-use super::positive;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
 /// A rigid body, given by the signed distance of a point from its surface: positive outside, negative inside.

@@ -1,13 +1,16 @@
 //! What a corrector works with: the jumps of a stage, the projection that removes them, and the books on impulse and
 //! energy.
 
-use super::JumpProjection;
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::contact_solver::{Bound, ContactFailure, ContactProblem, ContactSolver};
+mod energy;
+mod past;
+
+use super::{Buffers, JumpProjection};
+use crate::contact::{ContactJacobian, ErasedGaps, rounding};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
-use crate::state::{ContactState, Motion};
+use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Damping, Linearity, System};
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
@@ -73,176 +76,12 @@ enum Jump {
     Acceleration,
 }
 
-/// The gaps of all rows, as a correction evaluates them: those that are NaN or infinite are refused.
-pub(crate) trait Gaps<T: Real> {
-    fn law(&self, row: usize) -> ContactLaw;
-
-    /// What of a gap is rounding, if the terms of G u have this magnitude.
-    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T;
-
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
-
-    /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized
-    /// there; afterwards rows are those of `here` (time, u) again.
-    fn elsewhere(&mut self, field: usize, there: (f64, [&[T]; 3]), here: (f64, &[T]), out: &mut [T]) -> Result<()>;
-}
-
-/// Borrowed gaps, debug-printable.
-pub(crate) struct ErasedGaps<'a, T: Real>(pub(crate) &'a mut dyn Gaps<T>);
-
-impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Gaps")
-    }
-}
-
 /// A borrowed system, debug-printable.
 pub(crate) struct Erased<'a, T: Real>(pub(crate) &'a mut dyn System<T>);
 
 impl<T: Real> std::fmt::Debug for Erased<'_, T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "System({} dofs)", self.0.dofs())
-    }
-}
-
-/// The past as it was before the step, kept when a corrector first edits it.
-#[derive(Debug)]
-pub(crate) struct Backup<T> {
-    /// Whether state and history are those of a step that has not ended.
-    pub(crate) underway: bool,
-    /// Rotations of the history at the present stage.
-    pub(crate) rotations: usize,
-    /// Rotations at which the copy was made, if there is one.
-    kept: Option<usize>,
-    slots: Vec<Motion<T>>,
-}
-
-impl<T: Real> Backup<T> {
-    /// Room for `slots` past states.
-    pub(crate) fn new(slots: usize, dofs: usize) -> Self {
-        Self { underway: false, rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
-    }
-
-    /// Forgets the copy: the step begins.
-    pub(crate) fn begin(&mut self) {
-        (self.rotations, self.kept) = (0, None);
-    }
-
-    /// Refuses edits that could not be undone.
-    fn check(&self) -> Result<()> {
-        match self.slots.is_empty() {
-            false => Ok(()),
-            true => Err(Error::Incompatible {
-                part: "a corrector that projects the past".into(),
-                reason: "its `edits` does not say so, and no room was kept to undo a failed step",
-            }),
-        }
-    }
-
-    /// The past states that the step may have edited.
-    pub(crate) fn edited<'p>(&self, past: &'p [Motion<T>]) -> &'p [Motion<T>] {
-        match self.kept {
-            Some(_) => past,
-            None => &[],
-        }
-    }
-
-    fn keep(&mut self, past: &[Motion<T>]) {
-        if self.kept.is_none() {
-            for (copy, original) in self.slots.iter_mut().zip(past) {
-                copy.copy_from(original);
-            }
-            self.kept = Some(self.rotations);
-        }
-    }
-
-    /// Undoes all stages of a failed step: rotations and edits of the past.
-    pub(crate) fn undo(&mut self, slots: &mut [Motion<T>]) {
-        let kept = self.kept.take();
-        slots.rotate_left(self.rotations - kept.unwrap_or(0));
-        if let Some(rotations) = kept {
-            for (original, copy) in slots[1..].iter_mut().zip(&self.slots) {
-                original.copy_from(copy);
-            }
-            slots.rotate_left(rotations);
-        }
-    }
-}
-
-/// Buffers of the corrections, one entry a closed row unless said otherwise; reserved at build.
-#[derive(Debug)]
-pub(crate) struct Buffers<T> {
-    /// Closed rows.
-    pub(crate) closed: Vec<usize>,
-    /// Engaged rows, a subset of `closed`.
-    pub(super) engaged: Vec<usize>,
-    /// Rows that have opened in this stage.
-    pub(crate) opened: Vec<usize>,
-    /// Rows that were closed in this step or at its start, and are open now.
-    pub(crate) released: Vec<usize>,
-    /// Reported forces before this stage, one a candidate.
-    pub(crate) reported: Vec<T>,
-    pub(super) bounds: Vec<Bound>,
-    pub(super) jump: Vec<T>,
-    pub(super) tolerance: Vec<T>,
-    /// Impulses that remove the velocity jumps, one a closed row.
-    pub(super) impulses: Vec<T>,
-    /// Forces that remove the acceleration jumps, one an engaged row.
-    forces: Vec<T>,
-    pub(super) s: Vec<T>,
-    /// One a candidate.
-    rates: Vec<GapRates<T>>,
-    pub(super) gaps: Vec<T>,
-    /// Change of v and the damping force it makes (and that of before), one a dof; empty without damping.
-    change: Vec<T>,
-    damping: Vec<T>,
-    before: Vec<T>,
-}
-
-impl<T: Real> Buffers<T> {
-    /// Room for `rows` contacts, and for velocity changes of `damped` dofs (0 without damping).
-    pub(crate) fn new(rows: usize, damped: usize) -> Self {
-        let reals = |n| Vec::with_capacity(n);
-        Self {
-            closed: Vec::with_capacity(rows),
-            engaged: Vec::with_capacity(rows),
-            opened: Vec::with_capacity(rows),
-            released: Vec::with_capacity(rows),
-            reported: reals(rows),
-            bounds: Vec::with_capacity(rows),
-            jump: reals(rows),
-            tolerance: reals(rows),
-            impulses: reals(rows),
-            forces: reals(rows),
-            s: reals(rows * rows),
-            rates: vec![GapRates::default(); rows],
-            gaps: vec![T::zero(); rows],
-            change: vec![T::zero(); damped],
-            damping: vec![T::zero(); damped],
-            before: vec![T::zero(); damped],
-        }
-    }
-
-    /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
-    pub(crate) fn report(&mut self, contacts: &ContactState<T>, first: bool) {
-        if first {
-            self.reported.clone_from(&contacts.lambda);
-        }
-        for ((reported, &lambda), &closed) in self.reported.iter_mut().zip(&contacts.lambda).zip(&contacts.closed) {
-            if closed {
-                *reported = lambda;
-            }
-        }
-    }
-
-    /// Whether the last stage had contacts to correct.
-    pub(crate) fn has_touched(&self) -> bool {
-        !self.closed.is_empty() || !self.opened.is_empty() || !self.released.is_empty()
-    }
-
-    /// Whether damping carries corrections of v to the accelerations of all dofs.
-    pub(crate) fn spreads(&self) -> bool {
-        !self.change.is_empty()
     }
 }
 
@@ -540,75 +379,6 @@ impl<T: Real> Correction<'_, T> {
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
     }
 
-    /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as
-    /// there is one: the bodies leave each other faster, or with a negative energy slower.
-    ///
-    /// # Errors
-    ///
-    /// As [`apply_impulses`](Self::apply_impulses).
-    pub fn exchange_energy(&mut self, row: usize, energy: T) -> Result<()> {
-        let (s, rate) = (self.compliance(row), self.rate(row)?);
-        if s > T::zero() && energy != T::zero() && energy.is_finite() {
-            // ½ S j² + rate j = energy; beyond what the rate holds, all of it.
-            let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
-            return self.apply(&[row], &[(root - rate) / s]);
-        }
-        Ok(())
-    }
-
-    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can
-    /// tell: the bodies leave each other with that energy more, and the past that later rows read has had the same
-    /// velocity.
-    pub(super) fn give_back(&mut self, row: usize) -> Result<()> {
-        let (s, rate) = (self.compliance(row), self.rate(row)?);
-        let taken = self.contacts.dissipated[row];
-        // Of the relative velocity u = G v + ġ0, which is left of larger numbers, j u is noise of this size.
-        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
-        if !(s > T::zero() && T::of(2.0) * s * taken > noise * noise) {
-            return Ok(());
-        }
-        // Without cancellation: ½ S j² + j rate = taken.
-        let root = (rate * rate + T::of(2.0) * s * taken).sqrt();
-        let impulse = match rate > T::zero() {
-            true => T::of(2.0) * taken / (root + rate),
-            false => (root - rate) / s,
-        };
-        self.apply(&[row], &[impulse])?;
-        self.move_past(row, impulse)
-    }
-
-    /// Applies an impulse along a row to the velocities, and to the past as if they had always been so.
-    pub(super) fn part(&mut self, row: usize, impulse: T) -> Result<()> {
-        self.apply_impulses(&[row], &[impulse])?;
-        self.move_past(row, impulse)
-    }
-
-    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
-    /// rows read them. Schemes that difference displacements would see a part of it else, or more than all.
-    fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
-        let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
-        // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
-        let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));
-        let first = scheme.stages;
-        if (first..=places).any(|k| scheme.read[k][0] || scheme.read[k][1]) {
-            backup.check()?;
-            backup.keep(past);
-        }
-        for k in first..=places {
-            let (motion, steps) = (&mut past[k - 1], (k + 1 - scheme.stages) as f64);
-            let [by_u, by_v, _] = scheme.covector[k];
-            if scheme.read[k][0] {
-                projection.push(g, row, T::of(-steps * *h) * impulse, &mut motion.u);
-                contacts.impulse[row] -= T::of(steps * by_u) * impulse;
-            }
-            if scheme.read[k][1] {
-                projection.push(g, row, impulse, &mut motion.v);
-                contacts.impulse[row] += T::of(by_v) * impulse;
-            }
-        }
-        Ok(())
-    }
-
     /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in
     /// this step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response
     /// of the scheme's (u, h v, h² a) to a multiplier.
@@ -647,49 +417,6 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
-    /// Work of the raw multipliers over the stage, each times the change of its gap.
-    ///
-    /// # Errors
-    ///
-    /// What a constraint says of the start of the stage.
-    pub(super) fn contact_work(&mut self) -> Result<T> {
-        let Self { buffers, contacts, constraints, past, new, .. } = self;
-        let Buffers { closed, gaps, .. } = &mut **buffers;
-        let Some(start) = past.first() else { return Ok(T::zero()) };
-        constraints.0.elsewhere(0, start.place(), (new.t, &new.u), gaps)?;
-        Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
-    }
-
-    /// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw
-    /// multipliers of the closed rows, as far as there is any.
-    pub(super) fn exchange_by_forces(&mut self, energy: T) -> Result<()> {
-        self.read_rates()?;
-        let rows = std::mem::take(&mut self.buffers.closed);
-        let mut impulses = std::mem::take(&mut self.buffers.impulses);
-        impulses.clear();
-        impulses.extend(rows.iter().map(|&row| self.contacts.lambda_raw[row].max(T::zero())));
-        self.projection.assemble(self.g, &rows, &mut self.buffers.s);
-        let size = rows.len();
-        let (mut square, mut rate) = (T::zero(), T::zero());
-        for (i, (&row, &x)) in rows.iter().zip(&impulses).enumerate() {
-            rate += x * (self.g.product(row, &self.new.v) + self.buffers.rates[row].rate);
-            let column = &self.buffers.s[i * size..(i + 1) * size];
-            square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
-        }
-        let mut result = Ok(());
-        if square > T::zero() {
-            let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
-            let factor = (root - rate) / square;
-            for x in &mut impulses {
-                *x *= factor;
-            }
-            result = self.apply(&rows, &impulses);
-        }
-        self.buffers.closed = rows;
-        self.buffers.impulses = impulses;
-        result
-    }
-
     /// Calls a function with every row that has opened, up to its first error.
     ///
     /// # Errors
@@ -708,77 +435,6 @@ impl<T: Real> Correction<'_, T> {
     /// That of the function.
     pub fn each_released(&mut self, mut each: impl FnMut(&mut Self, usize) -> Result<()>) -> Result<()> {
         (0..self.buffers.released.len()).try_for_each(|i| each(self, self.buffers.released[i]))
-    }
-
-    /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
-    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
-    /// law reads the gap at the start of a stage.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::ContactNotFinite`]; [`Error::Incompatible`] if the corrector's [`edits`](super::Corrector::edits) is
-    /// not [`Edits::Past`](super::Edits::Past).
-    pub fn project_past(&mut self) -> Result<()> {
-        if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
-            return Ok(());
-        }
-        self.backup.check()?;
-        let rows = std::mem::take(&mut self.buffers.engaged);
-        let mut closing = self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row));
-        // States not known yet, while a multistep scheme is started, have no covector.
-        let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
-        if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
-            self.backup.keep(self.past);
-            for k in 1..=places {
-                for field in 0..3 {
-                    if closing.is_ok() && self.scheme.read[k][field] {
-                        closing = self.project_field(k, field, &rows);
-                    }
-                }
-            }
-        }
-        self.buffers.engaged = rows;
-        closing
-    }
-
-    /// Projects one field of past state k onto the engaged rows.
-    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, energy, .. } = self;
-        let Buffers { gaps, rates, jump, tolerance: before, .. } = &mut **buffers;
-        let motion = &mut past[k - 1];
-        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
-        // Of the past motion on its own part of a curved surface: u, v and a fit each other.
-        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
-        // Where a gap is held, under a law that reads it where a stage starts.
-        let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
-            true => contacts.gap[row],
-            false => T::zero(),
-        };
-        jump.clear();
-        jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
-        before.clear();
-        before.extend_from_slice(jump);
-        projection.solve(jump);
-        // In a stage before the last the state that the step starts from loses what the later stages do not see any
-        // more.
-        if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
-            constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
-            for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
-                let taken = T::of(0.5) * multiplier * before;
-                contacts.dissipated[row] += taken;
-                **energy += multiplier * rates[row].rate - taken;
-            }
-        }
-        let (values, unit) = match field {
-            0 => (&mut motion.u, psi / h),
-            1 => (&mut motion.v, psi),
-            _ => (&mut motion.a, psi * h),
-        };
-        for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
-            projection.push(g, row, -multiplier, values);
-            contacts.impulse[row] -= T::of(unit) * multiplier;
-        }
-        Ok(())
     }
 
     /// Solves S x + jump for the multipliers x of `rows` under their bounds.
@@ -802,34 +458,5 @@ impl<T: Real> Correction<'_, T> {
 
     fn no_response(&self, row: usize) -> Error {
         no_response(self.t, self.contacts.ids[row])
-    }
-}
-
-/// What rounding makes of a sum whose terms have this magnitude.
-pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
-    T::of(64.0) * T::epsilon() * magnitude
-}
-
-/// The error of a contact whose bodies' response to a force is not a number.
-pub(crate) fn no_response(t: f64, contact: crate::contact::ContactId) -> Error {
-    Error::ContactNotFinite { t, what: "the response G M⁻¹ Gᵀ", contact, value: f64::NAN }
-}
-
-/// The error of a contact problem that failed at time t.
-pub(crate) fn contact_error<T: Real>(
-    t: f64,
-    failure: ContactFailure<T>,
-    id: impl Fn(usize) -> crate::contact::ContactId,
-) -> Error {
-    match failure {
-        ContactFailure::Contradictory { row, other, residual } => {
-            Error::ContradictoryContacts { t, contact: id(row), other: id(other), violation: residual.value() }
-        }
-        ContactFailure::NotConverged { iterations, row, residual } => {
-            Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
-        }
-        ContactFailure::Unsymmetric { row, other } => {
-            Error::UnsymmetricContacts { t, contact: id(row), other: id(other) }
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
-use super::no_response;
 use crate::contact::{ContactId, ContactJacobian};
+use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::mass::{InverseMass, Mass};

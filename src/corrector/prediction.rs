@@ -1,10 +1,9 @@
 //! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the
 //! contact conditions.
 
-use super::correction::{ErasedGaps, contact_error, rounding};
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ContactLaw};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::contact::{ContactId, ContactJacobian, ContactLaw, ErasedGaps, rounding};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;

@@ -1,9 +1,7 @@
 //! What nodes have passed through in a step: their ways against facets that move.
 
-use super::geometry::{Point, Shape, add_scaled, dot, norm, sub};
-use super::search::Bounds;
-use super::stand::{Ground, Stand, meets};
-use super::{Facet, NodeToFacet};
+use super::NodeToFacet;
+use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, meets, norm, sub};
 use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;

@@ -1,48 +1,48 @@
 //! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
 
-use super::geometry::{Point, RIM, norm};
-use super::surface::Surface;
+use super::Surface;
+use super::shape::{Point, RIM, norm};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use std::ops::ControlFlow;
 
 /// An axis-parallel box.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    pub(super) lower: Point,
-    pub(super) upper: Point,
+pub(crate) struct Bounds {
+    pub(crate) lower: Point,
+    pub(crate) upper: Point,
 }
 
 impl Bounds {
     /// Holds nothing.
-    pub(super) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
+    pub(crate) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
 
-    pub(super) fn include(&mut self, x: Point) {
+    pub(crate) fn include(&mut self, x: Point) {
         self.lower = std::array::from_fn(|i| self.lower[i].min(x[i]));
         self.upper = std::array::from_fn(|i| self.upper[i].max(x[i]));
     }
 
-    pub(super) fn of_points(points: impl IntoIterator<Item = Point>) -> Self {
+    pub(crate) fn of_points(points: impl IntoIterator<Item = Point>) -> Self {
         points.into_iter().fold(Self::EMPTY, |mut bounds, x| {
             bounds.include(x);
             bounds
         })
     }
 
-    pub(super) fn inflated(&self, by: f64) -> Self {
+    pub(crate) fn inflated(&self, by: f64) -> Self {
         Self { lower: self.lower.map(|x| x - by), upper: self.upper.map(|x| x + by) }
     }
 
-    pub(super) fn intersects(&self, other: &Self) -> bool {
+    pub(crate) fn intersects(&self, other: &Self) -> bool {
         (0..3).all(|i| self.lower[i] <= other.upper[i] && other.lower[i] <= self.upper[i])
     }
 
-    pub(super) fn contains(&self, x: Point) -> bool {
+    pub(crate) fn contains(&self, x: Point) -> bool {
         (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
     }
 
     /// A bound of |x − y| over x in one box and y in the other.
-    pub(super) fn farthest(&self, other: &Self) -> f64 {
+    pub(crate) fn farthest(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
         norm([one(0), one(1), one(2)])
     }
@@ -53,28 +53,28 @@ impl Bounds {
     }
 
     /// Largest component of x − y over x in one box and y in the other, in either direction.
-    pub(super) fn spread(&self, other: &Self) -> f64 {
+    pub(crate) fn spread(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
         one(0).max(one(1)).max(one(2))
     }
 }
 
 /// How far around a facet a foot can lie beyond its box: the facet goes on a little beyond the rim.
-pub(super) fn overhang(bounds: &Bounds) -> f64 {
+pub(crate) fn overhang(bounds: &Bounds) -> f64 {
     let extent = (0..3).map(|i| bounds.upper[i] - bounds.lower[i]).fold(0.0, f64::max);
     8.0 * RIM * extent
 }
 
 /// The facets near each node: those whose boxes, widened, held the node when the list was built.
 #[derive(Debug, Default)]
-pub(super) struct Neighborhood {
+pub(crate) struct Neighborhood {
     starts: Vec<usize>,
     facets: Vec<usize>,
 }
 
 impl Neighborhood {
     /// Facets to look at for the k-th node, in ascending order: the result does not depend on the age of the list.
-    pub(super) fn of(&self, k: usize) -> &[usize] {
+    pub(crate) fn of(&self, k: usize) -> &[usize] {
         match self.starts.get(k..k + 2) {
             Some(range) => &self.facets[range[0]..range[1]],
             None => &[],
@@ -82,7 +82,7 @@ impl Neighborhood {
     }
 
     /// Lists anew, for each node, the facets whose boxes are within `range` of it.
-    pub(super) fn build(&mut self, nodes: &[usize], surface: &Surface, positions: &[Point], range: f64) {
+    pub(crate) fn build(&mut self, nodes: &[usize], surface: &Surface, positions: &[Point], range: f64) {
         let all = Bounds::of_points(nodes.iter().map(|&node| positions[node]));
         let leaves = surface.facets().iter().enumerate().filter_map(|(index, facet)| {
             let [lower, upper] = facet.shape(positions).bounds();

@@ -1,35 +1,35 @@
 //! Facets as shapes: closest points, shape functions and normals of segments, triangles and bilinear quadrilaterals.
 
 /// A point or a vector; in two dimensions the third component is zero.
-pub(super) type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
 /// How far outside an open side of a surface a projection still counts as inside, in shares of the facet: nodes at the
 /// rim of matching meshes must not lose their row to rounding or to a little stretch.
-pub(super) const RIM: f64 = 1e-3;
+pub(crate) const RIM: f64 = 1e-3;
 
-pub(super) fn sub(x: Point, y: Point) -> Point {
+pub(crate) fn sub(x: Point, y: Point) -> Point {
     [x[0] - y[0], x[1] - y[1], x[2] - y[2]]
 }
 
 /// `x + c y`.
-pub(super) fn add_scaled(x: Point, c: f64, y: Point) -> Point {
+pub(crate) fn add_scaled(x: Point, c: f64, y: Point) -> Point {
     [x[0] + c * y[0], x[1] + c * y[1], x[2] + c * y[2]]
 }
 
-pub(super) fn dot(x: Point, y: Point) -> f64 {
+pub(crate) fn dot(x: Point, y: Point) -> f64 {
     x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 }
 
-pub(super) fn cross(x: Point, y: Point) -> Point {
+pub(crate) fn cross(x: Point, y: Point) -> Point {
     [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
 }
 
-pub(super) fn norm(x: Point) -> f64 {
+pub(crate) fn norm(x: Point) -> f64 {
     dot(x, x).sqrt()
 }
 
 /// `x / |x|`; none for the zero vector.
-pub(super) fn unit(x: Point) -> Option<Point> {
+pub(crate) fn unit(x: Point) -> Option<Point> {
     let length = norm(x);
     (length > 0.0 && length.is_finite()).then(|| [x[0] / length, x[1] / length, x[2] / length])
 }
@@ -38,16 +38,16 @@ pub(super) fn unit(x: Point) -> Option<Point> {
 ///
 /// Side k runs from vertex k to the next; the sides of a segment are its two vertices.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Rim {
-    pub(super) sides: [bool; 4],
-    pub(super) vertices: [bool; 4],
+pub(crate) struct Rim {
+    pub(crate) sides: [bool; 4],
+    pub(crate) vertices: [bool; 4],
     /// How far the surface goes on beyond its rim, in shares of the facet: [`RIM`], if not said otherwise.
-    pub(super) beyond: f64,
+    pub(crate) beyond: f64,
 }
 
 /// Where on a facet a closest point lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Location {
+pub(crate) enum Location {
     /// Inside: the node stands on the facet along its normal.
     Inside,
     /// On a side that a neighbor shares.
@@ -60,29 +60,29 @@ pub(super) enum Location {
 
 /// The point of a facet closest to a node.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
+pub(crate) struct Foot {
     /// Shape functions of the vertices there; their sum is one.
-    pub(super) weights: [f64; 4],
-    pub(super) point: Point,
-    pub(super) distance: f64,
-    pub(super) location: Location,
+    pub(crate) weights: [f64; 4],
+    pub(crate) point: Point,
+    pub(crate) distance: f64,
+    pub(crate) location: Location,
 }
 
 /// A facet where its vertices are now.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     corners: [Point; 4],
     count: usize,
 }
 
 impl Shape {
     /// The facet with 2, 3 or 4 corners.
-    pub(super) fn new(corners: [Point; 4], count: usize) -> Self {
+    pub(crate) fn new(corners: [Point; 4], count: usize) -> Self {
         Self { corners, count }
     }
 
     /// Whether it is a segment.
-    pub(super) fn is_segment(&self) -> bool {
+    pub(crate) fn is_segment(&self) -> bool {
         self.count == 2
     }
 
@@ -95,29 +95,29 @@ impl Shape {
     }
 
     /// The side that begins at vertex k, as a vector.
-    pub(super) fn side(&self, k: usize) -> Point {
+    pub(crate) fn side(&self, k: usize) -> Point {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
     /// A corner.
-    pub(super) fn corner(&self, k: usize) -> Point {
+    pub(crate) fn corner(&self, k: usize) -> Point {
         self.corners[k]
     }
 
     /// Whether the projection of a point is on a segment or a triangle, its rim included.
-    pub(super) fn holds(&self, p: Point) -> bool {
+    pub(crate) fn holds(&self, p: Point) -> bool {
         const RIM_OF_RAY: f64 = 1e-9;
         let rim = Rim { sides: [true; 4], vertices: [true; 4], beyond: RIM_OF_RAY };
         self.project(p, rim).is_some_and(|foot| foot.location == Location::Inside)
     }
 
     /// Length of the longest side.
-    pub(super) fn size(&self) -> f64 {
+    pub(crate) fn size(&self) -> f64 {
         (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max).sqrt()
     }
 
     /// Lower and upper corner of the bounding box.
-    pub(super) fn bounds(&self) -> [Point; 2] {
+    pub(crate) fn bounds(&self) -> [Point; 2] {
         let [mut lower, mut upper] = [self.corners[0]; 2];
         for corner in &self.corners[1..self.count] {
             lower = std::array::from_fn(|i| lower[i].min(corner[i]));
@@ -127,7 +127,7 @@ impl Shape {
     }
 
     /// The point with the given shape functions.
-    pub(super) fn point(&self, weights: &[f64; 4]) -> Point {
+    pub(crate) fn point(&self, weights: &[f64; 4]) -> Point {
         // Differences from the first corner: far from the origin the sum of weighted corners would lose digits.
         let first = self.corners[0];
         self.corners[1..self.count]
@@ -137,7 +137,7 @@ impl Shape {
     }
 
     /// The shape functions at share `s` of side k.
-    pub(super) fn on_side(&self, k: usize, s: f64) -> [f64; 4] {
+    pub(crate) fn on_side(&self, k: usize, s: f64) -> [f64; 4] {
         let mut weights = [0.0; 4];
         weights[k] = 1.0 - s;
         weights[self.after(k)] = s;
@@ -145,7 +145,7 @@ impl Shape {
     }
 
     /// How far inside of side k a point is, in shares of the facet: 0 on the side, 1 opposite of it.
-    pub(super) fn inset(&self, weights: &[f64; 4], k: usize) -> f64 {
+    pub(crate) fn inset(&self, weights: &[f64; 4], k: usize) -> f64 {
         match self.count {
             2 => weights[1 - k],
             3 => weights[self.before(k)],
@@ -154,13 +154,13 @@ impl Shape {
     }
 
     /// The outward unit normal where the shape functions are `weights`; none if the facet is degenerate there.
-    pub(super) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
+    pub(crate) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
         let [first, second] = self.tangents_at(weights);
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
     }
 
     /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
-    pub(super) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
+    pub(crate) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
         match self.count {
             2 => [self.side(0), [0.0; 3]],
             3 => [self.side(0), sub(self.corners[2], self.corners[0])],
@@ -169,7 +169,7 @@ impl Shape {
     }
 
     /// ∂²x/∂ξ∂η of a quadrilateral; the other shapes are flat.
-    pub(super) fn twist(&self) -> Point {
+    pub(crate) fn twist(&self) -> Point {
         if self.count < 4 {
             return [0.0; 3];
         }
@@ -178,7 +178,7 @@ impl Shape {
     }
 
     /// Angle between the sides that meet at vertex k; 1 for a segment.
-    pub(super) fn angle(&self, k: usize) -> f64 {
+    pub(crate) fn angle(&self, k: usize) -> f64 {
         if self.count == 2 {
             return 1.0;
         }
@@ -187,7 +187,7 @@ impl Shape {
     }
 
     /// Whether the facet has a length or an area, and a normal that points to the same side at every vertex.
-    pub(super) fn is_regular(&self) -> bool {
+    pub(crate) fn is_regular(&self) -> bool {
         const SMALL: f64 = 1e-10;
         let size = self.size();
         if self.count == 2 {
@@ -199,7 +199,7 @@ impl Shape {
     }
 
     /// Whether it has no length or area.
-    pub(super) fn is_degenerate(&self) -> bool {
+    pub(crate) fn is_degenerate(&self) -> bool {
         const SMALL: f64 = 1e-10;
         let size = self.size();
         let corner = |k: usize| cross(self.side(k), sub(self.corners[self.before(k)], self.corners[k]));
@@ -215,7 +215,7 @@ impl Shape {
     /// The closest point of the facet; none if the facet is degenerate.
     ///
     /// Beyond an open side the facet goes on for a share of its extent, so that lever arms stay exact there.
-    pub(super) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
+    pub(crate) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
         match self.count {
             2 => self.project_on_segment(p, rim),
             3 => self.project_on_triangle(p, rim),
@@ -406,7 +406,7 @@ impl Shape {
 impl Foot {
     /// Closer, or as close and not outside of the rim.
     #[allow(clippy::float_cmp)] // a tie between two facets that share the point
-    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+    pub(crate) fn is_better_than(&self, other: &Self) -> bool {
         self.distance < other.distance
             || (self.distance == other.distance
                 && other.location == Location::Beyond

@@ -1,12 +1,22 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
-use super::Facet;
-use super::geometry::{Foot, Location, Point, RIM, Rim, Shape, add_scaled, dot, sub, unit};
+mod facet;
+mod projection;
+mod search;
+mod shape;
+
+pub use facet::Facet;
+pub(crate) use projection::{Ground, Stand, meets};
+pub(crate) use search::{Bounds, Neighborhood, overhang};
+pub(crate) use shape::{Point, Shape, add_scaled, dot, norm, sub};
+
+use super::check_nodes;
 use crate::error::{Error, Result};
+use shape::{Foot, Location, RIM, Rim, unit};
 
 /// Facets that share sides, with their neighbors.
 #[derive(Debug)]
-pub(super) struct Surface {
+pub(crate) struct Surface {
     facets: Vec<Facet>,
     rims: Vec<Rim>,
     /// The facet across each side, and which of its sides that is.
@@ -27,7 +37,7 @@ fn refuse(facet: usize, reason: &'static str) -> Error {
 
 impl Surface {
     /// Finds the neighbors, and refuses facets that are degenerate, turned against each other or that branch.
-    pub(super) fn new(facets: Vec<Facet>, dimension: usize, coordinates: &[Point]) -> Result<Self> {
+    pub(crate) fn new(facets: Vec<Facet>, dimension: usize, coordinates: &[Point]) -> Result<Self> {
         if facets.is_empty() {
             let what = "the list of facets of a contact surface";
             return Err(Error::Empty { what, remedy: "give at least one facet" });
@@ -38,7 +48,7 @@ impl Surface {
                 let expected = if dimension == 2 { 2 } else { 3 };
                 return Err(Error::Dimension { what: "a facet of a contact surface", expected, found: nodes.len() });
             }
-            super::super::check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
             if !facet.shape(coordinates).is_regular() {
                 let reason = match facet.shape(coordinates).is_degenerate() {
                     true => "it has no length or area",
@@ -170,32 +180,32 @@ impl Surface {
         }
     }
 
-    pub(super) fn facets(&self) -> &[Facet] {
+    pub(crate) fn facets(&self) -> &[Facet] {
         &self.facets
     }
 
     /// The longest side of the smallest facet, in the reference coordinates.
-    pub(super) fn finest(&self) -> f64 {
+    pub(crate) fn finest(&self) -> f64 {
         self.finest
     }
 
     /// The mean of the longest sides of the facets, in the reference coordinates.
-    pub(super) fn typical(&self) -> f64 {
+    pub(crate) fn typical(&self) -> f64 {
         self.typical
     }
 
     /// Nodes of the facets, sorted.
-    pub(super) fn nodes(&self) -> &[usize] {
+    pub(crate) fn nodes(&self) -> &[usize] {
         &self.nodes
     }
 
     /// The closest point of a facet, with the shape of the facet.
-    pub(super) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
+    pub(crate) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
         self.project_beyond(facet, p, RIM, positions)
     }
 
     /// As `project`, on a surface that goes on beyond its rim for another share of the facet.
-    pub(super) fn project_beyond(
+    pub(crate) fn project_beyond(
         &self,
         facet: usize,
         p: Point,
@@ -217,7 +227,7 @@ impl Surface {
     }
 
     /// Mean of the normals of the facets around a node, weighted by their angles there; none if the node has no facet.
-    pub(super) fn node_normal(&self, node: usize, positions: &[Point]) -> Option<Point> {
+    pub(crate) fn node_normal(&self, node: usize, positions: &[Point]) -> Option<Point> {
         let start = self.around.partition_point(|&(other, ..)| other < node);
         let around = self.around[start..].iter().take_while(|&&(other, ..)| other == node);
         let sum = around.fold([0.0; 3], |sum, &(_, facet, k)| {
@@ -259,7 +269,7 @@ impl Surface {
     /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
     /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
     /// facet, where that direction is lost in rounding, the mean normal itself.
-    pub(super) fn direction(
+    pub(crate) fn direction(
         &self,
         facet: usize,
         p: Point,

@@ -1,8 +1,8 @@
 //! Where a node stands on a surface: what searching and following share, and how the gap accelerates along a motion.
 
-use super::geometry::{Foot, Location, Point, Shape, add_scaled, dot};
+use super::Surface;
 use super::search::{Bounds, Neighborhood, overhang};
-use super::surface::Surface;
+use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
 
 /// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
 const SAME_SIDE: f64 = 0.5;
@@ -23,16 +23,16 @@ struct Seen {
 
 /// A node on a facet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stand {
+pub(crate) struct Stand {
     /// Place of the node in the list of its pass.
-    pub(super) place: usize,
+    pub(crate) place: usize,
     /// Index of the facet in the list of its pass.
-    pub(super) facet: usize,
+    pub(crate) facet: usize,
     location: Location,
     /// Shape functions of the facet's vertices at the closest point.
-    pub(super) weights: [f64; 4],
-    pub(super) normal: Point,
-    pub(super) gap: f64,
+    pub(crate) weights: [f64; 4],
+    pub(crate) normal: Point,
+    pub(crate) gap: f64,
     /// How often the node has jumped since the search, and where it stood last at the two times that rows are followed
     /// to, the newest first.
     jumps: u8,
@@ -41,34 +41,34 @@ pub(super) struct Stand {
 
 /// The nodes of a pass and what they may stand on, at the positions now.
 #[derive(Clone, Copy)]
-pub(super) struct Ground<'a> {
-    pub(super) nodes: &'a [usize],
+pub(crate) struct Ground<'a> {
+    pub(crate) nodes: &'a [usize],
     /// Facets to look at; all of them, if there is none.
-    pub(super) neighborhood: Option<&'a Neighborhood>,
-    pub(super) surface: &'a Surface,
+    pub(crate) neighborhood: Option<&'a Neighborhood>,
+    pub(crate) surface: &'a Surface,
     /// The surface of the nodes, if known.
-    pub(super) own: Option<&'a Surface>,
-    pub(super) positions: &'a [Point],
+    pub(crate) own: Option<&'a Surface>,
+    pub(crate) positions: &'a [Point],
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
-    pub(super) rounding: f64,
+    pub(crate) rounding: f64,
 }
 
 impl Ground<'_> {
     /// Facets to look at for the node at a place of the list.
-    pub(super) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
         let list = self.neighborhood.map(|lists| lists.of(place));
         let count = list.map_or(self.surface.facets().len(), <[usize]>::len);
         (0..count).map(move |k| list.map_or(k, |list| list[k]))
     }
 
     /// The closest facet within `reach` of the node at a place of the list; none beyond the rim.
-    pub(super) fn closest(&self, place: usize, reach: f64) -> Option<Stand> {
+    pub(crate) fn closest(&self, place: usize, reach: f64) -> Option<Stand> {
         let (facet, projected) = self.nearest(place, reach)?;
         self.on(place, facet, &projected)
     }
 
     /// The distance of that facet, or of its rim, and the stand on it; `reach` if there is no facet as near.
-    pub(super) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
+    pub(crate) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
         match self.nearest(place, reach) {
             Some((facet, projected)) => (projected.1.distance, self.on(place, facet, &projected)),
             None => (reach, None),
@@ -101,14 +101,14 @@ impl Ground<'_> {
 
     /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node
     /// that slides over the rim, or turns away, ends its step.
-    pub(super) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
+    pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
         let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), SAME_SIDE_OF_LAST);
         stays.then(|| self.on(place, facet, &projected)).flatten()
     }
 
-    pub(super) fn own_normal(&self, place: usize) -> Option<Point> {
+    pub(crate) fn own_normal(&self, place: usize) -> Option<Point> {
         self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
     }
 
@@ -124,7 +124,7 @@ impl Ground<'_> {
 }
 
 /// Whether a node with this normal, if it has one, meets the front of a facet with that one.
-pub(super) fn meets(normal: Point, own_normal: Option<Point>) -> bool {
+pub(crate) fn meets(normal: Point, own_normal: Option<Point>) -> bool {
     own_normal.is_none_or(|own| dot(own, normal) <= SAME_SIDE)
 }
 
@@ -139,7 +139,7 @@ impl Stand {
     /// facets, or around an edge that it touches, a node has no normal to converge to: one that has jumped too often
     /// stays. Rows are followed to where the balance holds and to where the gap is met, later in the step, in turns;
     /// where a kink lies between the two, the row of the later place serves both.
-    pub(super) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
+    pub(crate) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
         /// Cosines of the angles that are a jump and a kink (18°), and jumps that are followed.
         const TURN: f64 = 1.0 - 1e-5;
         const KINK: f64 = 0.95;
@@ -169,7 +169,7 @@ impl Stand {
     /// A = S,α · S,β − g n · S,αβ, and the turning of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α
     /// ξ̇. On a side or a vertex the node also turns around it: w⊥²/g. Closer than a share of the facet that turn is
     /// over in no time, and the facet stands for the smooth surface that is meant.
-    pub(super) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
+    pub(crate) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
         const CLOSE: f64 = 1e-3;
         let n = self.normal;
         let arm = add_scaled(x, -1.0, shape.point(&self.weights));

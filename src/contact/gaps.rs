@@ -1,0 +1,33 @@
+//! The gaps of all constraints of a run as one list, for those who read them without knowing the constraints.
+
+use super::{ContactLaw, GapRates};
+use crate::error::Result;
+use crate::real::Real;
+
+/// The gaps of all rows of a run, as a step evaluates them: those that are NaN or infinite are refused.
+pub(crate) trait Gaps<T: Real> {
+    fn law(&self, row: usize) -> ContactLaw;
+
+    /// What of a gap is rounding, if the terms of G u have this magnitude.
+    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T;
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
+
+    /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized
+    /// there; afterwards rows are those of `here` (time, u) again.
+    fn elsewhere(&mut self, field: usize, there: (f64, [&[T]; 3]), here: (f64, &[T]), out: &mut [T]) -> Result<()>;
+}
+
+/// Borrowed gaps, debug-printable.
+pub(crate) struct ErasedGaps<'a, T: Real>(pub(crate) &'a mut dyn Gaps<T>);
+
+impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Gaps")
+    }
+}
+
+/// What rounding makes of a sum whose terms have this magnitude.
+pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
+    T::of(64.0) * T::epsilon() * magnitude
+}

@@ -1,0 +1,148 @@
+//! Which rows there are: a search finds them, and following moves them to where their nodes stand.
+
+use super::{NodeToFacet, Pass};
+use crate::contact::ContactId;
+use crate::contact::surface::{Bounds, Ground, Point, Surface, sub};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+impl<T: Real> NodeToFacet<T> {
+    /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
+    pub(super) fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
+        let Self { dimension, coordinates, dofs, positions, built_at, bodies, .. } = self;
+        let (mut boxes, mut motions) = ([Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
+        for ((body, bounds), motion) in bodies.iter().zip(&mut boxes).zip(&mut motions) {
+            for &node in body {
+                let mut x = coordinates[node];
+                for (x, &dof) in x.iter_mut().zip(&dofs[node][..*dimension]) {
+                    *x += u[dof].value();
+                    if !x.is_finite() {
+                        let what = "the displacement of a contact surface (by dof)";
+                        return Err(Error::NotFinite { what, index: dof, value: u[dof].value() });
+                    }
+                }
+                positions[node] = x;
+                bounds.include(x);
+                if let Some(&before) = built_at.get(node) {
+                    motion.include(sub(x, before));
+                }
+            }
+        }
+        Ok((boxes, motions))
+    }
+
+    /// The boxes of the velocities of the two bodies.
+    pub(super) fn speeds(&self, v: &[T]) -> [Bounds; 2] {
+        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.vector(node, v))))
+    }
+
+    /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
+    pub(super) fn update_lists(&mut self, [one, other]: &[Bounds; 2], range: f64) {
+        if !self.built_at.is_empty() && range + one.spread(other) <= self.listed {
+            return;
+        }
+        self.listed = range + self.skin.unwrap_or(0.5 * range);
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
+            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.listed);
+        }
+        self.built_at.clone_from(&self.positions);
+        self.rebuilds += 1;
+    }
+
+    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body
+    /// makes with its velocities in theirs within the time `ahead`.
+    pub(super) fn find_rows(&mut self, pass: usize, (near, speeds): (&Bounds, &Bounds), u: &[T], v: &[T], ahead: f64) {
+        let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
+        self.find_rows_and(pass, (near, speeds), u, v, ahead, &mut clearance);
+        self.passes[pass].clearance = clearance;
+    }
+
+    fn find_rows_and(
+        &mut self,
+        pass: usize,
+        (near, speeds): (&Bounds, &Bounds),
+        u: &[T],
+        v: &[T],
+        ahead: f64,
+        clearance: &mut [f64],
+    ) {
+        let Self { surface, own_surface, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
+            return;
+        };
+        for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
+            if !near.contains(positions[node]) {
+                continue;
+            }
+            let mut velocity = [0.0; 3];
+            for (component, &dof) in velocity.iter_mut().zip(&dofs[node][..*dimension]) {
+                *component = v[dof].value();
+            }
+            let way = ahead * Bounds::of_points([velocity]).farthest(speeds);
+            let (distance, stand) = ground.clearance(place, *reach + way);
+            *clearance = distance;
+            let Some(stand) = stand else { continue };
+            let vertices = ground.surface.facets()[stand.facet].nodes();
+            if !partners.is_empty() {
+                let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
+                let on = on.map(|(&vertex, _)| vertex);
+                match pass {
+                    0 => partners[node] = on,
+                    _ if on.is_some_and(|vertex| partners[vertex] == Some(node)) => continue,
+                    _ => {}
+                }
+            }
+            found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+        }
+    }
+
+    /// The rows there are, where their nodes stand now; `motions` are those since the lists were built.
+    pub(super) fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
+        /// Gap, in shares of the reach, above which a row surely does not press.
+        const OPEN: f64 = 0.01;
+        let Self { surface, own_surface, positions, passes, rows, found, dimension, dofs, .. } = self;
+        for (row, &(node, pass)) in rows.identities.iter().enumerate() {
+            let old = rows.stands[row];
+            let ground = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding());
+            // The list of the node has all facets as near as this.
+            let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
+                Bounds::of_points([sub(positions[node], before)]).spread(&motions[1 - pass])
+            });
+            let known = self.listed - moved;
+            let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
+                let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
+                Some((stand, ground.surface.facets()[stand.facet].nodes()))
+            });
+            match stand {
+                Some((stand, vertices)) => match old.followed_by(stand, t) {
+                    Some(stand) => {
+                        found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+                    }
+                    None => found.keep(rows, row),
+                },
+                // There is nothing near that it could press on.
+                None if known > 0.0 && rows.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
+                None => {
+                    let contact = ContactId { constraint: 0, feature: node, candidate: pass };
+                    return Err(Error::ContactLost { t, contact });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the nodes of a pass stand on.
+fn ground<'a>(
+    pass: usize,
+    passes: &'a [Pass],
+    surface: &'a Surface,
+    own_surface: Option<&'a Surface>,
+    positions: &'a [Point],
+    rounding: f64,
+) -> Option<Ground<'a>> {
+    let Pass { nodes, neighborhood, .. } = &passes[pass];
+    let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
+    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, positions, rounding })
+}

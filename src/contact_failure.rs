@@ -1,0 +1,57 @@
+//! Why a contact problem was not solved: plain data, which contact solvers return and errors carry.
+
+use crate::real::Real;
+
+/// Why a contact problem was not solved; rows count within the problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactFailure<T> {
+    /// No multipliers meet all conditions: rows demand opposite things of the same dofs.
+    Contradictory {
+        /// The row that is violated most.
+        row: usize,
+        /// The row that presses hardest against it.
+        other: usize,
+        /// The violation, in the unit of y.
+        residual: T,
+    },
+    /// The iteration limit was reached.
+    NotConverged {
+        /// Iterations spent.
+        iterations: usize,
+        /// The worst row.
+        row: usize,
+        /// Its residual, in the unit of y.
+        residual: T,
+    },
+    /// W is not symmetric, and the solver is for symmetric ones; nothing was done.
+    Unsymmetric {
+        /// The pair of rows whose entries across the diagonal differ most.
+        row: usize,
+        /// The other row.
+        other: usize,
+    },
+}
+
+impl<T: Real> std::fmt::Display for ContactFailure<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contradictory { row, other, residual } => {
+                let residual = residual.value();
+                write!(f, "rows {row} and {other} contradict each other: {row} stays violated by {residual:e}")
+            }
+            Self::NotConverged { iterations, row, residual } => {
+                let residual = residual.value();
+                write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
+            }
+            Self::Unsymmetric { row, other } => {
+                write!(
+                    f,
+                    "rows {row} and {other} answer to each other differently: W is not symmetric; use ActiveSet or \
+                     GaussSeidel"
+                )
+            }
+        }
+    }
+}
+
+impl<T: Real> std::error::Error for ContactFailure<T> {}

@@ -1,0 +1,26 @@
+//! Failed contact problems as errors of a step, which name contacts instead of rows.
+
+use crate::contact_failure::ContactFailure;
+use crate::contact_id::ContactId;
+use crate::error::Error;
+use crate::real::Real;
+
+/// The error of a contact whose bodies' response to a force is not a number.
+pub(crate) fn no_response(t: f64, contact: ContactId) -> Error {
+    Error::ContactNotFinite { t, what: "the response G M⁻¹ Gᵀ", contact, value: f64::NAN }
+}
+
+/// The error of a contact problem that failed at time t.
+pub(crate) fn contact_error<T: Real>(t: f64, failure: ContactFailure<T>, id: impl Fn(usize) -> ContactId) -> Error {
+    match failure {
+        ContactFailure::Contradictory { row, other, residual } => {
+            Error::ContradictoryContacts { t, contact: id(row), other: id(other), violation: residual.value() }
+        }
+        ContactFailure::NotConverged { iterations, row, residual } => {
+            Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
+        }
+        ContactFailure::Unsymmetric { row, other } => {
+            Error::UnsymmetricContacts { t, contact: id(row), other: id(other) }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Memory of the corrections, reserved when a simulation is built.
+
+use crate::contact::GapRates;
+use crate::contact_solver::Bound;
+use crate::real::Real;
+use crate::state::ContactState;
+
+/// Buffers of the corrections, one entry a closed row unless said otherwise; reserved at build.
+#[derive(Debug)]
+pub(crate) struct Buffers<T> {
+    /// Closed rows.
+    pub(crate) closed: Vec<usize>,
+    /// Engaged rows, a subset of `closed`.
+    pub(super) engaged: Vec<usize>,
+    /// Rows that have opened in this stage.
+    pub(crate) opened: Vec<usize>,
+    /// Rows that were closed in this step or at its start, and are open now.
+    pub(crate) released: Vec<usize>,
+    /// Reported forces before this stage, one a candidate.
+    pub(crate) reported: Vec<T>,
+    pub(super) bounds: Vec<Bound>,
+    pub(super) jump: Vec<T>,
+    pub(super) tolerance: Vec<T>,
+    /// Impulses that remove the velocity jumps, one a closed row.
+    pub(super) impulses: Vec<T>,
+    /// Forces that remove the acceleration jumps, one an engaged row.
+    pub(super) forces: Vec<T>,
+    pub(super) s: Vec<T>,
+    /// One a candidate.
+    pub(super) rates: Vec<GapRates<T>>,
+    pub(super) gaps: Vec<T>,
+    /// Change of v and the damping force it makes (and that of before), one a dof; empty without damping.
+    pub(super) change: Vec<T>,
+    pub(super) damping: Vec<T>,
+    pub(super) before: Vec<T>,
+}
+
+impl<T: Real> Buffers<T> {
+    /// Room for `rows` contacts, and for velocity changes of `damped` dofs (0 without damping).
+    pub(crate) fn new(rows: usize, damped: usize) -> Self {
+        let reals = |n| Vec::with_capacity(n);
+        Self {
+            closed: Vec::with_capacity(rows),
+            engaged: Vec::with_capacity(rows),
+            opened: Vec::with_capacity(rows),
+            released: Vec::with_capacity(rows),
+            reported: reals(rows),
+            bounds: Vec::with_capacity(rows),
+            jump: reals(rows),
+            tolerance: reals(rows),
+            impulses: reals(rows),
+            forces: reals(rows),
+            s: reals(rows * rows),
+            rates: vec![GapRates::default(); rows],
+            gaps: vec![T::zero(); rows],
+            change: vec![T::zero(); damped],
+            damping: vec![T::zero(); damped],
+            before: vec![T::zero(); damped],
+        }
+    }
+
+    /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
+    pub(crate) fn report(&mut self, contacts: &ContactState<T>, first: bool) {
+        if first {
+            self.reported.clone_from(&contacts.lambda);
+        }
+        for ((reported, &lambda), &closed) in self.reported.iter_mut().zip(&contacts.lambda).zip(&contacts.closed) {
+            if closed {
+                *reported = lambda;
+            }
+        }
+    }
+
+    /// Whether the last stage had contacts to correct.
+    pub(crate) fn has_touched(&self) -> bool {
+        !self.closed.is_empty() || !self.opened.is_empty() || !self.released.is_empty()
+    }
+
+    /// Whether damping carries corrections of v to the accelerations of all dofs.
+    pub(crate) fn spreads(&self) -> bool {
+        !self.change.is_empty()
+    }
+}

@@ -1,0 +1,133 @@
+//! Edits of the past: its projection onto contacts that have just closed, and velocities given to it with those of the
+//! state.
+
+use super::{Buffers, Correction, rounding};
+use crate::error::Result;
+use crate::real::Real;
+
+impl<T: Real> Correction<'_, T> {
+    /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
+    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
+    /// law reads the gap at the start of a stage.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ContactNotFinite`](crate::Error::ContactNotFinite);
+    /// [`Error::Incompatible`](crate::Error::Incompatible) if the corrector's
+    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
+    pub fn project_past(&mut self) -> Result<()> {
+        if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
+            return Ok(());
+        }
+        self.backup.check()?;
+        let rows = std::mem::take(&mut self.buffers.engaged);
+        let mut closing = self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row));
+        // States not known yet, while a multistep scheme is started, have no covector.
+        let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
+        if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
+            self.backup.keep(self.past);
+            for k in 1..=places {
+                for field in 0..3 {
+                    if closing.is_ok() && self.scheme.read[k][field] {
+                        closing = self.project_field(k, field, &rows);
+                    }
+                }
+            }
+        }
+        self.buffers.engaged = rows;
+        closing
+    }
+
+    /// Projects one field of past state k onto the engaged rows.
+    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, energy, .. } = self;
+        let Buffers { gaps, rates, jump, tolerance: before, .. } = &mut **buffers;
+        let motion = &mut past[k - 1];
+        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        // Of the past motion on its own part of a curved surface: u, v and a fit each other.
+        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
+        // Where a gap is held, under a law that reads it where a stage starts.
+        let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
+            true => contacts.gap[row],
+            false => T::zero(),
+        };
+        jump.clear();
+        jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
+        before.clear();
+        before.extend_from_slice(jump);
+        projection.solve(jump);
+        // In a stage before the last the state that the step starts from loses what the later stages do not see any
+        // more.
+        if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
+            constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
+            for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
+                let taken = T::of(0.5) * multiplier * before;
+                contacts.dissipated[row] += taken;
+                **energy += multiplier * rates[row].rate - taken;
+            }
+        }
+        let (values, unit) = match field {
+            0 => (&mut motion.u, psi / h),
+            1 => (&mut motion.v, psi),
+            _ => (&mut motion.a, psi * h),
+        };
+        for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
+            projection.push(g, row, -multiplier, values);
+            contacts.impulse[row] -= T::of(unit) * multiplier;
+        }
+        Ok(())
+    }
+
+    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can
+    /// tell: the bodies leave each other with that energy more, and the past that later rows read has had the same
+    /// velocity.
+    pub(in crate::corrector) fn give_back(&mut self, row: usize) -> Result<()> {
+        let (s, rate) = (self.compliance(row), self.rate(row)?);
+        let taken = self.contacts.dissipated[row];
+        // Of the relative velocity u = G v + ġ0, which is left of larger numbers, j u is noise of this size.
+        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        if !(s > T::zero() && T::of(2.0) * s * taken > noise * noise) {
+            return Ok(());
+        }
+        // Without cancellation: ½ S j² + j rate = taken.
+        let root = (rate * rate + T::of(2.0) * s * taken).sqrt();
+        let impulse = match rate > T::zero() {
+            true => T::of(2.0) * taken / (root + rate),
+            false => (root - rate) / s,
+        };
+        self.apply(&[row], &[impulse])?;
+        self.move_past(row, impulse)
+    }
+
+    /// Applies an impulse along a row to the velocities, and to the past as if they had always been so.
+    pub(in crate::corrector) fn part(&mut self, row: usize, impulse: T) -> Result<()> {
+        self.apply_impulses(&[row], &[impulse])?;
+        self.move_past(row, impulse)
+    }
+
+    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
+    /// rows read them. Schemes that difference displacements would see a part of it else, or more than all.
+    fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
+        let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
+        // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
+        let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));
+        let first = scheme.stages;
+        if (first..=places).any(|k| scheme.read[k][0] || scheme.read[k][1]) {
+            backup.check()?;
+            backup.keep(past);
+        }
+        for k in first..=places {
+            let (motion, steps) = (&mut past[k - 1], (k + 1 - scheme.stages) as f64);
+            let [by_u, by_v, _] = scheme.covector[k];
+            if scheme.read[k][0] {
+                projection.push(g, row, T::of(-steps * *h) * impulse, &mut motion.u);
+                contacts.impulse[row] -= T::of(steps * by_u) * impulse;
+            }
+            if scheme.read[k][1] {
+                projection.push(g, row, impulse, &mut motion.v);
+                contacts.impulse[row] += T::of(by_v) * impulse;
+            }
+        }
+        Ok(())
+    }
+}

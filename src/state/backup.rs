@@ -1,0 +1,69 @@
+//! What undoes a failed step: its rotations of the history, and a copy of the past made at the first edit.
+
+use super::Motion;
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// The past as it was before the step, kept when a corrector first edits it.
+#[derive(Debug)]
+pub(crate) struct Backup<T> {
+    /// Whether state and history are those of a step that has not ended.
+    pub(crate) underway: bool,
+    /// Rotations of the history at the present stage.
+    pub(crate) rotations: usize,
+    /// Rotations at which the copy was made, if there is one.
+    kept: Option<usize>,
+    slots: Vec<Motion<T>>,
+}
+
+impl<T: Real> Backup<T> {
+    /// Room for `slots` past states.
+    pub(crate) fn new(slots: usize, dofs: usize) -> Self {
+        Self { underway: false, rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
+    }
+
+    /// Forgets the copy: the step begins.
+    pub(crate) fn begin(&mut self) {
+        (self.rotations, self.kept) = (0, None);
+    }
+
+    /// Refuses edits that could not be undone.
+    pub(crate) fn check(&self) -> Result<()> {
+        match self.slots.is_empty() {
+            false => Ok(()),
+            true => Err(Error::Incompatible {
+                part: "a corrector that projects the past".into(),
+                reason: "its `edits` does not say so, and no room was kept to undo a failed step",
+            }),
+        }
+    }
+
+    /// The past states that the step may have edited.
+    pub(crate) fn edited<'p>(&self, past: &'p [Motion<T>]) -> &'p [Motion<T>] {
+        match self.kept {
+            Some(_) => past,
+            None => &[],
+        }
+    }
+
+    pub(crate) fn keep(&mut self, past: &[Motion<T>]) {
+        if self.kept.is_none() {
+            for (copy, original) in self.slots.iter_mut().zip(past) {
+                copy.copy_from(original);
+            }
+            self.kept = Some(self.rotations);
+        }
+    }
+
+    /// Undoes all stages of a failed step: rotations and edits of the past.
+    pub(crate) fn undo(&mut self, slots: &mut [Motion<T>]) {
+        let kept = self.kept.take();
+        slots.rotate_left(self.rotations - kept.unwrap_or(0));
+        if let Some(rotations) = kept {
+            for (original, copy) in slots[1..].iter_mut().zip(&self.slots) {
+                original.copy_from(copy);
+            }
+            slots.rotate_left(rotations);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Time, and where a step size that changes stands in the grid of its nominal one.
+
+use crate::error::{Error, Result};
+
+/// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin
+/// does not round: runs are the same whenever they start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clock {
+    /// Time at the start of the run.
+    origin: f64,
+    /// From there to the last change of the step size.
+    elapsed: f64,
+    /// Steps since then, and their size.
+    pub(crate) steps: u64,
+    pub(crate) h: f64,
+}
+
+impl Clock {
+    pub(crate) fn new(origin: f64, h: f64) -> Self {
+        Self { origin, elapsed: 0.0, steps: 0, h }
+    }
+
+    /// Time at `fraction` of the step that comes next.
+    pub(crate) fn at(&self, fraction: f64) -> f64 {
+        self.origin + self.elapsed_at(fraction)
+    }
+
+    fn elapsed_at(&self, fraction: f64) -> f64 {
+        self.elapsed + (self.steps as f64 + fraction) * self.h
+    }
+
+    /// The clock with another step size from here on.
+    pub(crate) fn with_step_size(&self, h: f64) -> Self {
+        Self { elapsed: self.elapsed_at(0.0), steps: 0, h, ..*self }
+    }
+
+    /// From now until t.
+    pub(crate) fn until(&self, t: f64) -> f64 {
+        (t - self.origin) - self.elapsed_at(0.0)
+    }
+
+    /// Whether t is reached, but for 1e-9 h and the rounding of t.
+    pub(crate) fn has_reached(&self, t: f64) -> bool {
+        t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
+    }
+
+    /// Refuses a step size that does not change the time: host functions of time would stand still while the motion
+    /// goes on.
+    pub(crate) fn check(&self) -> Result<()> {
+        let (t, h) = (self.at(0.0), self.h);
+        match h >= resolution(t) {
+            true => Ok(()),
+            false => Err(Error::TimeNotAdvancing { t, h, resolution: resolution(t) }),
+        }
+    }
+}
+
+/// The distance between times near t that an `f64` can tell apart.
+pub(crate) fn resolution(t: f64) -> f64 {
+    t.abs().next_up() - t.abs()
+}
+
+/// Where the present step size stands in the nominal grid, for runs that control it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pace {
+    pub(crate) nominal: f64,
+    /// How often the nominal step is halved now.
+    level: u32,
+    /// Steps of the present size since the size last was the nominal one.
+    position: u64,
+    /// Steps taken since the size last changed, and whether it grew then.
+    steps: u32,
+    grown: bool,
+    /// Steps that growth asks for.
+    patience: u32,
+}
+
+/// Good steps before a step size grows, at first and at most.
+const PATIENCE: [u32; 2] = [2, 64];
+
+impl Pace {
+    pub(crate) fn new(nominal: f64) -> Self {
+        Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0] }
+    }
+
+    /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer.
+    pub(crate) fn halve(&mut self) {
+        if self.grown && self.steps == 0 {
+            self.patience = (2 * self.patience).min(PATIENCE[1]);
+        }
+        (self.level, self.position) = (self.level + 1, 2 * self.position);
+        (self.steps, self.grown) = (0, false);
+    }
+
+    /// After a good step: says whether the size may grow here.
+    pub(crate) fn advance(&mut self) -> bool {
+        self.position = if self.level > 0 { self.position + 1 } else { 0 };
+        self.steps += 1;
+        if self.grown {
+            self.patience = PATIENCE[0];
+        }
+        self.level > 0 && self.position.is_multiple_of(2) && self.steps >= self.patience
+    }
+
+    /// Growth: twice the size.
+    pub(crate) fn double(&mut self) {
+        (self.level, self.position) = (self.level - 1, self.position / 2);
+        (self.steps, self.grown) = (0, true);
+    }
+}

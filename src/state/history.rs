@@ -1,0 +1,117 @@
+//! The past of a run.
+
+use super::{Clock, Motion, Pace};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::Overclosures;
+
+/// The past states that a multistep scheme reads, and the clock of the run.
+#[derive(Clone, Debug)]
+pub struct History<T> {
+    /// Slot 0 is spare between steps; past state k (k ≥ 1) is slot k.
+    pub(crate) slots: Vec<Motion<T>>,
+    /// Number of states known, the current one included.
+    pub(crate) known: usize,
+    /// Number of newest states since a contact last closed or opened, the first one after that included.
+    pub(crate) smooth: usize,
+    pub(crate) clock: Clock,
+    pub(crate) pace: Pace,
+    /// Step size that made the current state.
+    pub(crate) made_with: f64,
+    /// The motions as they were computed, from which changes of the step size resample; empty until there is one.
+    pub(crate) trail: Trail<T>,
+    /// v and a of the current state as they were computed, if a change of the step size has moved the stored ones to
+    /// another time.
+    pub(crate) unmoved: [Vec<T>; 2],
+    /// (u_n − u_{n−1})/h on the dofs without mass: their velocity is differenced over two steps.
+    pub(crate) slopes: Vec<T>,
+    /// Name of the integrator: another one would read other things out of the same states.
+    pub(crate) scheme: String,
+    /// What is added to the gaps because bodies overlapped at the start.
+    pub(crate) overclosures: Option<Overclosures<T>>,
+}
+
+/// Motions before the current one as they were computed, newest first, whatever their spacing.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Trail<T> {
+    /// Each with the step size that made it; those beyond `known` are spare.
+    states: Vec<(Motion<T>, f64)>,
+    known: usize,
+}
+
+impl<T: Real> Trail<T> {
+    /// Room for `length` states, the newest of which are `known`.
+    pub(crate) fn new(length: usize, dofs: usize, known: &[(&Motion<T>, f64)]) -> Self {
+        let mut trail = Self { states: vec![(Motion::zero(dofs), 0.0); length], known: 0 };
+        for (motion, h) in known.iter().rev() {
+            trail.push(motion, *h);
+        }
+        trail
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.states.is_empty()
+    }
+
+    /// Puts a motion in front, without allocating; the oldest drops out.
+    pub(crate) fn push(&mut self, motion: &Motion<T>, h: f64) {
+        self.states.rotate_right(1);
+        if let Some((front, made_with)) = self.states.first_mut() {
+            front.copy_from(motion);
+            *made_with = h;
+            self.known = (self.known + 1).min(self.states.len());
+        }
+    }
+
+    /// The newest motion, to be edited.
+    pub(crate) fn front(&mut self) -> Option<&mut Motion<T>> {
+        self.states.first_mut().map(|(motion, _)| motion)
+    }
+
+    /// The motions known.
+    pub(crate) fn known(&self) -> impl Iterator<Item = (&Motion<T>, f64)> {
+        self.states[..self.known].iter().map(|(motion, h)| (motion, *h))
+    }
+}
+
+impl<T: Real> History<T> {
+    /// Step size with which the states were spaced.
+    pub fn step_size(&self) -> f64 {
+        self.clock.h
+    }
+
+    /// Number of past states known, the current one not counted.
+    pub fn len(&self) -> usize {
+        self.known - 1
+    }
+
+    /// Whether no past state is known.
+    pub fn is_empty(&self) -> bool {
+        self.known <= 1
+    }
+
+    /// Displacement, velocity and acceleration of past state k = 1 (the one before the current), 2, …, as later steps
+    /// read them: after a history projection they differ from what an observer saw.
+    pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
+        let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
+        Some((&motion.u, &motion.v, &motion.a))
+    }
+
+    pub(crate) fn check(&self, dofs: usize, slots: usize, massless: usize) -> Result<()> {
+        let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });
+        if self.slopes.len() != massless {
+            return wrong("the history (dofs without mass)", massless, self.slopes.len());
+        }
+        if self.slots.len() != slots {
+            return wrong("the history (states)", slots, self.slots.len());
+        }
+        for motion in &self.slots {
+            for found in (0..3).map(|field| motion.field(field).len()) {
+                if found != dofs {
+                    return wrong("a state of the history", dofs, found);
+                }
+            }
+        }
+        Ok(())
+    }
+}
