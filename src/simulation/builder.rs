@@ -7,7 +7,7 @@ use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
-    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
+    check_corrections, check_lagged_damping, check_massless, check_path, check_resumed, is_correctable, local_error,
 };
 use super::path::PathWork;
 use super::program::{Compiler, Program};
@@ -452,33 +452,6 @@ fn newton<T: Real>(
     let dofs = motion.u.len();
     let path = along_path.then(|| PathWork::new(dofs));
     Ok(Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path)))
-}
-
-/// Refuses a state and history that another run could not have left.
-fn check_resumed<T: Real>(
-    state: &State<T>,
-    history: &History<T>,
-    scheme: &Scheme<'_>,
-    (own, h): (f64, f64),
-    [dofs, massless]: [usize; 2],
-) -> Result<()> {
-    history.check(dofs, scheme.depth + scheme.tableau.stages.len(), massless)?;
-    check_vector("the resumed displacement", &state.motion.u, dofs)?;
-    check_vector("the resumed velocity", &state.motion.v, dofs)?;
-    check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-    if history.scheme != scheme.integrator.name() {
-        let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
-        return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
-    }
-    let (t, end) = (state.motion.t, history.clock.at(0.0));
-    if (t - end).abs() > 1e-6 * history.clock.h {
-        let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
-        return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
-    }
-    if own.to_bits() != h.to_bits() {
-        return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
-    }
-    Ok(())
 }
 
 /// The judge of the steps of a run that controls them.
