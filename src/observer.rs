@@ -53,7 +53,7 @@ pub trait Observer<T: Real> {
     }
 }
 
-/// What an observer needs to see; more costs more.
+/// What an observer needs to see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Wants {
     /// State, gaps and counts: nothing is computed for it.

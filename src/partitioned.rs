@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 
-/// What a body says of its interface: where it would be without contact, and how it gives way.
+/// The interface of a body: its values without contact, and its flexibility.
 ///
 /// Values are those along the normal of each frame node. The normal points from the first side to the second, for both.
 /// They may be displacements, velocities or accelerations, with the flexibility to match.
@@ -20,7 +20,7 @@ pub struct Side<'a, T> {
     pub flexibility: &'a [T],
 }
 
-/// What a [`Frame`] has found.
+/// The solution of a [`Frame`].
 #[derive(Clone, Debug, Default)]
 pub struct Interface<T> {
     forces: Vec<T>,
@@ -33,14 +33,13 @@ pub struct Interface<T> {
 
 impl<T: Real> Interface<T> {
     /// The force l on each node, positive in compression (of either sign where [`Frame::hold`] holds): the second side
-    /// gets +l along the normal, the first −l. One vector for both multipliers: the frame has no mass, and balances
-    /// them.
+    /// gets +l along the normal, the first −l. The multipliers of both sides are equal, because the frame has no mass.
     pub fn forces(&self) -> &[T] {
         &self.forces
     }
 
-    /// The frame, counted as the values of the first side: where closed, both sides are there; where open, it is
-    /// halfway between them (anywhere between them would do, nothing acts on it).
+    /// Positions of the frame, in the values of the first side: where closed, those of both sides; where open, halfway
+    /// between them (no force acts there, and any position between them would do).
     pub fn positions(&self) -> &[T] {
         &self.positions
     }
@@ -55,8 +54,8 @@ impl<T: Real> Interface<T> {
         &self.gaps
     }
 
-    /// Where the sides touch: a force, or a gap that is rounding of the numbers it was computed from. (Of
-    /// [`Frame::hold`]: the nodes held.)
+    /// Where the sides are closed: pressed by a force, or with a gap within the rounding of the numbers that it was
+    /// computed from. (After [`Frame::hold`]: the nodes held.)
     pub fn closed(&self) -> &[bool] {
         &self.closed
     }
@@ -79,8 +78,8 @@ impl<T: Real> Interface<T> {
 /// ```
 ///
 /// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes.
-/// A body needs to know neither the other one nor its code: a step goes on with the forces found. Results are those of
-/// the monolithic form up to rounding (`tests/partitioned.rs`).
+/// A body needs to know neither the other one nor its code: its step goes on with the forces of the frame. Results are
+/// those of the monolithic form up to rounding (`tests/partitioned.rs`).
 ///
 /// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one
 /// belongs to the first side. Three bodies that touch each other do not fit.
@@ -145,8 +144,8 @@ impl<T: Real> Frame<T> {
     ///
     /// [`Error::OutOfMemory`] if the dense problem of so many nodes does not fit.
     pub fn with_solver(nodes: usize, mut solver: impl ContactSolver<T> + 'static) -> Result<Self> {
-        // Asked for first, with what the solver takes (its `reserve` cannot fail): an absurd number is an error and not
-        // an abort.
+        // Memory is tried first, that of the solver included (its `reserve` cannot fail), so that an absurd number is
+        // an error and not an abort.
         memory::reserve::<T>(nodes, nodes.saturating_mul(8), "a frame")?;
         let delassus = memory::reserve(nodes, nodes, "a frame")?;
         solver.reserve(nodes);
@@ -179,7 +178,7 @@ impl<T: Real> Frame<T> {
     /// # Errors
     ///
     /// [`Error::Dimension`], [`Error::NotFinite`], [`Error::Asymmetric`] and [`Error::Singular`] (`dof` is the frame
-    /// node) for what the sides say, [`Error::Frame`] if no forces were found. The frame can be used again.
+    /// node) for wrong sides, [`Error::Frame`] if no forces were found. The frame can be used again.
     pub fn solve(&mut self, sides: [Side<'_, T>; 2], gaps: &[T]) -> Result<&Interface<T>> {
         self.run(sides, gaps, None)
     }
@@ -207,7 +206,7 @@ impl<T: Real> Frame<T> {
         nodes.clear();
         nodes.extend((0..n).filter(|&node| held.is_none_or(|held| held[node])));
         let [first, second] = &sides;
-        // A number for each W: what the solver has computed from the last one serves while it stays.
+        // A version number for each W, so that the solver can keep its factor while W stays.
         let size = nodes.len();
         let mut changed = delassus.len() != size * size;
         delassus.resize(size * size, T::zero());
@@ -218,7 +217,7 @@ impl<T: Real> Frame<T> {
             *w = value;
         }
         *version += u64::from(changed);
-        // Of a gap this much is rounding.
+        // The rounding of a gap.
         let rounding = |node: usize| {
             let size = first.free[node].abs() + second.free[node].abs() + gaps[node].abs();
             T::of(64.0) * T::epsilon() * size
@@ -285,7 +284,8 @@ fn check_finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     }
 }
 
-/// Refuses what is no flexibility: sizes, signs, columns solved for with other rows than they are read with.
+/// Refuses sides of wrong sizes, and flexibilities with a negative diagonal entry or that are not symmetric (columns
+/// may have been stored as rows, or solved for with other normals).
 fn check<T: Real>(side: &Side<'_, T>, n: usize) -> Result<()> {
     let Side { free, flexibility } = side;
     check_length("free values of a side", free.len(), n)?;
@@ -298,7 +298,7 @@ fn check<T: Real>(side: &Side<'_, T>, n: usize) -> Result<()> {
             return Err(Error::Singular { matrix: "flexibility of a side", dof: column });
         }
         for row in 0..column {
-            // Columns come from solves, whose rounding is that of the body's condition.
+            // Columns come from solves, whose error depends on the condition of the body's matrix.
             let scale = entry(row, row).max(entry(column, column));
             let (value, mirrored) = (entry(row, column), entry(column, row));
             if (value - mirrored).abs() > T::epsilon().sqrt() * scale {

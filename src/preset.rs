@@ -19,7 +19,7 @@ use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 /// // A bar of 50 elements falls on a floor with its first node.
 /// let (n, ea, rho_a, size, h) = (50, 900.0, 1.0, 0.2, 2e-3);
 /// let bar = |diagonal: f64, off: f64| {
-///     let element = |e| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)];
+///     let element = |e: usize| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)];
 ///     let entries: Vec<_> = (0..n).flat_map(element).map(|(i, j, x)| Triplet::new(i, j, x)).collect();
 ///     SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &entries)
 /// };
@@ -48,7 +48,7 @@ enum Kind {
     Explicit,
 }
 
-/// What the neighbors of massless contact dofs give away in a [`Preset`].
+/// The share of their mass that neighbors of massless contact dofs give away in a [`Preset`].
 const TAPER: f64 = 0.15;
 
 /// Spectral radius of the dissipative preset.

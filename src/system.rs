@@ -117,8 +117,8 @@ pub trait System<T: Real>: Send {
     /// Number of degrees of freedom, prescribed ones included.
     fn dofs(&self) -> usize;
 
-    /// How the force depends on u and v. A system that is nonlinear must not say that it is linear; the other way round
-    /// costs time only.
+    /// How the force depends on u and v. A nonlinear system must not be declared linear; a linear one that is declared
+    /// nonlinear only takes more time.
     fn linearity(&self) -> Linearity {
         Linearity::Nonlinear
     }
@@ -192,8 +192,8 @@ pub trait System<T: Real>: Send {
     }
 
     /// Elastic energy (½ uᵀ K u if it is linear), if the system has one; none by default. The potential of loads is not
-    /// part of it. Internal forces whose K is not symmetric have none: say none, and the balance does not take their
-    /// work for energy.
+    /// part of it. Internal forces whose K is not symmetric have no potential: return none, so that the energy balance
+    /// does not count their work as energy.
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let _ = u;
         None
@@ -201,8 +201,8 @@ pub trait System<T: Real>: Send {
 
     /// `out =` the part of the force that depends on t alone, for the energy balance and for
     /// [`EnergyMomentum`](crate::EnergyMomentum) without [`force_along`](Self::force_along); [`force`](Self::force)
-    /// contains it. The default is no load. Loads that follow u have no place here, and no line in the energy balance:
-    /// what they do is in its remainder. `EnergyMomentum` would take them for internal forces; with such loads give
+    /// contains it. The default is no load. Loads that depend on u are not part of this; the energy balance counts
+    /// their work in its remainder. `EnergyMomentum` would take them for internal forces; with such loads implement
     /// [`force_along`](Self::force_along).
     fn external_load(&mut self, t: f64, out: &mut [T]) {
         let _ = t;
@@ -275,7 +275,7 @@ pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usiz
     }
 }
 
-/// What points to a system is a system: `&mut S` lends the host's model, `Box<dyn System<T>>` is chosen at run time.
+/// Pointers to systems are systems: `&mut S` lends the host's model, `Box<dyn System<T>>` is chosen at run time.
 macro_rules! forward {
     ($($pointer:ty),*) => {$(
         impl<T: Real, S: System<T> + ?Sized> System<T> for $pointer {

@@ -9,13 +9,13 @@ use crate::tableau::{ContactLevel, Tableau};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Admitted {
     pub(crate) integrator: String,
-    /// Why not laws on a predicted gap, if not.
+    /// Why laws on a predicted gap are refused, if they are.
     pub(crate) no_prediction: Option<&'static str>,
-    /// Why not rigid ones, if not.
+    /// Why rigid laws are refused, if they are.
     pub(crate) no_rigid: Option<&'static str>,
-    /// Why not restitution above zero, if not.
+    /// Why coefficients of restitution above zero are refused, if they are.
     pub(crate) no_restitution: Option<&'static str>,
-    /// Why not those that read the gap at the start of a stage, if not, and why not the persistency switch among them.
+    /// Why laws that read the gap at the start of a stage are refused, if they are, and why the persistency switch is.
     pub(crate) no_start: Option<&'static str>,
     pub(crate) no_switch: Option<&'static str>,
 }

@@ -7,7 +7,7 @@ use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
-    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
+    check_corrections, check_lagged_damping, check_massless, check_path, check_resumed, is_correctable, local_error,
 };
 use super::path::PathWork;
 use super::program::{Compiler, Program};
@@ -58,7 +58,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     overclosure: InitialOverclosure,
 }
 
-/// Whether the correctors are those that suit most runs, or were chosen.
+/// Whether the default corrector is added, or correctors were chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DefaultCorrection {
     Wanted,
@@ -160,9 +160,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Leaves contact as the scheme solves it: without correctors, and without the one that is there by default.
+    /// Leaves contact as the scheme solves it: without correctors, the default one included.
     /// Contact forces then spike at impact, and velocities oscillate: the trapezoidal rule may end the fall of a block
-    /// with many times its energy. For comparisons, and for schemes that are studied raw.
+    /// with many times its energy. For comparisons, and for studies of the schemes themselves.
     #[must_use]
     pub fn uncorrected(mut self) -> Self {
         self.correctors.clear();
@@ -170,10 +170,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Adds a corrector; several act in the order given, and in place of the one that is there by default:
+    /// Adds a corrector; several act in the order given, and in place of the default one:
     /// [`PersistencyCorrection::with_history_projection`], where contact is rigid, on dofs with mass, and imposed on
     /// the displacements of the state. (Contact on velocities or ahead of the state leaves nothing to correct,
-    /// compliant laws and [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] have cures of their own.)
+    /// compliant laws, [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] suppress oscillation by
+    /// themselves.)
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
         self.correction = DefaultCorrection::Replaced;
@@ -181,8 +182,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Adds correctors that were chosen at run time: any number, an `Option` for instance. None leave contact
-    /// [as it is](Self::uncorrected).
+    /// Adds correctors that were chosen at run time: any number, an `Option` for instance. If there are none, contact
+    /// is left [uncorrected](Self::uncorrected).
     #[must_use]
     pub fn correctors(mut self, correctors: impl IntoIterator<Item = Box<dyn Corrector<T> + 'a>>) -> Self {
         self.correction = DefaultCorrection::Replaced;
@@ -231,16 +232,16 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Lets the run change its step size by itself; without this every step has the size given, and one that fails is
-    /// the caller's affair.
+    /// Lets the run change its step size by itself. Without this every step has the size given, and the error of one
+    /// that fails is returned.
     #[must_use]
     pub fn step_control(mut self, control: StepControl) -> Self {
         self.control = Some(control);
         self
     }
 
-    /// Keeps the books of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a product with
-    /// C a step, with supports one evaluation of f as well.
+    /// Accumulates the works of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a
+    /// product with C a step, with supports one evaluation of f as well.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
         self.balance = EnergyBalance::On;
@@ -279,16 +280,18 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused,
     /// and a step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
     ///
-    /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K:
-    /// that of
-    /// [`System::highest_frequency`], or a bound by Gershgorin's circles where that clears the step, or Lanczos'
-    /// estimate from below. So what is refused is unstable; what passes may exceed the limit by a fraction of a
-    /// percent. At the limit itself a step is taken: waves along a uniform bar are exact there, though the shortest
-    /// grows linearly in time once it is excited. For nonlinear systems the tangent at the start counts (at the present
-    /// state, for `set_step_size`), and it may stiffen later. Damping counts where the scheme takes its forces from
-    /// before the step: the strongest damping in the highest mode, which is exact for Rayleigh's and may refuse what is
-    /// stable otherwise. Stiffness of compliant contact laws does not count, nor does a K that is not symmetric beyond
-    /// its circles.
+    /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K.
+    /// The frequency is that of [`System::highest_frequency`]; without it the upper bound by Gershgorin's circles, if
+    /// it admits the step; otherwise Lanczos' estimate, which is a lower bound. So a step that is refused is unstable,
+    /// and one that is admitted may exceed the limit by a fraction of a percent. A step at the limit itself is
+    /// admitted: waves along a uniform bar are exact there, though the shortest grows linearly in time once it is
+    /// excited.
+    ///
+    /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`); it may
+    /// stiffen later. Damping counts if the scheme takes its forces from before the step. It is then assumed that the
+    /// highest mode has the strongest damping, which is exact for Rayleigh damping and otherwise may refuse a stable
+    /// step. The stiffness of compliant contact laws does not count. Of a K that is not symmetric only Gershgorin's
+    /// circles count.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
         self.stability = Stability::Unchecked;
@@ -415,7 +418,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 }
 
-/// Refuses times that are none.
+/// Refuses times that are not finite, and an overclosure that is removed over a time that is not positive.
 fn check_times(t: f64, overclosure: InitialOverclosure) -> Result<()> {
     let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
         true => Ok(()),
@@ -430,7 +433,7 @@ fn check_times(t: f64, overclosure: InitialOverclosure) -> Result<()> {
     }
 }
 
-/// Memory of Newton's method, for systems that need it and runs that ask for it.
+/// Memory of Newton's method: for nonlinear systems, and for runs with settings of it.
 fn newton<T: Real>(
     settings: Option<Newton>,
     system: &mut dyn System<T>,
@@ -449,33 +452,6 @@ fn newton<T: Real>(
     let dofs = motion.u.len();
     let path = along_path.then(|| PathWork::new(dofs));
     Ok(Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path)))
-}
-
-/// Refuses a state and history that another run could not have left.
-fn check_resumed<T: Real>(
-    state: &State<T>,
-    history: &History<T>,
-    scheme: &Scheme<'_>,
-    (own, h): (f64, f64),
-    [dofs, massless]: [usize; 2],
-) -> Result<()> {
-    history.check(dofs, scheme.depth + scheme.tableau.stages.len(), massless)?;
-    check_vector("the resumed displacement", &state.motion.u, dofs)?;
-    check_vector("the resumed velocity", &state.motion.v, dofs)?;
-    check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-    if history.scheme != scheme.integrator.name() {
-        let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
-        return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
-    }
-    let (t, end) = (state.motion.t, history.clock.at(0.0));
-    if (t - end).abs() > 1e-6 * history.clock.h {
-        let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
-        return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
-    }
-    if own.to_bits() != h.to_bits() {
-        return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
-    }
-    Ok(())
 }
 
 /// The judge of the steps of a run that controls them.

@@ -17,7 +17,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
     magnitudes: Vec<T>,
-    /// Rows and rates of a constraint that looks elsewhere.
+    /// Rows and rates of a constraint that is evaluated at another motion.
     scratch: ContactJacobian<T>,
     rates: Vec<GapRates<T>>,
     /// The free dofs that contact may ever act on, ascending.
@@ -29,12 +29,12 @@ pub(crate) struct Constraints<'a, T: Real> {
     stale: bool,
     /// Counts how often the rows have been read.
     version: u64,
-    /// What is added to gaps that were negative at the start, and of it what each row gets; empty without.
+    /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
     overclosures: Option<Overclosures<T>>,
     added: Vec<T>,
 }
 
-/// The place of a dof that no constraint has announced.
+/// The place of a dof that no constraint has listed among those it may act on.
 const UNKNOWN: usize = usize::MAX - 1;
 
 impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
@@ -55,7 +55,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         let dofs = u.len();
         for part in &mut parts {
             part.check(dofs)?;
-            // A constraint may have no rows before.
+            // Before its first search a constraint may have no rows.
             part.search(t, u, v, 0.0)?;
         }
         let mut interface = Vec::new();
@@ -75,14 +75,14 @@ impl<'a, T: Real> Constraints<'a, T> {
         for (place, &dof) in interface.iter().enumerate() {
             places[dof] = place;
         }
-        // (A sum that leaves the range is an absurd promise too.)
+        // (A sum that overflows is as absurd as one that does not fit into memory.)
         let promised = |count: fn(&Box<dyn ContactConstraint<T> + 'a>) -> usize, what| {
             parts.iter().map(count).try_fold(0_usize, usize::checked_add).ok_or(Error::OutOfMemory { what })
         };
         let rows = promised(ContactConstraint::max_candidates, "the contact problem")?;
         let entries = promised(ContactConstraint::max_entries, "the contact Jacobian")?;
-        // Asked for once, so that an absurd promise is an error and not an abort: the largest blocks that are reserved
-        // later.
+        // The largest blocks that are reserved later are tried here, so that absurd capacities are an error and not an
+        // abort.
         memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
         memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
         let jacobian = ContactJacobian::with_capacity(rows, entries);
@@ -115,7 +115,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.parts.iter().map(ContactConstraint::max_entries).sum()
     }
 
-    /// Finds the candidates of a step that looks so far `ahead`.
+    /// Finds the candidates of a step that imposes contact up to a time `ahead` of the motion.
     pub(crate) fn search(
         &mut self,
         motion: &Motion<T>,
@@ -123,13 +123,13 @@ impl<'a, T: Real> Constraints<'a, T> {
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
         for part in &mut self.parts {
-            // Remembered beyond an error of a later part: the rows are read again by the next search that succeeds.
+            // This is kept if a later part fails: the next search that succeeds reads the rows again.
             self.stale |= part.search(motion.t, &motion.u, &motion.v, ahead)? == Candidates::Changed;
         }
         self.read_stale(jacobian)
     }
 
-    /// Shows every constraint the step that is about to be accepted.
+    /// Lets every constraint inspect the step that is about to be accepted.
     pub(crate) fn inspect(&mut self, [from, to]: [&Motion<T>; 2], closed: [&[bool]; 2]) -> Result<()> {
         let mut rest = closed;
         for (constraint, part) in self.parts.iter_mut().enumerate() {
@@ -152,7 +152,7 @@ impl<'a, T: Real> Constraints<'a, T> {
     pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
         for constraint in 0..self.parts.len() {
             let moved = self.follow_part(constraint, t, u);
-            // Remembered beyond an error, as by a search.
+            // This is kept after an error, as in a search.
             self.stale |= match &moved {
                 Ok(candidates) => *candidates == Candidates::Changed,
                 Err(_) => true,
@@ -177,7 +177,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.parts.iter().all(ContactConstraint::is_affine)
     }
 
-    /// The version of the rows: responses to those of another one are not theirs.
+    /// The version of the rows: what was computed from rows of another version is out of date.
     pub(crate) fn version(&self) -> u64 {
         self.version
     }
@@ -260,7 +260,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.overclosures.as_ref()
     }
 
-    /// Says of every row what is added to its gap.
+    /// Finds for every row what is added to its gap.
     fn distribute(&mut self) {
         if let Some(overclosures) = &self.overclosures {
             self.added.clear();
@@ -318,7 +318,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
     }
 
-    /// What the gap rates of all rows have of their own, refusing NaN and infinity.
+    /// The parts of the gap rates of all rows that do not come from v and a, refusing NaN and infinity.
     pub(crate) fn finite_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
         let mut rest = &mut *out;
         for part in &mut self.parts {
@@ -343,7 +343,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(())
     }
 
-    /// (contact, row) of the contacts of a state that are candidates still: a search may have found others since.
+    /// (contact, row) of the contacts of a state that are still candidates: a search may have changed these since.
     pub(crate) fn rows_of<'c>(&'c self, contacts: &'c ContactState<T>) -> impl Iterator<Item = (usize, usize)> + 'c {
         let (same, sorted) = (self.ids == contacts.ids, self.ids.is_sorted());
         let row = move |contact: usize, id: &ContactId| match (same, sorted) {
@@ -414,7 +414,7 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
                     };
                 }
             }
-            // Back in any case, and to the same rows: G need not be read again.
+            // Back to the same rows, after an error too: G need not be read again.
             let back = self.follow_part(constraint, here.0, here.1);
             self.stale |= back.is_err();
             found.and(back)?;

@@ -79,7 +79,7 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// The estimate of the local error of the last step (length), for runs that
-    /// [control it](StepControl::local_error).
+    /// [control it](crate::StepControl::local_error).
     pub fn local_error(&self) -> Option<f64> {
         self.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
     }

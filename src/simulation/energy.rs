@@ -30,7 +30,7 @@ pub(crate) struct Ledger<T> {
 /// The constraints and their rows of G.
 pub(crate) type Rows<'r, 'a, T> = (&'r Constraints<'a, T>, &'r ContactJacobian<T>);
 
-/// An accepted step, as the ledger sees it.
+/// What the ledger reads of a step.
 pub(crate) struct StepBooks<'a, T> {
     pub(crate) t: f64,
     /// u, v and a at the time of the state.
@@ -69,7 +69,7 @@ impl<T: Real> Ledger<T> {
         Ok(ledger)
     }
 
-    /// Reads the powers of a state from which a run begins, or begins again behind a discontinuity.
+    /// Evaluates forces and powers of a state at which a run begins, or begins again after a discontinuity.
     pub(crate) fn restart(
         &mut self,
         system: &mut dyn System<T>,
@@ -105,7 +105,7 @@ impl<T: Real> Ledger<T> {
         self.old_u.copy_from_slice(state.displacement());
     }
 
-    /// Prepares the books of a step before it is accepted, which may fail.
+    /// Computes the works of a step before it is accepted. This may fail.
     pub(crate) fn prepare(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) -> Result<()> {
         if !system.prescribed().is_empty() {
             balance_residual(system, books.t, books.motion, &books.contacts.lambda, books.g, &mut self.residual)?;
@@ -118,7 +118,7 @@ impl<T: Real> Ledger<T> {
             let mean = half * (reaction + *next);
             works.supports += mean * (u[dof] - self.old_u[dof]);
         }
-        // The spare vector takes the load at the end, until the step is accepted.
+        // The load at the end is kept in the spare vector until the step is accepted.
         system.external_load(books.t, &mut self.old_load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&old, &new)| half * (old + new));
@@ -127,7 +127,7 @@ impl<T: Real> Ledger<T> {
         for (row, &force) in books.contacts.lambda.iter().enumerate() {
             books.forces.scatter(row, force, &mut self.next_contact);
         }
-        // In the middle of the step, on the line through the forces of two steps.
+        // The force in the middle of the step, by the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let forces = self.contact.iter().zip(&self.next_contact).map(|(&old, &new)| old + newest * (new - old));
@@ -139,7 +139,7 @@ impl<T: Real> Ledger<T> {
         works.check(books.t)
     }
 
-    /// Books an accepted step.
+    /// Takes over what [`prepare`](Self::prepare) computed, for the step is accepted.
     pub(crate) fn end(&mut self) {
         (self.works, self.power) = self.next;
         std::mem::swap(&mut self.load, &mut self.old_load);

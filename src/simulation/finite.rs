@@ -1,14 +1,14 @@
-//! What a run publishes is finite: the last look at a state before it is accepted.
+//! The last check of a state before it is accepted: all of it is finite.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{ContactState, Motion, State};
 
-/// The dofs of a motion that are looked at.
+/// The dofs of a motion that are checked.
 #[derive(Clone, Copy)]
 pub(super) enum Extent<'d> {
     All,
-    /// Those that something has changed since the others were found finite.
+    /// Those that have changed since all were found finite.
     At([&'d [usize]; 2]),
 }
 

@@ -1,12 +1,12 @@
-//! Bodies that overlap when a run starts: the depths, and what is left of them later.
+//! Bodies that overlap when a run starts: the depths of the overlaps, and the share of them that is left later.
 
 use crate::contact::ContactId;
 use crate::real::Real;
 
-/// Depths at the start of a run, which are added to the gaps from then on, or for a while.
+/// Depths of overlaps at the start of a run, which are added to the gaps from then on, or for a time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Overclosures<T> {
-    /// (constraint, feature) and what is added, ascending.
+    /// (constraint, feature) and the depth, ascending.
     depths: Vec<((usize, usize), T)>,
     start: f64,
     /// The time over which they are removed.
@@ -14,7 +14,7 @@ pub(crate) struct Overclosures<T> {
 }
 
 impl<T: Real> Overclosures<T> {
-    /// From the gaps of contacts at the start; of a feature with several the deepest counts.
+    /// From the gaps of contacts at the start. Of several contacts of a feature the deepest counts.
     pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
         let mut depths: Vec<((usize, usize), T)> = Vec::new();
         for &(id, gap) in gaps {

@@ -4,14 +4,14 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::system::{Damping, Path, PathForce, System};
 
-/// What the force of a path has been made of.
+/// How the force of a path was formed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PathForm {
     /// The system's own.
     Own,
     /// The force in the middle: there is no potential.
     Middle,
-    /// Simpson's mean, or one near it.
+    /// Simpson's mean, or the mean nearest to it that conserves energy.
     Simpson,
 }
 
@@ -35,9 +35,9 @@ impl<T: Real> PathWork<T> {
         self.start = system.potential_energy(from);
     }
 
-    /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end,
-    /// a f(u₀) + b f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such
-    /// means the one nearest to Simpson's rule. Each of the three sums to no net force, hence the mean does.
+    /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end, a f(u₀) + b
+    /// f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such means the one
+    /// nearest to Simpson's rule. Each of the three internal forces has no resultant, hence neither has the mean.
     pub(super) fn force(
         &mut self,
         system: &mut dyn System<T>,
@@ -58,7 +58,7 @@ impl<T: Real> PathWork<T> {
         };
         *form = PathForm::Simpson;
         let work = |force: &[T]| (0..to.len()).map(|i| force[i] * (to[i] - from[i])).sum::<T>();
-        // What is not internal: loads and damping, the same in all three.
+        // The external part, loads and damping, is the same in all three.
         system.external_load(t, load);
         if system.damping_force(mean, v, scratch) == Damping::Present {
             T::axpy(-T::one(), scratch, load);

@@ -39,7 +39,7 @@ pub(crate) struct ScaledRow<T> {
 /// The most terms a row can have.
 const TERMS: usize = 3 * MAX_PAST;
 
-/// Dofs a block: what it touches stays in the first-level cache.
+/// Dofs a block: the vectors of a block stay in the first-level cache.
 const BLOCK: usize = 1024;
 
 impl<T: Real> ScaledRow<T> {
@@ -139,9 +139,9 @@ impl<T: Real> ScaledRows<T> {
 pub(crate) struct ContactTarget<T> {
     /// Displacements ahead of the state, or h times a velocity: lengths both.
     pub(crate) row: ScaledRow<T>,
-    /// Where in the step the target lives.
+    /// The fraction of the step at which the target lives.
     pub(crate) at: f64,
-    /// At velocity level: displacements of the forecast, and where in the step they live.
+    /// At velocity level: displacements of the forecast, and the fraction of the step at which they live.
     pub(crate) forecast: Option<(ScaledRow<T>, f64)>,
 }
 
@@ -168,7 +168,7 @@ pub(crate) struct CompiledStage<T> {
     /// Only where contact is not imposed on the displacements of the stage's own state.
     pub(crate) contact: Option<ContactTarget<T>>,
     pub(crate) load: f64,
-    /// Where in the step the stage starts and ends.
+    /// The fractions of the step at which the stage starts and ends.
     pub(crate) start: f64,
     pub(crate) end: f64,
     /// Whether the force is that of the path over the stage.
@@ -234,8 +234,8 @@ impl<T: Real> Program<T> {
                 continue;
             }
             if let Err(error) = self.operators[i].factorize(system, h, at) {
-                // They could be factorized before; should the host's tangent fail now, its first error is the one to
-                // tell.
+                // They could be factorized for the old size before. If the host's tangent fails now, the first error is
+                // the one that is returned.
                 let mut constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
                 constant.try_for_each(|operator| operator.factorize(system, old, at)).ok();
                 return Err(error);
@@ -270,8 +270,8 @@ impl<T: Real> Compiler<'_, T> {
         self.stages(&tableau.stages, books)
     }
 
-    /// Compiles the one-step scheme that starts a multistep one: what it leaves behind is read by `reader`. Its
-    /// covectors change from step to step and are not part of the program.
+    /// Compiles the one-step scheme `start` whose first steps make the past of the multistep scheme `reader`. Its
+    /// momentum covectors change from step to step and are not part of the program.
     pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
         self.stages(&start.stages, |_| Ok((Vec::new(), reader.reads_after(reader.stages.len() - 1))))
     }

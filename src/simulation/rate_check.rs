@@ -1,4 +1,4 @@
-//! A comparison of gap rates with the gaps: a constraint that moves must say so in its rates.
+//! A comparison of gap rates with gaps: a constraint that moves must give rates that are not zero.
 
 use super::constraints::Constraints;
 use crate::contact::{ContactJacobian, GapRates};
@@ -13,7 +13,7 @@ pub(super) struct RateCheck<T> {
     before: Vec<T>,
     now: Vec<T>,
     rates: Vec<GapRates<T>>,
-    /// Whether the gap has moved all the time, and the rates have been zero.
+    /// Whether the gap has changed at every time so far with zero rates.
     silent: Vec<bool>,
 }
 
@@ -28,8 +28,8 @@ impl<T: Real> RateCheck<T> {
         }
     }
 
-    /// Refuses rows whose gap moves all through the time h from a motion on, with displacements held, while their rates
-    /// are zero throughout. (Jumps move a gap once, and a wall that begins or ceases to move has a rate at some time.)
+    /// Refuses rows whose gap, at fixed displacements, changes throughout the time h from a motion on while their rates
+    /// are zero. (A jump changes a gap once only, and a wall that starts or stops has a rate at some of the times.)
     pub(super) fn check(
         &mut self,
         constraints: &mut Constraints<'_, T>,
@@ -37,12 +37,12 @@ impl<T: Real> RateCheck<T> {
         h: f64,
         jacobian: &ContactJacobian<T>,
     ) -> Result<()> {
-        /// Times, in shares of h: no motion of some frequency is at rest in all of them.
+        /// Times, in shares of h, so uneven that an oscillation does not have the same gap at all of them.
         const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
         let count = constraints.len();
         let Self { before, now, rates, silent } = self;
         for (row, silent) in silent[..count].iter_mut().enumerate() {
-            // A spring asks for no rates.
+            // The force of a spring does not depend on rates.
             *silent = !(constraints.law(row).is_compliant() && constraints.law(row).inertia() == 0.0);
         }
         let mut first = T::zero();

@@ -26,8 +26,8 @@ impl<T: Real> Simulation<'_, T> {
     /// then extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the
     /// closed contacts.
     ///
-    /// Every scheme keeps its order when the step changes by factors up to 3, every time if need be
-    /// (`docs/schemes.md`); beyond that the past is extrapolated farther than it is known. Total momentum is conserved;
+    /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`);
+    /// larger factors extrapolate the past beyond what is kept of it. Total momentum is conserved;
     /// the impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of
     /// the scheme.
     ///
@@ -107,7 +107,7 @@ impl<T: Real> Simulation<'_, T> {
         let mut past = vec![Motion::zero(newest.u.len()); known - 1];
         for (k, out) in (1..known).zip(&mut past) {
             let age = k as f64 * h;
-            // The interval that contains the time, or the oldest one.
+            // The interval that contains the time, or else the oldest one.
             let interval = nodes.windows(2).find(|pair| pair[1].age >= age).or(nodes.windows(2).last());
             match interval {
                 Some([newer, older]) => interpolate(newer, older, age, out),
@@ -117,7 +117,7 @@ impl<T: Real> Simulation<'_, T> {
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        // Rows whose law reads the gap where a stage starts may hold it anywhere.
+        // Laws that read the gap where a stage starts may hold it at another value than zero.
         let elsewhere = |law: ContactLaw| law.is_compliant() || law.reads_start();
         let rigid = closed.map(|(_, row)| row).filter(|&row| !elsewhere(constraints.law(row)));
         let closed: Vec<usize> = rigid.collect();
@@ -132,8 +132,8 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Starts again from the displacements and velocities of the present state, after a discontinuity that the host
-    /// knows of (a load or a support that jumps): accelerations are those of equilibrium now, contacts at rest are
-    /// found anew, and the past is forgotten and made again as at the start.
+    /// knows of (a load or a support that jumps): accelerations follow from the balance after it, contacts at rest are
+    /// found anew, and the past is made anew as at the start.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -189,8 +189,8 @@ impl<T: Real> Simulation<'_, T> {
     }
 }
 
-/// A computed motion, and how long before the newest one it was: a sum of step sizes, since differences of absolute
-/// times have the rounding of these.
+/// A computed motion, and its age, the time from it to the newest one: a sum of step sizes, since differences of
+/// absolute times would have their rounding.
 struct Node<'h, T> {
     motion: &'h Motion<T>,
     age: f64,
@@ -201,7 +201,7 @@ fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<No
     let newest = std::iter::once((&state.motion, history.made_with));
     let smooth = history.smooth;
     let known: Vec<(&Motion<T>, f64)> = match history.trail.is_empty() {
-        // As long as the step has not changed, the past that the scheme reads is what was computed.
+        // Until the step changes for the first time, the past that the scheme reads is as it was computed.
         true => {
             let past = history.slots[1..history.known].iter().map(|motion| (motion, history.made_with));
             newest.chain(past).take(smooth).collect()
@@ -222,15 +222,15 @@ fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut Hist
     let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
     let length = if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) };
     if history.trail.is_empty() && length > 0 {
-        // One-step schemes read no past, but the motion before is still there.
+        // One-step schemes read no past, but the motion before the present one is still in its slot.
         let known = history.known.max(history.smooth.min(2));
         let past: Vec<_> = history.slots[1..known].iter().map(|motion| (motion, history.made_with)).collect();
         history.trail = Trail::new(length, state.motion.u.len(), &past);
     }
 }
 
-/// Moves stored v and a that live δ steps from their state to the place of the new step, along the line through the
-/// last two computed ones.
+/// Moves stored v and a of schemes that store those δ steps away from the state: δ steps are another time with the new
+/// step size. Values there are on the line through the last two that were computed.
 fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
@@ -272,7 +272,8 @@ fn interpolate<T: Real>(newer: &Node<'_, T>, older: &Node<'_, T>, age: f64, out:
 /// Shifts the resampled past so that the scheme's momentum is that before the change.
 ///
 /// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h makes it p (h' − h) a more.
-/// Interpolation errs in ψ by O(h²) at every change; left alone, changes at every step would leave order 1.
+/// Interpolation errs in ψ by O(h²) at every change. Without this shift, changes at every step would reduce the order
+/// to 1.
 fn conserve_momentum<T: Real>(
     scheme: &Scheme<'_>,
     state: &State<T>,
@@ -283,9 +284,9 @@ fn conserve_momentum<T: Real>(
     let Some(psi) = scheme.covectors.get(past.len()) else { return };
     let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
     let p = psi[0][2] + older().map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum::<f64>();
-    // The momentum that a unit shift of the past velocities makes, and a shift −k h of the past displacements.
+    // The change of ψ by a shift of the past displacements by −k h, and by a unit shift of the past velocities.
     let (by_u, by_v): (f64, f64) = (older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum());
-    // Schemes whose ψ reads old accelerations alone (Adams formulas) lose nothing: these enter with h a.
+    // A ψ that reads only accelerations of the past (Adams formulas) needs no shift: these enter with h a.
     if by_u.abs().max(by_v.abs()) < 1e-6 {
         return;
     }

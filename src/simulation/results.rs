@@ -61,9 +61,10 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Works done on the system since the start, by the trapezoidal rule over the steps (that of contact with its forces in
-/// the middle of the step, which is the same where they live at the end of it); all but `remainder` are what
-/// physics says, the remainder is what the scheme adds (positive) or dissipates (negative) by itself.
+/// Works done on the system since the start, by the trapezoidal rule over the steps. (That of contact takes the forces
+/// in the middle of the step, which is the same rule for schemes whose forces live at its end.) All but `remainder` are
+/// works of forces of the model; the remainder is the energy that the scheme itself adds (positive) or dissipates
+/// (negative).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Works<T> {
     /// Work of the external load.

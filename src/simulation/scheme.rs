@@ -6,7 +6,7 @@ use crate::real::Real;
 use crate::state::Motion;
 use crate::tableau::{StartUp, Tableau};
 
-/// Dofs a block: what it touches stays in the first-level cache until it has been looked at.
+/// Dofs a block: the values of a block are still in the first-level cache when they are checked.
 const BLOCK: usize = 1024;
 
 /// An integrator, its tableau, and the numbers derived from it once.
@@ -36,7 +36,7 @@ impl<'a> Scheme<'a> {
         Self { integrator, tableau, depth, shifts, start_up, starter, covectors }
     }
 
-    /// How far ahead of the state contact is looked at in a step, in steps.
+    /// How far ahead of the state a step imposes contact, in steps.
     pub(super) fn ahead(&self) -> f64 {
         self.tableau.stages.iter().map(|stage| stage.end + stage.contact.lead()).fold(1.0, f64::max)
     }
@@ -61,9 +61,8 @@ impl<'a> Scheme<'a> {
         [of(1), of(2)]
     }
 
-    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are shown
-    /// as they are. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is
-    /// finite.
+    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are
+    /// copied. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is finite.
     pub(super) fn show<T: Real>(
         &self,
         new: &Motion<T>,

@@ -15,26 +15,26 @@ use faer::{Mat, Side};
 /// What is known of the stability of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StepLimit {
-    /// The caller answers for it.
+    /// Nothing: the caller has switched the check off.
     Unchecked,
     /// Steps up to this one have been found stable.
     Cleared(f64),
 }
 
-/// Steps of Lanczos' iteration, at most: one product with K each. They are taken only where Gershgorin's circles do not
-/// clear the step.
+/// The most steps of Lanczos' iteration, with one product with K each. They are taken only if Gershgorin's circles do
+/// not admit the step size.
 const ITERATIONS: usize = 40;
 
-/// After so many of them the estimate is looked at.
+/// The estimate is evaluated after these numbers of them.
 const LOOKS: [usize; 8] = [3, 6, 9, 13, 18, 24, 31, ITERATIONS];
 
-/// How well the highest frequency (its square) is known when an error names the step that works.
+/// Relative accuracy of the square of the highest frequency, when an error names the largest stable step.
 const ACCURACY: f64 = 2e-3;
 
-/// Residuals between the estimate and a limit that it clears.
+/// An estimate counts as below a limit if it is below by this many of its residuals.
 const RESERVE: f64 = 4.0;
 
-/// The critical Ω is that of double roots, which are found to the square root of rounding.
+/// Relative accuracy of the critical Ω: roots are double there, and found to the square root of rounding only.
 const SLIVER: f64 = 1e-7;
 
 /// Refuses tableaux whose results have nothing to do with the equation of motion, however small the step.
@@ -55,10 +55,10 @@ pub(super) fn check_scheme(integrator: &str, tableau: &Tableau) -> Result<()> {
 
 /// Refuses a step beyond the limit of the scheme, as far as that is known; says up to which step it is.
 ///
-/// Gershgorin's circles bound the highest frequency from above: a step that they clear is stable. Where they do not,
-/// Lanczos' iteration on M⁻¹ K tells: Ritz values are never above the highest frequency, so what is refused by them is
-/// unstable. What they let pass may exceed the limit by what the iteration has missed (within its steps a fraction of a
-/// percent on meshes). Nonlinear systems are judged by the tangent at `motion`.
+/// Gershgorin's circles bound the highest frequency from above: a step that this bound admits is stable. Otherwise
+/// Lanczos' iteration on M⁻¹ K decides: Ritz values are never above the highest frequency, so a step that they refuse
+/// is unstable. One that they admit may exceed the limit by the error of the iteration (a fraction of a percent on
+/// meshes). For nonlinear systems the tangent at `motion` counts.
 pub(super) fn check_step<T: Real>(
     system: &mut dyn System<T>,
     scheme: &Scheme<'_>,
@@ -88,15 +88,15 @@ pub(super) fn check_step<T: Real>(
             lanczos.start = circles.rows;
         }
         if !stiffness.is_symmetric() {
-            // Ritz values say nothing.
+            // Ritz values are no bounds then.
             return Ok(StepLimit::Cleared(h));
         }
         let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
         lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
     };
     if lags && highest.at_least > 0.0 {
-        // The mode of the highest frequency with the strongest damping of any: exact for Rayleigh's, on the safe side
-        // otherwise.
+        // The highest mode is taken to have the strongest damping of all modes: exact for Rayleigh damping, on the safe
+        // side otherwise.
         let still = vec![T::zero(); system.dofs()];
         let damping = lanczos.highest(system, 0.0, |system, x, y| {
             system.damping_force(&still, x, y);
@@ -128,7 +128,7 @@ fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
 #[derive(Clone, Copy, Debug)]
 struct Highest {
     at_least: f64,
-    /// The estimate with its residual: not a proof, as another eigenvalue may hide.
+    /// The estimate plus its residual. Not a strict bound, as the iteration may have missed a higher eigenvalue.
     at_most: f64,
 }
 
@@ -142,14 +142,14 @@ enum Stiffness<'s, T: Real> {
 
 /// Gershgorin's bound of ω².
 struct Circles<T> {
-    /// √(Σ_j |K_ij|/m_i) over √m_i for each dof, where an eigenvector of the highest frequency may be large.
+    /// √(Σ_j |K_ij|/m_i) over √m_i for each dof: large where the eigenvector of the highest frequency may be large.
     rows: Vec<T>,
     largest: T,
 }
 
 impl<'s, T: Real> Stiffness<'s, T> {
-    /// The tangent, where the system has one; its force otherwise. None for nonlinear forces without a length to vary
-    /// them by.
+    /// The tangent, if the system has one, otherwise its force. None for nonlinear forces at zero displacements, which
+    /// give no length for a difference.
     fn of(system: &mut dyn System<T>, at: &'s Motion<T>) -> Result<Option<Self>> {
         let dofs = system.dofs();
         let entries = system.pattern().row_idx().len();
@@ -223,11 +223,11 @@ impl<'s, T: Real> Stiffness<'s, T> {
 }
 
 /// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980, chapter 13),
-/// without orthogonalization against older vectors: copies of eigenvalues that this brings do no harm at the end of the
-/// spectrum.
+/// without orthogonalization against older vectors: this yields eigenvalues several times, which does no harm at the
+/// end of the spectrum.
 struct Lanczos<T> {
     inverse: InverseMass<T>,
-    /// Sizes of the entries of the first vector; their signs have no pattern.
+    /// Sizes of the entries of the first vector; their signs are scattered.
     start: Vec<T>,
     vectors: [Vec<T>; 4],
 }
@@ -277,7 +277,7 @@ impl<T: Real> Lanczos<T> {
             }
             for i in 0..q.len() {
                 q[i] = next[i] / beta;
-                // M q, to be subtracted next time; the one before waits in `next`.
+                // `old` becomes M q, which the next iteration subtracts; `next` takes the one before.
                 next[i] = old[i];
                 old[i] = image[i] / beta;
             }
@@ -295,7 +295,7 @@ impl<T: Real> Lanczos<T> {
                 found = ritz(&diagonal, &beside, beta);
                 let miss = found.at_most - found.at_least;
                 let known = found.at_least > limit && miss <= ACCURACY * found.at_least;
-                // (Higher eigenvalues may hide behind one that is nearly found: some reserve.)
+                // (With some reserve, as a higher eigenvalue may not have been found yet.)
                 if known || found.at_least + RESERVE * miss <= limit {
                     return Ok(found);
                 }

@@ -30,29 +30,31 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) massless: &'s [usize],
 }
 
-/// What becomes of bodies that overlap at the start (mesh generators leave slivers; rigid contacts and equality rows).
+/// How bodies that overlap at the start are treated, in rigid contacts and equality rows. (Mesh generators leave small
+/// overlaps.)
 ///
-/// Gaps within the rounding of what they are computed from are zero for all of them.
+/// Gaps within the rounding of the numbers that they are computed from count as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum InitialOverclosure {
     /// [`Error::InitialViolation`], which names the depth.
     #[default]
     Refused,
-    /// The gap of such a contact is measured from where it starts, for good: nothing is strained. The depth is that of
-    /// the whole feature ([`ContactId::feature`](crate::contact::ContactId::feature)): a node that slides on keeps it.
+    /// The depth is added to the gap for the whole run, so that the contact starts closed and nothing is strained. It
+    /// is added to all gaps of the feature ([`ContactId::feature`](crate::contact::ContactId::feature)), so that a node
+    /// that slides on keeps it.
     AdjustedGaps,
-    /// The overlap is removed over a time from the start, along 1 − 3 τ² + 2 τ³ with τ from 0 to 1, as an interference
-    /// fit is mounted: what is strained then is strained by it.
+    /// The depth is added at first, and taken away over this time by the factor 1 − 3 τ² + 2 τ³ with τ from 0 to 1.
+    /// This strains the bodies as an interference fit does.
     RemovedOver(f64),
 }
 
 /// Whether a motion may start inside an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Violation {
-    /// As the caller has said, at the start of a run.
+    /// As the caller has chosen, at the start of a run.
     Initial(InitialOverclosure),
-    /// Schemes that impose contact on velocities leave penetrations behind, from which a run may be restarted.
+    /// At a restart: schemes that impose contact on velocities leave penetrations behind.
     Accepted,
 }
 
@@ -100,8 +102,8 @@ impl<T: Real> Start<'_, T> {
             1
         };
         let shown = scheme.shown(&motion);
-        // A velocity that lives elsewhere is moved there. The acceleration is not: its rate is unknown, and an estimate
-        // would be that of the stiffest mode.
+        // A scheme that stores the velocity of another time gets it there. The acceleration is left at the start: its
+        // rate is unknown, and an estimate would be dominated by the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
         T::axpy(T::of(scheme.shifts[0] * h), a, v);
         let clock = Clock::new(t, h);
@@ -212,7 +214,7 @@ impl<T: Real> Start<'_, T> {
         };
         problem.add_inertial(constraints, g, &motion, &contacts.gap)?;
         if !massless.is_empty() {
-            // Those are solved, or open.
+            // These have been solved for, or are open.
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
@@ -222,8 +224,8 @@ impl<T: Real> Start<'_, T> {
     }
 }
 
-/// Rounding of gaps that were computed by whoever made the mesh, over that of ours: coordinates may have gone through a
-/// file with twelve digits.
+/// Rounding of initial gaps, in units of that of our own sums: coordinates may have been written to a file with twelve
+/// digits.
 const INPUT: f64 = 64.0;
 
 /// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle.
@@ -269,8 +271,8 @@ fn touching_contacts<T: Real>(
     Ok(touching)
 }
 
-/// Whether the straight line into the past is a motion of the system: no acceleration at the start changes a velocity
-/// beyond rounding within a step, nor would any at the past states.
+/// Whether the straight line through the start is the past motion of the system: neither the acceleration at the start
+/// nor that at the past states changes a velocity beyond rounding within a step.
 fn is_free_flight<T: Real>(
     system: &mut dyn System<T>,
     projection: &mut JumpProjection<T>,
@@ -287,7 +289,7 @@ fn is_free_flight<T: Real>(
     let mut a = vec![T::zero(); motion.u.len()];
     for motion in past {
         match system.force(motion.t, &motion.u, &motion.v, &mut a) {
-            // A past that the host does not admit is none.
+            // The host does not admit this past.
             Err(error) if error.is_recoverable() => return Ok(false),
             other => other?,
         }

@@ -11,12 +11,12 @@ use crate::state::{ContactState, Motion};
 use crate::system::System;
 use crate::tableau::ContactLevel;
 
-/// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0, with q the acceleration of the gap without contact, or the
-/// one that just meets the condition a scheme imposes ahead of the state.
+/// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0. q is the acceleration of the gap without contact, or, for a
+/// scheme that imposes contact ahead of the state, the violation of that condition as an acceleration.
 pub(super) struct StartProblem<T> {
     /// Rows that take part.
     pub(super) rows: Vec<usize>,
-    /// Rows that join if the others push them in.
+    /// Rows that join the problem if the multipliers of the others close them.
     pub(super) waiting: Vec<usize>,
     /// q and its rounding, one entry a candidate.
     pub(super) offset: Vec<T>,
@@ -27,8 +27,8 @@ pub(super) struct StartProblem<T> {
 }
 
 impl<T: Real> StartProblem<T> {
-    /// Contacts at rest: closed, with no approach or separation. One that approaches is left to the first step, one
-    /// that separates is open.
+    /// Contacts at rest: touching, and neither approaching nor separating. One that approaches is left to the first
+    /// step, one that separates is open.
     pub(super) fn at_rest(
         constraints: &mut Constraints<'_, T>,
         g: &ContactJacobian<T>,
@@ -40,7 +40,8 @@ impl<T: Real> StartProblem<T> {
         constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
         let rows = (0..constraints.len()).filter(|&row| {
             let rate = g.product(row, &motion.v) + rates[row].rate;
-            // The sliver of approach that counts as touching does not count as rest.
+            // The way in one step that the tolerance of touching allows is not allowed here: at rest the rate is zero
+            // but for rounding.
             let still =
                 rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
             constraints.law(row).is_equality() || touching[row] && still
@@ -90,7 +91,7 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// Contacts that would violate the condition which the scheme imposes ahead of the state.
+    /// Contacts that would violate the condition that the scheme imposes ahead of the state.
     pub(super) fn ahead(
         contact: ContactLevel,
         system: &mut dyn System<T>,
@@ -147,7 +148,7 @@ impl<T: Real> StartProblem<T> {
         };
         let tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
-        // Over a stabilized bipenalty: the body is as it was before the start.
+        // The stabilized bipenalty compares with the step before: the gap is taken to have been the same.
         if constraints.laws().iter().any(ContactLaw::is_predictive) {
             let mut gaps = vec![T::zero(); constraints.len()];
             constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
@@ -162,7 +163,7 @@ impl<T: Real> StartProblem<T> {
         let aims = |law: ContactLaw| !law.is_compliant() || law.is_predictive();
         let aimed = |row: &usize| open[*row] && aims(constraints.law(*row));
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
-        // (Half of the response enters a mean gap.)
+        // (A mean gap changes by half of the response.)
         let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(T::one(), T::zero()).0;
         let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
         Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })

@@ -12,13 +12,14 @@ type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 
 /// `M a + C v + K u = F(t) + Gᵀ λ` with constant M, C and K (both triangles stored), M symmetric.
 ///
-/// A mass matrix without entries off the diagonal is recognized as lumped. Without damping nothing is paid for damping.
+/// A mass matrix without entries off the diagonal is recognized as lumped. Without damping no damping product is
+/// formed.
 ///
 /// C (gyroscopic forces) and K (circulatory ones, loads that follow the motion) need not be symmetric; a scheme that
 /// has them in its effective matrix then takes [`Lu`](crate::Lu) as its linear solver, others refuse it by
 /// [`Error::Asymmetric`]. A K that is not symmetric has no potential: [`Energy::potential`](crate::Energy) is then
-/// none, and what all of K u does is in the remainder of the energy balance. A gyroscopic C does no work, and the
-/// balance holds as with any other.
+/// none, and the work of K u is in the remainder of the energy balance. A gyroscopic C does no work, and the balance
+/// holds as with any other.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -117,7 +118,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         if n == 0 {
             return Err(Error::Empty { what: "the system", remedy: "give it at least one dof" });
         }
-        // K knows how many dofs there are, if it is square; else it is the one that is wrong.
+        // If K is square and the sizes differ, the mass is reported; otherwise K.
         let dofs = stiffness.nrows();
         if dofs == stiffness.ncols() && dofs != n {
             return Err(Error::Dimension {
@@ -230,7 +231,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     }
 }
 
-/// (Zero is refused when a simulation is built, where the scheme cannot do without.)
+/// Refuses negative masses and those that are not finite. (Zero masses are refused when a simulation is built, if the
+/// scheme does not admit them.)
 fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
     match mass.iter().position(|&m| !(m >= T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
