@@ -36,8 +36,8 @@ pub(crate) struct Stand {
     pub(crate) gap: f64,
     /// How often the node has jumped to another facet or normal since the search.
     jumps: u8,
-    /// Where it stood last at the two times that rows are followed to in a step (where the gap is met, where the balance
-    /// holds), the one seen last first.
+    /// Where it stood last at the two times that rows are followed to in a step (where the gap is met, where the
+    /// balance holds), the one seen last first.
     seen: [Option<Seen>; 2],
 }
 
