@@ -97,7 +97,8 @@ impl<T: Real> History<T> {
         Some((&motion.u, &motion.v, &motion.a))
     }
 
-    /// Refuses a history that does not fit a system of this size, with `slots` motions and `massless` dofs without mass.
+    /// Refuses a history that does not fit a system of this size, `slots` motions long and with `massless` dofs without
+    /// mass.
     pub(crate) fn check(&self, dofs: usize, slots: usize, massless: usize) -> Result<()> {
         let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });
         if self.slopes.len() != massless {
