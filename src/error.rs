@@ -59,7 +59,8 @@ pub enum Error {
     /// A matrix that must be symmetric is not; both triangles must be stored.
     #[error(
         "the {matrix} matrix is not symmetric: entry ({row}, {column}) is {value:e}, entry ({column}, {row}) is \
-         {mirrored:e}; store both triangles (an effective matrix that is not to be symmetric takes the linear solver Lu)"
+         {mirrored:e}; store both triangles (an effective matrix that is not to be symmetric takes the linear solver \
+         Lu)"
     )]
     Asymmetric {
         /// Which matrix.
@@ -155,8 +156,8 @@ pub enum Error {
     },
     /// A time-integration tableau does not converge to the motion, however small the step: its order is 0.
     #[error(
-        "{integrator} is of order 0 in displacement or velocity: its results are no motion of the system, however small the \
-         step; check the rows of its tableau with `analysis::order`"
+        "{integrator} is of order 0 in displacement or velocity: its results are no motion of the system, however \
+         small the step; check the rows of its tableau with `analysis::order`"
     )]
     InconsistentScheme {
         /// Name of the integrator.
@@ -164,8 +165,9 @@ pub enum Error {
     },
     /// A time-integration tableau is zero-unstable: errors of single steps grow without bound, however small the step.
     #[error(
-        "{integrator} (order {order}) is zero-unstable: without stiffness and damping a step has the spectral radius {radius:e}, \
-         or more than the double root 1 of rigid motion; check the rows of its tableau with `analysis::zero_stability`"
+        "{integrator} (order {order}) is zero-unstable: without stiffness and damping a step has the spectral radius \
+         {radius:e}, or more than the double root 1 of rigid motion; check the rows of its tableau with \
+         `analysis::zero_stability`"
     )]
     UnstableScheme {
         /// Name of the integrator.
@@ -177,8 +179,8 @@ pub enum Error {
     },
     /// A step beyond the stability limit of the scheme.
     #[error(
-        "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system is {frequency:e} (1/time) \
-         or more, for which h may be {largest:e}; take smaller steps or an implicit scheme \
+        "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system is \
+         {frequency:e} (1/time) or more, for which h may be {largest:e}; take smaller steps or an implicit scheme \
          (`SimulationBuilder::unchecked_stability` takes the step as it is)"
     )]
     BeyondStability {
@@ -204,8 +206,9 @@ pub enum Error {
     },
     /// An iteration has met a direction along which a matrix that must be positive definite is not.
     #[error(
-        "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of conjugate \
-         gradients, least of all at dof {dof}; look for a body without mass or support, or a negative stiffness"
+        "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of \
+         conjugate gradients, least of all at dof {dof}; look for a body without mass or support, or a negative \
+         stiffness"
     )]
     Indefinite {
         /// pᵀAp over pᵀdiag(A)p.
@@ -215,8 +218,8 @@ pub enum Error {
     },
     /// The iterative solution of a linear system did not converge.
     #[error(
-        "{method} not converged after {iterations} iterations: relative residual {residual:e}, tolerance {tolerance:e}; take \
-         smaller steps, allow more iterations, or use `Cholesky`"
+        "{method} not converged after {iterations} iterations: relative residual {residual:e}, tolerance \
+         {tolerance:e}; take smaller steps, allow more iterations, or use `Cholesky`"
     )]
     LinearNotConverged {
         /// The iteration.
@@ -250,8 +253,8 @@ pub enum Error {
     },
     /// Closed contacts demand opposite things: no contact forces meet them all.
     #[error(
-        "t = {t:e}: contacts {contact} and {other} contradict each other, {contact} stays violated by {violation:e} (gap \
-         units) whatever the forces; a body is squeezed between obstacles or tied twice"
+        "t = {t:e}: contacts {contact} and {other} contradict each other, {contact} stays violated by {violation:e} \
+         (gap units) whatever the forces; a body is squeezed between obstacles or tied twice"
     )]
     ContradictoryContacts {
         /// Time of the stage.
@@ -266,8 +269,8 @@ pub enum Error {
     /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver
     /// is for symmetric problems.
     #[error(
-        "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is not \
-         symmetric; solve contact by ActiveSet or GaussSeidel"
+        "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is \
+         not symmetric; solve contact by ActiveSet or GaussSeidel"
     )]
     UnsymmetricContacts {
         /// Time of the stage.
@@ -279,8 +282,8 @@ pub enum Error {
     },
     /// The contact problem was not solved.
     #[error(
-        "t = {t:e}: contact problem not solved after {iterations} iterations; contact {contact} misses complementarity by \
-         {residual:e} (gap units)"
+        "t = {t:e}: contact problem not solved after {iterations} iterations; contact {contact} misses \
+         complementarity by {residual:e} (gap units)"
     )]
     Contact {
         /// Time of the stage.
@@ -294,9 +297,9 @@ pub enum Error {
     },
     /// A gap moves in time by itself, and its rates do not say so.
     #[error(
-        "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its rates \
-         are zero; give ∂g/∂t (`ContactConstraint::rates`, or the second entry of a moving offset or gap function), and check \
-         it with `verify::gap_jacobian`",
+        "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its \
+         rates are zero; give ∂g/∂t (`ContactConstraint::rates`, or the second entry of a moving offset or gap \
+         function), and check it with `verify::gap_jacobian`",
         .gap[0], .gap[1], .t[0], .t[1]
     )]
     SilentMotion {
@@ -316,8 +319,8 @@ pub enum Error {
     },
     /// The initial state violates a contact constraint.
     #[error(
-        "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is not \
-         negative (zero for an equality row)"
+        "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is \
+         not negative (zero for an equality row)"
     )]
     InitialViolation {
         /// The contact.
@@ -329,8 +332,8 @@ pub enum Error {
     },
     /// Dofs without mass were not brought into static balance at the start.
     #[error(
-        "dofs without mass ({dof} and others) not in static balance after {iterations} iterations from the initial displacements; \
-         start nearer to it, or give them a mass"
+        "dofs without mass ({dof} and others) not in static balance after {iterations} iterations from the initial \
+         displacements; start nearer to it, or give them a mass"
     )]
     StartNotBalanced {
         /// Iterations spent.
@@ -354,9 +357,9 @@ pub enum Error {
     },
     /// Newton's method did not converge.
     #[error(
-        "step from t = {t:e} with h = {h:e}: Newton's method not converged after {iterations} iterations; relative residual \
-         {residual:e}, relative increment {increment:e}, worst dof {dof}; take smaller steps, check the tangent with \
-         `verify::tangent`, or try a line search"
+        "step from t = {t:e} with h = {h:e}: Newton's method not converged after {iterations} iterations; relative \
+         residual {residual:e}, relative increment {increment:e}, worst dof {dof}; take smaller steps, check the \
+         tangent with `verify::tangent`, or try a line search"
     )]
     NewtonNotConverged {
         /// Time at the start of the step.
@@ -374,8 +377,8 @@ pub enum Error {
     },
     /// A step is so small that it would not change the time.
     #[error(
-        "step from t = {t:e}: h = {h:e} is below the resolution of times there, {resolution:e}, so that the step would not \
-         change t; count time from an origin nearer to the run, or take larger steps"
+        "step from t = {t:e}: h = {h:e} is below the resolution of times there, {resolution:e}, so that the step \
+         would not change t; count time from an origin nearer to the run, or take larger steps"
     )]
     TimeNotAdvancing {
         /// Time at the start of the step.
@@ -400,8 +403,8 @@ pub enum Error {
     },
     /// The effective matrix of an iteration is not positive definite.
     #[error(
-        "step from t = {t:e} with h = {h:e}: the effective matrix of iteration {iteration} is not positive definite at dof \
-         {dof}: the stiffness there is too negative for this step; take smaller steps"
+        "step from t = {t:e} with h = {h:e}: the effective matrix of iteration {iteration} is not positive definite \
+         at dof {dof}: the stiffness there is too negative for this step; take smaller steps"
     )]
     IndefiniteTangent {
         /// Time at the start of the step.
@@ -447,8 +450,8 @@ pub enum Error {
     },
     /// A node has left the facets that the last search found for it.
     #[error(
-        "t = {t:e}: contact {contact} has left what the search at the start of the step found; take smaller steps or give \
-         the contact a larger reach"
+        "t = {t:e}: contact {contact} has left what the search at the start of the step found; take smaller steps or \
+         give the contact a larger reach"
     )]
     ContactLost {
         /// Time of the stage.
@@ -458,8 +461,8 @@ pub enum Error {
     },
     /// A body has passed through another one within a step, or was stopped where that one is not.
     #[error(
-        "step from t = {t:e} with h = {h:e}: contact {contact} {what}; its node, at a gap of {gap:e}, went {way:e} against the \
-         surface; take smaller steps (`StepControl` does)"
+        "step from t = {t:e} with h = {h:e}: contact {contact} {what}; its node, at a gap of {gap:e}, went {way:e} \
+         against the surface; take smaller steps (`StepControl` does)"
     )]
     PassedThrough {
         /// Time at the start of the step.
@@ -486,8 +489,8 @@ pub enum Error {
     },
     /// A callback of the host has panicked in an earlier call, and the host's own parts may have stopped half way.
     #[error(
-        "a callback of the host has panicked in an earlier call: this simulation does not go on; its state and history are those \
-         before that call: build another one and `resume` from them, or from copies kept before"
+        "a callback of the host has panicked in an earlier call: this simulation does not go on; its state and \
+         history are those before that call: build another one and `resume` from them, or from copies kept before"
     )]
     Poisoned,
     /// A callback of the host failed.

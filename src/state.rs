@@ -1,4 +1,4 @@
-//! The motion: what a later step reads, and what the user reads.
+//! The state of a run: its motion, as later steps and as users read it, and its contacts.
 
 mod backup;
 mod clock;
@@ -28,7 +28,7 @@ impl<T: Real> Motion<T> {
         Self { t: 0.0, u: zero(), v: zero(), a: zero() }
     }
 
-    /// Time; u, v, a.
+    /// Time, and u, v, a there: what gaps and their rates are evaluated at.
     pub(crate) fn place(&self) -> (f64, [&[T]; 3]) {
         (self.t, [&self.u, &self.v, &self.a])
     }
@@ -49,7 +49,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// Field 1, 2: v, a at the time of the state, `shown` if it is not empty.
+    /// Field 1, 2: v, a at the time of the state: `shown`, unless it is empty because the stored ones live there.
     pub(crate) fn shown<'v>(&'v self, shown: &'v [Vec<T>; 2], field: usize) -> &'v [T] {
         match shown[field - 1].is_empty() {
             true => self.field(field),

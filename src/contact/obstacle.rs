@@ -354,6 +354,7 @@ fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     }
 }
 
+/// `x / |x|`; vectors that are zero or not finite are refused under the name given.
 pub(super) fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
     finite(name, &x)?;
     // Scaled first: squares of very small or large entries leave the range of the scalar.

@@ -18,6 +18,7 @@ pub(crate) struct Buffers<T> {
     pub(crate) released: Vec<usize>,
     /// Reported forces before this stage, one a candidate.
     pub(crate) reported: Vec<T>,
+    /// The contact problem of the jumps of one kind: what multipliers may be, jumps, and what of them is rounding.
     pub(super) bounds: Vec<Bound>,
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
@@ -25,11 +26,13 @@ pub(crate) struct Buffers<T> {
     pub(super) impulses: Vec<T>,
     /// Forces that remove the acceleration jumps, one an engaged row.
     pub(super) forces: Vec<T>,
+    /// S = G M⁻¹ Gᵀ of the rows of such a problem.
     pub(super) s: Vec<T>,
-    /// One a candidate.
+    /// Rates and gaps as the constraints give them, one a candidate.
     pub(super) rates: Vec<GapRates<T>>,
     pub(super) gaps: Vec<T>,
-    /// Change of v and the damping force it makes (and that of before), one a dof; empty without damping.
+    /// Change of v by a correction, the change of damping force that it makes, and the force before it where damping is
+    /// not linear; one a dof, empty without damping.
     pub(super) change: Vec<T>,
     pub(super) damping: Vec<T>,
     pub(super) before: Vec<T>,

@@ -163,8 +163,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Takes for no jump what the rows of the scheme make of gaps that are met to some of their rounding: rows that
-    /// depend on one another contradict each other by that.
+    /// Widens the tolerances by the jumps that the scheme's rows make of gaps which are met only up to a few roundings:
+    /// by so much rows that depend on one another may contradict each other.
     fn allow_rounding_of_gaps(&mut self, rows: &[usize], jump: Jump) {
         /// Roundings of a gap that it may miss.
         const ROUNDINGS: f64 = 32.0;
@@ -258,7 +258,7 @@ impl<T: Real> Correction<'_, T> {
         self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates)
     }
 
-    /// The same if the rates of the rows are known.
+    /// [`apply_impulses`](Self::apply_impulses) with the rates of the gaps read already.
     fn apply(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
@@ -275,7 +275,7 @@ impl<T: Real> Correction<'_, T> {
         // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
         // obstacle's.
         for ((&row, &impulse), &before) in rows.iter().zip(impulses.iter()).zip(jump.iter()) {
-            // (States between stages are not shown: what they lose of v is not lost by the step.)
+            // (A state between stages drops out of the past: what its v loses is no loss of the step.)
             if !scheme.is_last() {
                 continue;
             }

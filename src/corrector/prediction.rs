@@ -119,7 +119,7 @@ impl<T: Real> Prediction<'_, T> {
         }
     }
 
-    /// Gaps at the displacements moved, on their own part of a curved surface.
+    /// Gaps at the shifted displacements; curved ones are linearized there.
     fn read_gaps(&mut self) -> Result<()> {
         let Self { t, start, shifted, buffers, constraints, .. } = self;
         let there = (*t, [&**shifted, &start.v, &start.a]);

@@ -7,12 +7,13 @@ use crate::real::Real;
 /// The past as it was before the step, kept when a corrector first edits it.
 #[derive(Debug)]
 pub(crate) struct Backup<T> {
-    /// Whether state and history are those of a step that has not ended.
+    /// Whether a step has begun and not ended: state and history are then those of its present stage.
     pub(crate) underway: bool,
-    /// Rotations of the history at the present stage.
+    /// How often the step has rotated the history: once a stage.
     pub(crate) rotations: usize,
-    /// Rotations at which the copy was made, if there is one.
+    /// What `rotations` was when the copy was made, if there is one.
     kept: Option<usize>,
+    /// The copy; no slots if no corrector edits the past.
     slots: Vec<Motion<T>>,
 }
 
@@ -46,6 +47,7 @@ impl<T: Real> Backup<T> {
         }
     }
 
+    /// Makes the copy, if the step has none yet.
     pub(crate) fn keep(&mut self, past: &[Motion<T>]) {
         if self.kept.is_none() {
             for (copy, original) in self.slots.iter_mut().zip(past) {

@@ -63,6 +63,7 @@ pub(crate) fn resolution(t: f64) -> f64 {
 /// Where the present step size stands in the nominal grid, for runs that control it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pace {
+    /// The step size given, of which all others are halves, quarters and so on.
     pub(crate) nominal: f64,
     /// How often the nominal step is halved now.
     level: u32,

@@ -18,7 +18,7 @@ pub struct History<T> {
     pub(crate) pace: Pace,
     /// Step size that made the current state.
     pub(crate) made_with: f64,
-    /// The motions as they were computed, from which changes of the step size resample; empty until there is one.
+    /// The motions as they were computed, from which changes of the step size resample; empty until it first changes.
     pub(crate) trail: Trail<T>,
     /// v and a of the current state as they were computed, if a change of the step size has moved the stored ones to
     /// another time.
@@ -97,6 +97,8 @@ impl<T: Real> History<T> {
         Some((&motion.u, &motion.v, &motion.a))
     }
 
+    /// Refuses a history that does not fit a system of this size, `slots` motions long and with `massless` dofs without
+    /// mass.
     pub(crate) fn check(&self, dofs: usize, slots: usize, massless: usize) -> Result<()> {
         let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });
         if self.slopes.len() != massless {

@@ -70,7 +70,7 @@ impl Momentum {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if there is no such stage.
+    /// [`Error::Parameter`](crate::Error::Parameter) if there is no such stage.
     pub fn after_stage(&self, s: usize) -> Result<&[[f64; 3]]> {
         self.covectors.get(s).map(Vec::as_slice).ok_or_else(|| no_stage(s))
     }

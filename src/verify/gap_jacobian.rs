@@ -86,7 +86,7 @@ pub fn gap_jacobian<T: Real>(
     // Rates first, while the rows are those of the search at u.
     let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
     let delay = if speed > 0.0 { step / speed } else { step };
-    // As far as times near t can tell: t ± delay and t ± 100 delay are then what they say.
+    // Rounded to what times near t can resolve, so that t ± delay and t ± 100 delay are off by just that.
     let delay = (t + delay.max(resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
@@ -157,7 +157,7 @@ type Found<T> = (Vec<(usize, usize)>, ContactJacobian<T>);
 struct Watched<'c, T: Real> {
     constraint: &'c mut dyn ContactConstraint<T>,
     rows: Option<Found<T>>,
-    /// Searches that kept a change for themselves.
+    /// Searches that changed rows and said that nothing has changed.
     unreported: usize,
 }
 

@@ -4,7 +4,8 @@ use super::Surface;
 use super::search::{Bounds, Neighborhood, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
 
-/// Cosine of the angle between the normals of a node and a facet above which they are on the same side.
+/// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
+/// look to the same side.
 const SAME_SIDE: f64 = 0.5;
 
 /// The same for the facet that a node stands on already, within a step.
@@ -21,29 +22,30 @@ struct Seen {
     facet: usize,
 }
 
-/// A node on a facet.
+/// How a node stands on a surface: the facet and its closest point, the normal and the gap there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stand {
-    /// Place of the node in the list of its pass.
+    /// Index of the node in the list of nodes that may stand on the surface.
     pub(crate) place: usize,
-    /// Index of the facet in the list of its pass.
+    /// Index of the facet in the surface.
     pub(crate) facet: usize,
     location: Location,
     /// Shape functions of the facet's vertices at the closest point.
     pub(crate) weights: [f64; 4],
     pub(crate) normal: Point,
     pub(crate) gap: f64,
-    /// How often the node has jumped since the search, and where it stood last at the two times that rows are followed
-    /// to, the newest first.
+    /// How often the node has jumped to another facet or normal since the search.
     jumps: u8,
+    /// Where it stood last at the two times that rows are followed to in a step (where the gap is met, where the
+    /// balance holds), the one seen last first.
     seen: [Option<Seen>; 2],
 }
 
-/// The nodes of a pass and what they may stand on, at the positions now.
+/// Nodes and a surface that they may stand on, at given positions of both.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     pub(crate) nodes: &'a [usize],
-    /// Facets to look at; all of them, if there is none.
+    /// The facets near each node, if known; otherwise all are looked at.
     pub(crate) neighborhood: Option<&'a Neighborhood>,
     pub(crate) surface: &'a Surface,
     /// The surface of the nodes, if known.
@@ -135,10 +137,12 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
-    /// Where the node stands at t, as the stand that follows this one; nothing if it is to stay as it is. Between two
-    /// facets, or around an edge that it touches, a node has no normal to converge to: one that has jumped too often
-    /// stays. Rows are followed to where the balance holds and to where the gap is met, later in the step, in turns;
-    /// where a kink lies between the two, the row of the later place serves both.
+    /// The stand that takes the place of this one when the node is found as in `next` at t; none if this one stays.
+    ///
+    /// It stays if the node has jumped too often: between two facets, or around an edge that it touches, there is no
+    /// normal to converge to. It also stays if a kink lies between two places of a step: rows are followed in turns to
+    /// where the balance holds and, later in the step, to where the gap is met, and the row of the later one then
+    /// serves both.
     pub(crate) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
         /// Cosines of the angles that are a jump and a kink (18°), and jumps that are followed.
         const TURN: f64 = 1.0 - 1e-5;

@@ -104,7 +104,7 @@ impl Shape {
         self.corners[k]
     }
 
-    /// Whether the projection of a point is on a segment or a triangle, its rim included.
+    /// Whether the projection of a point is on a segment or a triangle, its sides included up to rounding.
     pub(crate) fn holds(&self, p: Point) -> bool {
         const RIM_OF_RAY: f64 = 1e-9;
         let rim = Rim { sides: [true; 4], vertices: [true; 4], beyond: RIM_OF_RAY };

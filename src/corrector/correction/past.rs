@@ -78,13 +78,12 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Gives back along a row what corrections have taken since it closed, as far as the numbers of the velocities can
-    /// tell: the bodies leave each other with that energy more, and the past that later rows read has had the same
-    /// velocity.
+    /// Gives back along a row the energy that corrections have taken since it closed, unless it is below the rounding
+    /// of the velocities: the bodies leave each other faster, and the past that later rows read gets the same velocity.
     pub(in crate::corrector) fn give_back(&mut self, row: usize) -> Result<()> {
         let (s, rate) = (self.compliance(row), self.rate(row)?);
         let taken = self.contacts.dissipated[row];
-        // Of the relative velocity u = G v + ġ0, which is left of larger numbers, j u is noise of this size.
+        // The gap rate is a small difference of larger numbers; this is their rounding.
         let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
         if !(s > T::zero() && T::of(2.0) * s * taken > noise * noise) {
             return Ok(());
@@ -106,7 +105,8 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
-    /// rows read them. Schemes that difference displacements would see a part of it else, or more than all.
+    /// rows read them. Otherwise a scheme that takes velocities from differences of displacements would see a part of
+    /// Δv only, or more than all of it.
     fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
         // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
