@@ -94,7 +94,7 @@ pub(crate) fn factorize<T: Scalar>(
         let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
         return Err(original(index.saturating_sub(base)));
     }
-    // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
+    // The caller checks the pivots: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
     // rounding.
     match symbolic.raw() {
         SymbolicCholeskyRaw::Simplicial(raw) => {
