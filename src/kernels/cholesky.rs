@@ -99,7 +99,7 @@ pub(crate) fn factorize<T: Scalar>(
     match symbolic.raw() {
         SymbolicCholeskyRaw::Simplicial(raw) => {
             for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
-                pivots[original(k)] = values[start].clone();
+                pivots[original(k)] = values[start];
                 // The sweeps multiply by 1/D.
                 values[start] = T::recip_impl(&values[start]);
             }
