@@ -27,9 +27,9 @@ use std::ops::Range;
 /// use contact_dynamics::{Automatic, ByBody, Cholesky, LinearSolver};
 ///
 /// // Two bodies of two dofs each, numbered alternately.
-/// let one = [(0, 0, 2.0), (0, 2, -1.0), (2, 0, -1.0), (2, 2, 1.0)];
-/// let other = [(1, 1, 4.0), (1, 3, -2.0), (3, 1, -2.0), (3, 3, 4.0)];
-/// let entries = [one, other].concat().into_iter().map(|(i, j, a)| Triplet::new(i, j, a)).collect::<Vec<_>>();
+/// let entries = [(0, 0, 2.0), (0, 2, -1.0), (2, 0, -1.0), (2, 2, 1.0),
+///     (1, 1, 4.0), (1, 3, -2.0), (3, 1, -2.0), (3, 3, 4.0)];
+/// let entries = entries.map(|(i, j, a)| Triplet::new(i, j, a));
 /// let a = SparseColMat::<usize, f64>::try_new_from_triplets(4, 4, &entries)?;
 /// let solver = ByBody::new(Automatic).body([1], Cholesky::default());
 /// let mut factor = solver.analyze(a.symbolic(), &[])?;
