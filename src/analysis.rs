@@ -1,4 +1,5 @@
-//! What the rows of a tableau say: order, spectral radius, stability limit, period error, damping, overshoot.
+//! Properties that follow from the rows of a tableau: order, spectral radius, stability limit, period error, damping,
+//! overshoot.
 //!
 //! All figures are computed from the rows of a [`Tableau`] alone, for the scalar equation `a + 2 ξ ω v + ω² u = 0` with
 //! Ω = ω h, so they hold for a scheme of one's own as well.

@@ -97,7 +97,7 @@ impl<T: Real> DenseCholesky<T> {
                 independent.extend(0..size);
                 return Ok(());
             }
-            // Row by row after all, from the start: the kernel has written to both triangles.
+            // Not sound: again row by row, from the start, because the kernel has overwritten both triangles.
             for i in 0..size {
                 for j in 0..=i {
                     l[i * size + j] = entry(i, j);
@@ -117,8 +117,8 @@ impl<T: Real> DenseCholesky<T> {
                 };
             }
             let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
-            // What is left may be more than the rounding of the row's own diagonal entry, and rounding all the same:
-            // that of the rows before it, divided by the roots of their pivots.
+            // A pivot above the rounding of its own diagonal entry may still be rounding: that of the rows before it,
+            // divided by the roots of their pivots.
             let sound = pivot > dependent * diagonal[i]
                 && (pivot > suspect * diagonal[i] || {
                     let length =
@@ -141,9 +141,8 @@ impl<T: Real> DenseCholesky<T> {
     /// Factorizes a matrix that need not be symmetric, with entries `entry(i, j)` and a diagonal that is not negative,
     /// by LU with partial pivoting. Rows and columns are measured by the roots of the diagonal.
     ///
-    /// Where a pivot is lost in rounding the factorization is singular, and ends: it cannot be solved with. `Err(row)`
-    /// as from
-    /// [`factorize`](Self::factorize).
+    /// Where a pivot is lost in rounding the matrix is singular: the factorization ends there and cannot be used to
+    /// solve. `Err(row)` as from [`factorize`](Self::factorize).
     pub(crate) fn factorize_general(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let Self { l, first: exchanges, diagonal, independent, kind, .. } = self;
         (self.size, *kind) = (size, Kind::General);
@@ -160,7 +159,7 @@ impl<T: Real> DenseCholesky<T> {
             }
         }
         let dependent = T::of(16.0 * size as f64) * T::epsilon();
-        // `diagonal` goes with the rows; the measure of a column is taken before they are exchanged.
+        // `diagonal` is exchanged with the rows; the measure of a column is taken before that.
         for k in 0..size {
             let measure = entry(k, k).sqrt();
             let share = |i: usize| l[i * size + k].abs() / diagonal[i];

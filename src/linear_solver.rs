@@ -80,7 +80,7 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Solves in place; `rhs` holds one or more columns of the system's size, one after the other.
     ///
     /// Does not allocate for a single column. Call after a successful [`factorize`](Self::factorize) only. A right-hand
-    /// side that is not finite is no error: its solution is not finite either, and the step says so.
+    /// side that is not finite is no error: its solution is not finite either, which the step reports.
     ///
     /// # Errors
     ///
@@ -93,12 +93,12 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
 
-    /// Iterations of the last solve, of its longest column; zero for what does not iterate.
+    /// Iterations of the last solve, the largest number of its columns; zero for direct solvers.
     fn iterations(&self) -> usize {
         0
     }
 
-    /// The factorization as a static condensation on the dofs that were to be eliminated last, if it can do that.
+    /// The factorization as a static condensation on the dofs given as `last`, if the solver offers it.
     ///
     /// With it a step in contact costs one sweep forward and one backward, as without contact, plus work on the
     /// interface alone. Without it contact is solved with full solves: one for each contact that presses, and one more
@@ -143,8 +143,8 @@ pub trait Condensation<T: Real> {
     ///
     /// # Errors
     ///
-    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for the bodies that contact does
-    /// not touch by whatever solver they have).
+    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for bodies without contact with
+    /// the solver that they were given).
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()>;
 
     /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
@@ -168,8 +168,8 @@ fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -
     }
 }
 
-/// What a matrix must share with the pattern that was analyzed: a fingerprint, for the pattern itself can be as large
-/// as a factor.
+/// A fingerprint of the analyzed pattern, to compare with that of a matrix; the pattern itself can be as large as a
+/// factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Fingerprint {
     dofs: usize,
@@ -179,7 +179,7 @@ struct Fingerprint {
 
 impl Fingerprint {
     fn of(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
-        // Each row index by the place where it stands: an odd factor mixes, a rotation keeps the order.
+        // A hash that depends on the order: the odd factor mixes the bits, the rotation makes each place count.
         let mix = |mixed: u64, index: usize| (mixed.rotate_left(5) ^ index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let (mut entries, mut mixed) = (0, 0);
         for column in 0..pattern.ncols() {
@@ -219,8 +219,8 @@ pub(crate) const COLUMNS: usize = 16;
 /// contact at one end each, else [`Cholesky`].
 ///
 /// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many
-/// contacts press, which a pattern does not tell, and a factorization is exact to rounding at any step.
-/// Nor [`Lu`]: whether values are symmetric a pattern does not say.
+/// contacts press, which a pattern does not show, and a factorization is exact to rounding at any step. Nor [`Lu`]: a
+/// pattern does not show whether the values are symmetric.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Automatic;
 

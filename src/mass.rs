@@ -129,7 +129,7 @@ impl<T: Real> InverseMass<T> {
                     x[dof] = T::zero();
                 }
                 if factor.solve(x).is_err() {
-                    // Direct factors do not fail; if one ever does, whoever reads the response finds that it is none.
+                    // Direct solvers do not fail. If one ever does, NaN keeps the response from being used.
                     x.fill(T::nan());
                 }
             }

@@ -1,4 +1,4 @@
-//! Large allocations that may fail: an error instead of an abort; scratch that can be cloned.
+//! Large allocations that return an error instead of aborting, and scratch memory that can be cloned.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -18,7 +18,7 @@ pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Res
     Ok(vector)
 }
 
-/// Scratch for the kernels of faer; a clone begins with none.
+/// Scratch memory for faer's kernels; a clone starts empty.
 #[derive(Default)]
 pub(crate) struct Scratch {
     buffer: Option<MemBuffer>,
@@ -26,7 +26,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// Scratch of at least this size, allocated if there is less.
+    /// Scratch of at least this size; allocates if there is less.
     pub(crate) fn get(&mut self, required: StackReq) -> &mut MemBuffer {
         let bytes = required.unaligned_bytes_required();
         if bytes > self.bytes {

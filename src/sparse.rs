@@ -14,7 +14,7 @@ pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) 
     }
 }
 
-/// Refuses patterns with slack between columns or with rows out of order: every loop here relies on neither.
+/// Refuses patterns with slack between columns or with rows out of order, on whose absence every loop here relies.
 pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<()> {
     let refuse = |reason| Err(Error::Incompatible { part: format!("the {matrix} matrix"), reason });
     if pattern.col_nnz().is_some() {
@@ -27,7 +27,7 @@ pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatR
     }
 }
 
-/// Refuses patterns of effective matrices that are not square, and those that [`check_pattern`] does; gives the number
+/// Refuses the pattern of an effective matrix that is not square, or that [`check_pattern`] refuses; returns the number
 /// of dofs.
 pub(crate) fn check_effective_pattern(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<usize> {
     let (rows, columns) = (pattern.nrows(), pattern.ncols());
@@ -138,7 +138,7 @@ pub(crate) fn check_symmetric_in<T: Real>(
     }
 }
 
-/// A number that has nothing to do with its index (the finalizer of splitmix64).
+/// A pseudo-random number for each index (the finalizer of splitmix64).
 pub(crate) fn scattered(index: usize) -> u64 {
     let x = (index as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,15 +1,15 @@
-//! Work side by side, where there are threads for it.
+//! Work on several threads with the feature `rayon`, in sequence without it.
 
 use faer::Par;
 
-/// Scalars of a factor from which on a thread of its own is worth waking: a tenth of a millisecond of reading.
+/// The smallest factor, in scalars, that is worth a thread of its own: reading it takes a tenth of a millisecond.
 pub(crate) const GRAIN: usize = 1 << 18;
 
-/// How faer is to compute a factor of so many scalars: with all threads of the present pool with the feature `rayon` if
-/// it is large, else with one.
+/// The parallelism with which faer computes a factor of so many scalars: all threads of the current pool if the factor
+/// is large, else one.
 #[cfg(feature = "rayon")]
 pub(crate) fn parallelism(scalars: usize) -> Par {
-    /// Below, threads wait for each other longer than they work.
+    /// In smaller factors threads wait for each other longer than they work.
     const WORTHWHILE: usize = 1 << 20;
     match rayon::current_num_threads() {
         count if count > 1 && scalars >= WORTHWHILE => Par::rayon(count),
@@ -17,31 +17,31 @@ pub(crate) fn parallelism(scalars: usize) -> Par {
     }
 }
 
-/// How faer is to compute a factor: with one thread.
+/// The parallelism with which faer computes a factor: one thread.
 #[cfg(not(feature = "rayon"))]
 pub(crate) fn parallelism(_: usize) -> Par {
     Par::Seq
 }
 
-/// Does both: on two threads with the feature `rayon` if its pool has any, else one after the other.
+/// Runs both, on two threads if the current pool has them, else one after the other.
 #[cfg(feature = "rayon")]
 pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     rayon::join(first, second);
 }
 
-/// Does both, one after the other.
+/// Runs both, one after the other.
 #[cfg(not(feature = "rayon"))]
 pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     first();
     second();
 }
 
-/// Whether parts with factors of these sizes, in scalars, are worth a thread each.
+/// Whether two or more of the parts, whose factors have these sizes in scalars, are worth a thread each.
 pub(crate) fn worthwhile(scalars: impl Iterator<Item = usize>) -> bool {
     cfg!(feature = "rayon") && scalars.filter(|scalars| *scalars >= GRAIN).count() > 1
 }
 
-/// Does something to every part, on several threads. What fails first in the order of the parts is told.
+/// Calls `act` on every part, on several threads. Of several errors that of the first part in order is returned.
 pub(crate) fn try_each<P: Send, E: Send>(
     parts: &mut [P],
     act: &(impl Fn(&mut P) -> Result<(), E> + Sync),

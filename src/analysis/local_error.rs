@@ -1,11 +1,11 @@
-//! The local error of a scheme, from what a step shows of it.
+//! The local error of a scheme, from the values before and after a step.
 
 use super::amplification;
 use super::order::{Order, order};
 use crate::tableau::Tableau;
 use faer::c64;
 
-/// Ω at which the error is taken: the terms of higher order are Ω² of it.
+/// Ω at which the error is taken: terms of higher order are smaller by Ω².
 const OMEGA: f64 = 0.02;
 
 /// How the error that a step adds follows from its distance to Taylor's expansion,
@@ -25,7 +25,8 @@ pub struct LocalError {
 }
 
 /// The local error of a scheme, from a free oscillation at small Ω: the error that a step adds to it is that of its
-/// principal root, and the distance that of its principal vector, so what earlier steps did to v and a is part of it.
+/// principal root, and the distance that of its principal vector, so the effect of earlier steps on v and a is
+/// included.
 ///
 /// `None` if the error does not follow the distance: schemes of first order like Newmark's with γ ≠ ½ err in v by h²,
 /// of which h v shows h³ only.
@@ -52,7 +53,7 @@ fn factor(tableau: &Tableau, order: &Order, omega: f64) -> Option<f64> {
     let principal = (0..vectors.ncols()).min_by(|&i, &j| size(roots[i] - exact).total_cmp(&size(roots[j] - exact)))?;
     let root = roots[principal];
     let [u, stored_v, stored_a] = [0, 1, 2].map(|i| vectors[(i, principal)]);
-    // v and a at the time of the state, as it shows them.
+    // v and a extrapolated to the time of the state.
     let back = c64::new(1.0, 0.0) - c64::new(1.0, 0.0) / root;
     let shown = |x: c64, shift: f64| x - x * back * shift;
     let (v, a) = (shown(stored_v, order.velocity_shift), shown(stored_a, order.acceleration_shift));

@@ -1,15 +1,15 @@
-//! What a scheme makes of degrees of freedom without mass.
+//! The stability of degrees of freedom without mass.
 
 use crate::tableau::Tableau;
 
-/// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic,
-/// 0 = f(ū), and ū = α u + (1 − α) u₀ carries an error of u₀ over by −(1 − α)/α. `None` if the displacement of such a
-/// dof is not determined (explicit schemes), or not by that of the state before alone.
+/// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic, 0
+/// = f(ū), and ū = α u + (1 − α) u₀ carries an error of u₀ over by −(1 − α)/α. `None` if the displacement of such a dof
+/// is not determined (explicit schemes), or not by that of the previous state alone.
 ///
 /// Below 1 in size errors decay, and a [`Simulation`](crate::Simulation) takes dofs without mass; at 1 they alternate
-/// forever. Explicit stages that balance forces at displacements which they know beforehand bring such dofs into static
-/// balance there, and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f)
-/// for generalized-α (theory, section 15).
+/// forever. Explicit stages whose displacements are known before their balance bring such dofs into static balance
+/// there, and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f) for
+/// generalized-α (theory, section 15).
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, GeneralizedAlpha, MoreauJean, Newmark, TimeIntegrator, analysis};

@@ -21,15 +21,15 @@ pub struct Order {
 }
 
 impl Order {
-    /// What a tableau without a solution for smooth motion has.
+    /// The orders of a tableau that has no solution for smooth motion.
     const NONE: Self =
         Self { displacement: 0, velocity: 0, acceleration: 0, velocity_shift: 0.0, acceleration_shift: 0.0 };
 }
 
-/// Orders beyond this one are not told apart.
+/// Higher orders are reported as this one.
 const HIGHEST: i32 = 6;
 
-/// Damping and stiffness of the test equation: numbers without a relation that could cancel a term.
+/// Damping and stiffness of the test equation: unrelated numbers, so that no term cancels by chance.
 const TEST: [f64; 2] = [0.731, 1.273];
 
 /// Order of consistency of a tableau.
@@ -52,7 +52,7 @@ pub fn order(tableau: &Tableau) -> Order {
         return Order::NONE;
     };
     let one = Series::monomial(1.0, 0);
-    // What the stored values should be: 1, h, h².
+    // The exact values of U, V, A: 1, h, h².
     let relative = |stored: &Series, power: i32| stored.over(&Series::monomial(1.0, power));
     let error = |value: &Series| value.minus(&one).valuation().map_or(HIGHEST, |power| power.clamp(0, HIGHEST));
     let in_u = error(&displacement);

@@ -1,4 +1,4 @@
-//! What the first steps make of a mode that the step does not resolve.
+//! The overshoot of modes that the step does not resolve, in the first steps.
 
 use super::order::order;
 use crate::integrator::{Newmark, TimeIntegrator};
@@ -14,7 +14,7 @@ pub struct Overshoot {
     pub velocity: f64,
 }
 
-/// Steps over which overshoot is looked for.
+/// Number of steps in which overshoot is measured.
 const STEPS: usize = 10;
 
 /// Overshoot of an undamped oscillator that is released from u₀ at rest, with Ω = ω h (Hilber, Hughes, Earthq. Eng.
@@ -47,7 +47,7 @@ pub fn overshoot(tableau: &Tableau, omega: f64, start: StartUp) -> Overshoot {
 /// ```
 pub fn overshoot_growth(tableau: &Tableau, start: StartUp) -> [f64; 2] {
     let [low, high] = [1e3, 1e4].map(|omega| overshoot(tableau, omega, start));
-    // What decreases is bounded.
+    // A decreasing overshoot is bounded.
     let exponent = |high: f64, low: f64| (high / low).log10().max(0.0);
     [exponent(high.displacement, low.displacement), exponent(high.velocity, low.velocity)]
 }
@@ -58,7 +58,7 @@ fn release(tableau: &Tableau, omega: f64, start: StartUp, steps: usize) -> Vec<[
     let (depth, stages) = (tableau.depth(), tableau.stages.len().max(1));
     let order = order(tableau);
     let [u, a] = [1.0, -omega * omega];
-    // Stored values of schemes that keep them elsewhere.
+    // The stored values of schemes that store v and a at another time.
     let mut past = vec![[u, order.velocity_shift * a, a]];
     if start == StartUp::Taylor {
         past.extend((1..depth).map(|k| {

@@ -9,7 +9,7 @@ use crate::tableau::Tableau;
 ///
 /// `None` if free oscillations err at first order, in phase or amplitude.
 ///
-/// Exact but for rounding: the motion eᵗ is put into the rows for u″ = u, and what is left over says which equation it
+/// Exact but for rounding: the motion eᵗ is put into the rows for u″ = u, and the remainder shows which equation it
 /// solves instead; no oscillation is sampled at small Ω.
 ///
 /// ```
@@ -17,17 +17,17 @@ use crate::tableau::Tableau;
 /// let p = |tableau| analysis::period_elongation(&tableau);
 /// assert!((p(CentralDifference.tableau()).unwrap() + 1.0 / 24.0).abs() < 1e-14);
 /// assert!((p(Newmark::trapezoidal().tableau()).unwrap() - 1.0 / 12.0).abs() < 1e-14);
-/// // The damping of first order that γ ≠ ½ brings.
+/// // γ ≠ ½ brings damping of first order.
 /// assert_eq!(p(Newmark::new(0.3025, 0.6)?.tableau()), None);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub fn period_elongation(tableau: &Tableau) -> Option<f64> {
-    // Response of u″ + k u to a unit force eᵗ at k = −1, where the equation itself responds without bound: 1/η is the k
-    // that is missing, e h² + …, so e^{t} is the scheme's motion for u″ = (1 + e h²) u.
+    // The response η of u″ + k u to the force eᵗ at k = −1, where the exact one is unbounded: 1/η is the missing part
+    // of k, e h² + …, so eᵗ is the scheme's motion for u″ = (1 + e h²) u.
     let [displacement, ..] = response(tableau, [0.0, -1.0], 1.0)?;
     let missing = Series::monomial(1.0, 0).over(&displacement);
     // In terms of the rate σ = √(1 + e h²) that the scheme was given: σ h (1 − ½ e (σ h)²) is the exponent of a step.
-    // The series has real coefficients in σ h; at σ h = iΩ the angle is Ω (1 + ½ e Ω²), which shortens the period for e
-    // > 0.
+    // The series has real coefficients in σ h; at σ h = iΩ the angle is Ω (1 + ½ e Ω²): a positive e shortens the
+    // period.
     missing.valuation().filter(|&power| power >= 2).map(|_| -0.5 * missing.coefficient(2))
 }

@@ -1,4 +1,4 @@
-//! Everything a paper's table would say of a scheme.
+//! The properties of a scheme that papers tabulate.
 
 use super::{
     Order, ZeroStability, critical_omega, order, overshoot_growth, period_and_damping, radius_at_infinity,
@@ -40,7 +40,7 @@ pub struct Report {
 ///
 /// # Errors
 ///
-/// [`Error::Tableau`](crate::Error::Tableau) if no step could be made of it.
+/// [`Error::Tableau`](crate::Error::Tableau) if it defines no step.
 ///
 /// ```
 /// use contact_dynamics::analysis::report;

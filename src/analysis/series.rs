@@ -1,4 +1,5 @@
-//! Truncated Laurent series in the step size, with running error bounds: what cancels is recognized as zero.
+//! Truncated Laurent series in the step size, with running error bounds, by which terms that cancel are recognized as
+//! zero.
 
 /// `h^valuation (c₀ + c₁ h + c₂ h² + …)`; terms beyond the stored ones are unknown, an empty series is zero.
 #[derive(Clone, Debug, PartialEq)]

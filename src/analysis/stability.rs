@@ -61,8 +61,7 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
 /// assert_eq!(analysis::critical_omega(&Composite.tableau(), 0.0), None);
 /// ```
 pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
-    // Roots that are nearly double at 1 are known to eps/Ω, matrices of size Ω to eps Ω.
-    // (What is not a number is not stable.)
+    // Roots that are nearly double at 1 are known to eps/Ω, matrices of size Ω to eps Ω. NaN counts as unstable.
     let is_stable = |omega: f64| spectral_radius(tableau, omega, xi) <= 1.0 + 1e-11 + 1e-13 * omega;
     let at = |i: i32| 10_f64.powf(f64::from(i) / 80.0);
     let first = (-160..=320).find(|&i| !is_stable(at(i)))?;

@@ -18,11 +18,11 @@ use crate::tableau::{A, ContactLevel, Rows, Stage, Tableau, U, V, Z};
 ///   smallest element.
 /// * Exact in one dimension at Courant number 1 with lumped linear elements of equal size, also through impact and
 ///   release.
-/// * Conserves linear momentum in the form v + ½ h a, and an energy that is that of the system up to Ω²/4 of it.
+/// * Conserves linear momentum in the form v + ½ h a, and an energy that differs from that of the system by up to Ω²/4
+///   of it.
 /// * Contact is imposed on the displacements of the next step, which λ' decides: gaps are exact, u of a state never
 ///   penetrates. The velocity of a state is the mean of those before and after it, and no correction applies. (A
-///   multiplier found for one step size closes no gap after another: steps that change right after an impact leave a
-///   small one.)
+///   multiplier is found for one step size: if the step changes right after an impact, a small gap is left.)
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, TimeIntegrator, analysis};

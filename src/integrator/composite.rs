@@ -17,7 +17,7 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// * Period elongation 5/24 Ω², numerical damping ≈ ¼ Ω⁵ for small Ω.
 /// * Conserves linear momentum; no energy or angular-momentum theorem.
 /// * Contact is imposed on the displacements at the end of the step.
-/// * The past it carries survives an impact: without the history projection of
+/// * After an impact the rows still read values from before it: without the history projection of
 ///   [`PersistencyCorrection`](crate::PersistencyCorrection) contact may be lost for several steps.
 ///
 /// At equal number of solves the two-stage scheme of Bathe is more accurate on smooth motion.

@@ -12,20 +12,19 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// ```
 ///
 /// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none,
-/// the mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; the latter
-/// reads
-/// [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and takes
-/// three forces an iteration, and two tangents.
+/// the mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; this mean
+/// reads [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and
+/// takes three forces and two tangents an iteration.
 ///
 /// * Conserves the energy of conservative systems without contact, whatever the step, to the tolerance of
-///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` does (the
-///   mean stress on the mean configuration does, Simpson's mean errs by O(h²)).
+///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` conserves it
+///   (the mean stress on the mean configuration does, Simpson's mean errs by O(h²)).
 /// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a lives at the
 ///   middle of the step and is extrapolated for a [`State`](crate::State).
 /// * The exact tangent of a path is not symmetric and takes [`Lu`](crate::Lu); a symmetric one close to it takes an
-///   iteration more. Of the mean of three forces it is that of Simpson's rule.
+///   iteration more. For the mean of three forces the tangent is that of Simpson's rule.
 /// * Contact is imposed on the displacements at the end of the step. Impacts cost the energy of the contact nodes if
-///   they are corrected; raw, energy may rise or fall there.
+///   they are corrected; without a correction energy may rise or fall there.
 ///
 /// ```
 /// use contact_dynamics::{EnergyMomentum, Newmark, TimeIntegrator, analysis};

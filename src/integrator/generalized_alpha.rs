@@ -14,20 +14,24 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 ///
 /// | constructor | α_m | α_f | paper |
 /// | --- | --- | --- | --- |
-/// | [`chung_hulbert`](Self::chung_hulbert) | (2ρ∞ − 1)/(ρ∞ + 1) | ρ∞/(ρ∞ + 1) | Chung, Hulbert, J. Appl. Mech. 60, 1993 |
-/// | [`hht`](Self::hht) | 0 | (1 − ρ∞)/(1 + ρ∞) | Hilber, Hughes, Taylor, Earthq. Eng. Struct. Dyn. 5, 1977 |
-/// | [`wbz`](Self::wbz) | (ρ∞ − 1)/(ρ∞ + 1) | 0 | Wood, Bossak, Zienkiewicz, Int. J. Numer. Meth. Eng. 15, 1980 |
+/// | [`chung_hulbert`] | (2ρ∞ − 1)/(ρ∞ + 1) | ρ∞/(ρ∞ + 1) | Chung, Hulbert, J. Appl. Mech. 60, 1993 |
+/// | [`hht`] | 0 | (1 − ρ∞)/(1 + ρ∞) | Hilber, Hughes, Taylor, Earthq. Eng. Struct. Dyn. 5, 1977 |
+/// | [`wbz`] | (ρ∞ − 1)/(ρ∞ + 1) | 0 | Wood, Bossak, Zienkiewicz, Int. J. Numer. Meth. Eng. 15, 1980 |
+///
+/// [`chung_hulbert`]: Self::chung_hulbert
+/// [`hht`]: Self::hht
+/// [`wbz`]: Self::wbz
 ///
 /// All three take γ = ½ − α_m + α_f and β = ¼ (1 − α_m + α_f)².
 ///
-/// * Order 2 if γ = ½ − α_m + α_f. The stored a lives at t + (α_m − α_f) h and is only of order 1 there where the state
-///   is; the acceleration of a [`State`](crate::State) is extrapolated to its time and of order 2.
+/// * Order 2 if γ = ½ − α_m + α_f. The stored a lives at t + (α_m − α_f) h and is only of order 1 at the time of the
+///   state; the acceleration of a [`State`](crate::State) is extrapolated to its time and of order 2.
 /// * Unconditionally stable for α_m ≤ α_f ≤ ½ and β ≥ ¼ + ½ (α_f − α_m). Chung–Hulbert has the least low-frequency
 ///   damping for a given ρ∞; its spectrum with ρ∞ = 0 is Houbolt's.
 /// * Internal forces are those of the mean displacement, f_int(ū), not the mean of two forces.
 /// * Conserves linear momentum in the form v + (1 − γ − α_m) h a.
-/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + (1 − α_f) h. The
-///   scheme carries a: after an impact it needs both parts of the correction.
+/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + (1 − α_f) h. The rows
+///   read a of the past: after an impact they need both parts of the correction.
 ///
 /// ```
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};
@@ -38,7 +42,7 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeneralizedAlpha {
     kind: &'static str,
-    /// ρ∞ where the member was chosen by it.
+    /// ρ∞, if the member was chosen by it.
     rho: Option<f64>,
     alpha_m: f64,
     alpha_f: f64,

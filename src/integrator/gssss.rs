@@ -19,8 +19,8 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// * Unconditionally stable for ρ₃ ≤ ρ₁ ≤ ρ₂ ≤ 1; ρ∞ = ρ₂. U0(1, 1, 0) has the trapezoidal rule's spectrum, U0(ρ, ρ, ρ)
 ///   is Chung–Hulbert's scheme.
 /// * Conserves linear momentum; U0(1, 1, ρ₃) keeps the energy of a linear oscillator bounded without damping it.
-/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + w h. The scheme
-///   carries a.
+/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + w h. The rows read a
+///   of the past.
 ///
 /// ```
 /// use contact_dynamics::{Gssss, TimeIntegrator, analysis};

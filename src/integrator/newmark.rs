@@ -18,7 +18,8 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// * The trapezoidal rule (¼, ½) conserves the energy of linear free motion; it has no numerical damping.
 /// * Conserves linear momentum in the form v + (1 − γ) h a.
 /// * Contact is imposed on the displacements at the end of the step.
-/// * Carries a: after an impact it needs the acceleration correction as much as the velocity correction.
+/// * The rows read a of the past: after an impact they need the acceleration correction as much as the velocity
+///   correction.
 ///
 /// ```
 /// use contact_dynamics::{Newmark, TimeIntegrator, analysis};

@@ -19,9 +19,9 @@ use crate::tableau::{A, ContactLevel, Row, Rows, Stage, Tableau, U, V, Z};
 /// * Conserves linear momentum.
 /// * Displacements are known before a stage's forces, so contact is imposed on those at the end of the next stage,
 ///   which the multiplier decides (forward increments, as in [`CentralDifference`](crate::CentralDifference)): no state
-///   penetrates, and no correction applies. Imposed on the velocities of either stage instead, the multipliers of the
-///   two stages fight: the force of two bars had ten times the error. A rigid mass leaves with up to 6 % of its
-///   approach speed.
+///   penetrates, and no correction applies. With contact imposed on the velocities of either stage instead, the
+///   multipliers of the two stages counteract each other: the force of two bars had ten times the error. A rigid mass
+///   leaves with up to 6 % of its approach speed.
 ///
 /// ```
 /// use contact_dynamics::{NohBathe, TimeIntegrator, analysis};

@@ -1,5 +1,5 @@
-//! Sweeps over a supernodal factor for several right-hand sides at once, by products of dense blocks; those for a single
-//! one are passed on to `sweep`.
+//! Sweeps over a supernodal factor for several right-hand sides at once, by products of dense blocks; a single one is
+//! passed on to `sweep`.
 
 use super::cholesky::{Columns, Supernodal, supernodes};
 use super::sweep;

@@ -1,14 +1,14 @@
 //! Recurrences of L D Lᵀ with bidiagonal L, down and up two chains at a time.
 //!
-//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains wait at the same time,
-//! and a product that is fused with its sum waits half as long, on machines that have it.
+//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains at a time share the
+//! wait, and fused multiply-add, where the machine has it, halves it.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
 
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-/// Of two chains: the entries of L below the diagonal (one for each unknown, the last one to what comes behind), 1/D,
-/// and the unknowns. All slices of a chain are of one length.
+/// Two chains: the entries of L below the diagonal (one for each unknown; the last one couples it to the unknown behind
+/// the chain), 1/D, and the unknowns. All slices of a chain have the same length.
 #[derive(Debug)]
 pub struct Chains<'a, T> {
     pub lower: [&'a [T]; 2],
@@ -32,7 +32,7 @@ pub(crate) fn backward<T: Scalar>(chains: Chains<'_, T>, behind: [T; 2]) {
     }
 }
 
-/// Whether the machine has fused products: in software they would take a hundred times as long.
+/// Whether the machine has fused multiply-add: in software it would take a hundred times as long.
 fn fuses() -> bool {
     cfg!(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64"))
         && !matches!(Arch::new(), Arch::Scalar)
@@ -89,7 +89,7 @@ fn up<T: Scalar>(
     behind: [T; 2],
     eliminate: impl Fn(T, T, T) -> T,
 ) {
-    // What the one has more than the other lies at its front.
+    // The longer chain begins with the unknowns that the other lacks.
     let common = x0.len().min(x1.len());
     let (front0, front1) = (x0.len() - common, x1.len() - common);
     let ((rest_x0, x0), (rest_x1, x1)) = (x0.split_at_mut(front0), x1.split_at_mut(front1));

@@ -94,12 +94,12 @@ pub(crate) fn factorize<T: Scalar>(
         let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
         return Err(original(index.saturating_sub(base)));
     }
-    // Pivots, for the caller to judge: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
+    // The caller checks the pivots: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
     // rounding.
     match symbolic.raw() {
         SymbolicCholeskyRaw::Simplicial(raw) => {
             for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
-                pivots[original(k)] = values[start].clone();
+                pivots[original(k)] = values[start];
                 // The sweeps multiply by 1/D.
                 values[start] = T::recip_impl(&values[start]);
             }

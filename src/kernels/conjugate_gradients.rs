@@ -13,7 +13,7 @@ pub struct Blocks<'a, T> {
 /// Preconditioners of conjugate gradients for a matrix with identities as diagonal blocks.
 #[derive(Clone, Copy, Debug)]
 pub enum Sweeps<'a, T> {
-    /// None but that scaling.
+    /// None beyond the scaling of the matrix.
     Nodes,
     /// (1 + L)(1 + Lᵀ).
     GaussSeidel,
@@ -53,17 +53,17 @@ pub enum Outcome {
         iterations: usize,
         residual: f64,
     },
-    /// pᵀAp over pᵀdiag(A)p of a direction, and the dof with the smallest share in the former.
+    /// `curvature` is pᵀAp over pᵀdiag(A)p of a direction p, `dof` the one with the smallest share of pᵀAp.
     Indefinite {
         curvature: f64,
         dof: usize,
     },
 }
 
-/// Sums side by side: one after the other would wait for each addition.
+/// Partial sums: in a single sum each addition would wait for the one before.
 const LANES: usize = 4;
 
-/// Σ x y in double precision: an f32 run keeps its digits, and its range, in products of long vectors.
+/// Σ x y in double precision: in an f32 run products of long vectors would otherwise lose digits or overflow.
 #[inline]
 fn dot<T: Scalar>(x: &[T], y: &[T]) -> f64 {
     let mut sums = [0.0; LANES];
@@ -93,7 +93,7 @@ fn store<T: Scalar, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
 }
 
 /// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the place of a pivot that is
-/// not larger than what rounding leaves of its diagonal entry.
+/// not larger than the rounding of its diagonal entry.
 #[inline]
 fn inverse_factor<T: Scalar, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B>, usize> {
     let mut l = [[T::zero(); B]; B];
@@ -315,7 +315,7 @@ pub(crate) fn factorize<T: Scalar, const B: usize>(
     true
 }
 
-/// What ends an iteration, looked at after each step of it.
+/// The criteria that end an iteration, tested after each step.
 struct Judge {
     tolerance: f64,
     /// The squared norm of the right-hand side.
@@ -343,7 +343,7 @@ impl Judge {
         self.iterations += 1;
         let step = alpha * before;
         self.length += step;
-        // The second: this step has changed nothing that the scalar can resolve, and no later one will.
+        // The second criterion: the scalar does not resolve the change of this step, nor that of any later one.
         if after <= self.tolerance.powi(2) * self.first || step <= self.rounding * self.length {
             return Some(Outcome::Converged { iterations: self.iterations });
         }
@@ -352,11 +352,11 @@ impl Judge {
     }
 }
 
-/// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding less
-/// than two of its digits mean anything: the matrix is singular for all the scalar can tell.
+/// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding fewer
+/// than two of its digits are significant: the matrix is singular to working precision.
 const NEGLIGIBLE: f64 = 64.0;
 
-/// Solves A x = b in place. Zero is the start.
+/// Solves A x = b in place, starting from zero.
 #[inline]
 pub(crate) fn solve<T: Scalar, const B: usize>(
     iteration: &Iteration<'_, T>,
@@ -378,7 +378,7 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
         b.fill(T::zero());
         return Outcome::Converged { iterations: 0 };
     }
-    // A power of two, which rounds nothing: squares of small forces stay in range.
+    // Scaled by a power of two, which rounds nothing: squares of small forces stay in range.
     #[allow(clippy::cast_possible_truncation)]
     let exponent = (largest.value().log2().floor() as i32).max(-1000);
     let (down, up) = (T::of(2.0_f64.powi(-exponent)), T::of(2.0_f64.powi(exponent)));
@@ -416,7 +416,7 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
 }
 
 /// With the preconditioner (1 + L)(1 + Lᵀ), swept so that a step costs no more than a product (Eisenstat, 1981): in the
-/// variables (1 + Lᵀ) x the matrix is (1 + L)⁻¹ A (1 + Lᵀ)⁻¹ p = t + (1 + L)⁻¹ (p − t) with t = (1 + Lᵀ)⁻¹ p.
+/// variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
 #[inline]
 fn gauss_seidel<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,

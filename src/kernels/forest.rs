@@ -1,16 +1,17 @@
-//! The elimination forest of a supernodal factor: who hands what to whom in a sweep, and what may go side by side.
+//! The elimination forest of a supernodal factor: between which supernodes values pass in a sweep, and which branches
+//! may be swept in parallel.
 //!
-//! A sweep with a work vector for each supernode (its own rows, then those below it) needs nothing but that of the
-//! parent: forward a supernode adds what its children have for it, backward it hands its children what they need (Duff
-//! and Reid, ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may be swept at the same time.
-//! What is added to what, and in which order, is a matter of the factor alone: results are the same bit for bit on any
-//! number of threads.
+//! Each supernode has a work vector: its own rows, then those below it. Values pass only between a supernode and its
+//! parent: forward a supernode adds the contributions of its children, backward it gives its children the solution on
+//! the rows below them (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may
+//! therefore be swept at the same time. All sums and their order depend on the factor alone: results are the same bit
+//! for bit on any number of threads.
 
 use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
-/// The supernodes of the interior, and how they hang together.
+/// The supernodes of the interior, and the trees that they form.
 #[derive(Debug)]
 pub struct Forest {
     /// The first column that is not in the forest.
@@ -20,7 +21,7 @@ pub struct Forest {
     /// The children of each supernode, ascending, one list after the other.
     children: Vec<usize>,
     first_child: Vec<usize>,
-    /// For each row below a supernode its place in the work vector of the parent; of a root's rows, behind `end`.
+    /// For each row below a supernode, its place in the work vector of the parent; for a root, its distance from `end`.
     places: Vec<usize>,
     /// The first column of each supernode; one more entry for `end`.
     begins: Vec<usize>,
@@ -29,14 +30,14 @@ pub struct Forest {
     pub(crate) plan: Plan,
 }
 
-/// What is swept after what: forward from the branches to the stem, backward the other way round.
+/// The order of a sweep: forward from the branches to the stem, backward from the stem to the branches.
 #[derive(Debug)]
 pub(crate) enum Plan {
     /// Supernodes one after the other.
     Serial(Range<usize>),
     /// A branch (all supernodes before those of the stem), then the stem.
     Stem(Box<Plan>, Range<usize>),
-    /// Two branches that have nothing to do with each other; the second one begins with this supernode.
+    /// Two branches without a common supernode; the second one begins with this supernode.
     Fork(Box<[Plan; 2]>, usize),
 }
 
@@ -108,7 +109,7 @@ impl Forest {
         self.begins.len() - 1
     }
 
-    /// Where the rows below a supernode are among the work vectors of all.
+    /// Where the rows below a supernode are in the array of all work vectors.
     #[inline]
     pub(crate) fn update(&self, s: usize) -> Range<usize> {
         self.offsets[s] + self.size(s)..self.offsets[s + 1]
@@ -131,7 +132,7 @@ impl Forest {
         &self.children[self.first_child[s]..self.first_child[s + 1]]
     }
 
-    /// Where the rows below a supernode are in the work vector of its parent; those of a root, behind `end`.
+    /// Where the rows below a supernode are in the work vector of its parent; for a root, their distances from `end`.
     #[inline]
     pub(crate) fn places(&self, s: usize) -> &[usize] {
         &self.places[self.below(s)]
@@ -148,7 +149,7 @@ impl Forest {
     }
 }
 
-/// The children of each parent, and where the list of each begins; a parent that is no index has no list.
+/// The children of each parent, and where the list of each begins; a parent out of range has no list.
 fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let count = parents.len();
     let mut first = vec![0; count + 1];
@@ -170,9 +171,9 @@ fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
 /// Cuts a forest into branches.
 struct Planner<'f> {
     parents: &'f [usize],
-    /// Scalars of all supernodes before each one.
+    /// Scalars that a sweep reads of all supernodes before each one.
     read_before: Vec<usize>,
-    /// For each supernode the first of its branch, if the branch has all those in between; else nothing.
+    /// For each supernode the first one of its branch, if the branch is contiguous; else nothing.
     first: Vec<Option<usize>>,
 }
 
@@ -201,7 +202,7 @@ impl<'f> Planner<'f> {
         if self.reads(&range) < 2 * GRAIN {
             return Plan::Serial(range);
         }
-        // The stem: roots as long as there is one tree only, and trees that are not worth a thread.
+        // The stem: the root while only one tree is left, and trees that are not worth a thread.
         let mut end = range.end;
         while let Some(first) = end.checked_sub(1).filter(|last| *last >= range.start).and_then(|last| self.first[last])
         {
@@ -219,12 +220,12 @@ impl<'f> Planner<'f> {
         if end == range.end { plan } else { Plan::Stem(Box::new(plan), end..range.end) }
     }
 
-    /// The supernode at which a forest falls into two of about the same weight, both worth a thread.
+    /// The supernode that splits a forest into two of about the same weight, both worth a thread.
     fn cut(&self, range: &Range<usize>) -> Option<usize> {
         // From the last tree to the first one.
         let (mut cuts, mut end) = (Vec::new(), range.end);
         while end > range.start {
-            // A tree that is not in one piece ends the search: what is before it stays together with it.
+            // A tree that is not contiguous ends the search: it cannot be separated from those before it.
             let Some(first) = self.first[end - 1].filter(|first| *first >= range.start) else { break };
             cuts.push(first);
             end = first;
@@ -256,7 +257,7 @@ mod tests {
         (symbolic_cholesky(ordering, a.symbolic(), &last).unwrap(), n - last.len())
     }
 
-    /// The order of a plan on one thread, and the number of forks; checks that branches are strangers to each other.
+    /// The order of a plan on one thread, and the number of forks; checks that no branch has children in another.
     fn flatten(plan: &Plan, forest: &Forest, order: &mut Vec<usize>) -> usize {
         match plan {
             Plan::Serial(range) => {
@@ -274,8 +275,8 @@ mod tests {
                 assert_eq!(order.len(), *cut);
                 forks += flatten(&branches[1], forest, order);
                 for branch in [begin..*cut, *cut..order.len()] {
-                    let strangers = |s: usize| forest.children(s).iter().all(|child| branch.contains(child));
-                    assert!(branch.clone().all(strangers), "{branch:?}");
+                    let closed = |s: usize| forest.children(s).iter().all(|child| branch.contains(child));
+                    assert!(branch.clone().all(closed), "{branch:?}");
                     assert!(branch.map(|s| forest.reads(s)).sum::<usize>() >= GRAIN);
                 }
                 forks

@@ -1,11 +1,11 @@
 //! Sweeps over a supernodal factor for one right-hand side, at the speed of reading the factor once.
 //!
-//! Eight columns of a supernode go together: every entry of L is read once, every entry of the vector an eighth as
-//! often. The loops that do are plain ones in functions of their own, compiled for the vector units of the machine that
-//! they run on. (Inlined into more than that, they would not always be recognized as vector loops.)
+//! Eight columns of a supernode are processed together: every entry of L is read once, every entry of the vector an
+//! eighth as often. The inner loops are functions of their own, compiled for the vector units of the machine that they
+//! run on. (Inlined into larger functions, they are not always vectorized.)
 //!
-//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; what
-//! is eliminated behind it column by column.
+//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; the
+//! columns behind it are swept on one thread.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
 use super::cholesky::{Columns, Supernodal, supernodes};
@@ -14,7 +14,7 @@ use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
-/// Sums that are kept side by side in a dot product.
+/// Partial sums of a dot product.
 const LANES: usize = 8;
 
 /// A factor and its forest.
@@ -25,13 +25,14 @@ pub(crate) struct Interior<'a, T> {
 }
 
 /// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them
-/// what its parent has to add. `b` are the entries of the right-hand side, `order` where each column finds its own.
+/// its contribution to the parent. `b` is the right-hand side; column k reads its entry `order[k]`, or k without an
+/// order.
 pub(crate) fn forest_forward<T: Scalar>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
     forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
 }
 
-/// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry those
-/// of the roots know the solution on the rows below them.
+/// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry the
+/// work vectors of the roots hold the solution on the rows below them.
 pub(crate) fn forest_backward<T: Scalar>(interior: &Interior<'_, T>, w: &mut [T]) {
     backward_plan(&interior.forest.plan, interior, 0, w);
 }
@@ -125,12 +126,13 @@ struct Panel<'a, T> {
     /// First column, and number of columns.
     start: usize,
     size: usize,
-    /// Rows from the first column's on.
+    /// Rows from the diagonal entry of the first column down.
     rows: usize,
-    /// Entries of a column of the whole supernode, and the columns from the first one on, each from the first row on.
+    /// Entries of a column of the whole supernode.
     stride: usize,
+    /// The columns, `stride` apart, from the diagonal entry of the first one on.
     values: &'a [T],
-    /// The rows that do not follow the columns of the supernode.
+    /// The rows below the columns of the whole supernode.
     pattern: &'a [usize],
 }
 
@@ -154,7 +156,7 @@ impl<'a, T> Panel<'a, T> {
         &self.values[j * self.stride + from..j * self.stride + self.rows]
     }
 
-    /// How many rows follow the first one directly; the others are `pattern`.
+    /// How many of the rows are columns of the supernode; the others are `pattern`.
     #[inline]
     fn leading(&self) -> usize {
         self.rows - self.pattern.len()
@@ -185,7 +187,7 @@ impl<T: Scalar> Panel<'_, T> {
         (0..eights).rev().step_by(8).for_each(|last| self.substitute::<8>(arch, last - 7, w));
     }
 
-    /// The columns that go by eight end at the first of these, those that go by four at the second.
+    /// The ends of the columns that are processed by eights, and by fours.
     fn groups(&self) -> [usize; 2] {
         [self.size - self.size % 8, self.size - self.size % 4]
     }

@@ -1,7 +1,7 @@
 //! Passes over vectors.
 //!
-//! `combine` and `recover` are compiled for the vector units of the machine that they run on. Their results are the same
-//! bit for bit on any machine, because no product is fused with its sum.
+//! `combine` and `recover` are compiled for the vector units of the machine that they run on. Their results are the
+//! same bit for bit on any machine: no product is fused with its sum.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
 
 use crate::scalar::Scalar;
@@ -72,7 +72,7 @@ impl<T: Scalar> WithSimd for Recover<'_, T> {
     }
 }
 
-/// Numbers that are added up side by side: one sum after the other would wait for each addition.
+/// Partial sums: in a single sum each addition would wait for the one before.
 const LANES: usize = 8;
 
 /// Σ 0 x: zero if every x is finite, NaN otherwise. An early exit would not vectorize.
@@ -89,7 +89,7 @@ pub(crate) fn all_finite<T: Scalar>(x: &[T]) -> bool {
     sums.into_iter().sum::<T>() + rest == T::zero()
 }
 
-/// The same for vectors of one length, looked at together.
+/// The same for several vectors of one length, in one pass.
 #[inline(always)]
 fn all_finite_together<T: Scalar, const N: usize>(x: [&[T]; N]) -> bool {
     let n = x.first().map_or(0, |x| x.len());
@@ -165,9 +165,9 @@ fn combine_loop<T: Scalar>(terms: &[(T, &[T])], differences: &[(T, &[T])], y: &[
 
 #[inline(always)]
 fn recover_blocks<T: Scalar>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], accumulate: Accumulate) -> bool {
-    /// Entries a block: what it touches stays in the first-level cache until it has been looked at.
+    /// Entries in a block: they stay in the first-level cache until they have been checked.
     const BLOCK: usize = 512;
-    /// With or without u, and a replaced or added to.
+    /// `MOVES`: u is updated too. `ADDS`: a is added to, not replaced.
     #[inline(always)]
     fn pass<T: Scalar, const MOVES: bool, const ADDS: bool>(w: [T; 3], d: &[T], [u, v, a]: [&mut [T]; 3]) -> bool {
         let n = d.len();
@@ -179,7 +179,7 @@ fn recover_blocks<T: Scalar>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], ac
             v[i] += w[1] * d[i];
             a[i] = if ADDS { a[i] + w[2] * d[i] } else { w[2] * d[i] };
         }
-        // No d that is not finite leaves a finite.
+        // A d that is not finite makes a not finite either.
         match MOVES {
             true => all_finite_together([u, v, a]),
             false => all_finite_together([v, a]),

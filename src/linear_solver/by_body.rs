@@ -15,9 +15,9 @@ use std::ops::Range;
 /// Each is ordered, factorized and solved alone, with one solver for all or with a solver of its own
 /// ([`body`](Self::body)). Results are those of a single factorization up to rounding.
 ///
-/// Dofs that are coupled to no other (prescribed ones, point masses, a whole diagonal matrix) are gathered and divided
-/// through, whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs
-/// of contact is condensed by its own solver.
+/// Dofs that are coupled to no other (prescribed ones, point masses, a whole diagonal matrix) form one diagonal part,
+/// whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs of
+/// contact is condensed by its own solver.
 ///
 /// Symmetry and rounding are judged body by body, relative to the entries of the body: a soft body beside a stiff one
 /// is held to its own scale. Errors name dofs of the whole system.
@@ -27,7 +27,8 @@ use std::ops::Range;
 /// use contact_dynamics::{Automatic, ByBody, Cholesky, LinearSolver};
 ///
 /// // Two bodies of two dofs each, numbered alternately.
-/// let entries = [(0, 0, 2.0), (0, 2, -1.0), (2, 0, -1.0), (2, 2, 1.0), (1, 1, 4.0), (1, 3, -2.0), (3, 1, -2.0), (3, 3, 4.0)];
+/// let entries = [(0, 0, 2.0), (0, 2, -1.0), (2, 0, -1.0), (2, 2, 1.0),
+///     (1, 1, 4.0), (1, 3, -2.0), (3, 1, -2.0), (3, 3, 4.0)];
 /// let entries = entries.map(|(i, j, a)| Triplet::new(i, j, a));
 /// let a = SparseColMat::<usize, f64>::try_new_from_triplets(4, 4, &entries)?;
 /// let solver = ByBody::new(Automatic).body([1], Cholesky::default());
@@ -51,12 +52,12 @@ impl<T: Real> Default for ByBody<'_, T> {
 }
 
 impl<'a, T: Real> ByBody<'a, T> {
-    /// One solver for all bodies, but for those that are given their own.
+    /// One solver for all bodies, except those that are given their own.
     pub fn new(solver: impl LinearSolver<T> + 'a) -> Self {
         Self { others: Box::new(solver), chosen: Vec::new() }
     }
 
-    /// A solver for the bodies that have any of these dofs: one dof of a body, or the range of all its dofs, of which
+    /// A solver for each body that has any of these dofs: name one dof of it, or the range of all its dofs, of which
     /// some may be prescribed.
     ///
     /// The analysis refuses dofs that do not exist ([`Error::MissingDof`]) and bodies that are given two solvers
@@ -127,7 +128,7 @@ impl<T: Real> LinearSolver<T> for ByBody<'_, T> {
     }
 }
 
-/// The smallest dof of a tree; the way there becomes shorter.
+/// The smallest dof of a tree; shortens the path to it.
 fn root(above: &mut [usize], mut dof: usize) -> usize {
     while above[dof] != dof {
         above[dof] = above[above[dof]];
@@ -164,7 +165,7 @@ fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<usize>, Vec<V
 /// Ascending indices into a longer slice.
 #[derive(Debug)]
 enum Selection {
-    /// All of a range: the part of the slice is used where it is.
+    /// A whole range: that part of the slice is used in place.
     Range(Range<usize>),
     List(Vec<usize>),
 }
@@ -191,7 +192,7 @@ impl Selection {
         }
     }
 
-    /// The entries selected, copied to `scratch` if they are not side by side.
+    /// The entries selected, copied to `scratch` if they are not contiguous.
     fn read<'x, T: Real>(&self, x: &'x [T], scratch: &'x mut [T]) -> &'x [T] {
         match self {
             Self::Range(range) => &x[range.clone()],
@@ -225,13 +226,13 @@ struct Part<T: Real> {
     pattern: SymbolicSparseColMat<usize>,
     /// Where its entries are among those of the whole matrix.
     entries: Selection,
-    /// Its entries, if they are not side by side there.
+    /// Its entries, if they are not contiguous there.
     values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     /// Where its dofs of contact are on the interface of the system.
     interface: Selection,
-    /// A column of its dofs: where they are not side by side, and, without dofs of contact or beside other threads, its
-    /// solution.
+    /// A column of its dofs, if they are not contiguous; and its solution, if it has no dofs of contact or is solved
+    /// for on a thread of its own.
     column: Vec<T>,
     /// A column of its dofs of contact.
     on_interface: Vec<T>,
@@ -285,8 +286,8 @@ impl<T: Real> Part<T> {
         factor.solve(column).map_err(|error| in_system(error, |dof| dofs.at(dof)))
     }
 
-    /// Condenses, what contact touches; the solution on its part of the interface is in `on_interface`. What contact
-    /// does not touch is solved.
+    /// Condenses a part that contact acts on; the solution on its part of the interface is in `on_interface`. Other
+    /// parts are solved.
     fn condense(&mut self, rhs: &[T]) -> Result<()> {
         if !self.touches() {
             return self.solve(rhs);
@@ -312,7 +313,7 @@ impl<T: Real> Part<T> {
 /// The same error with dofs of the whole system.
 fn in_system(error: Error, whole: impl Fn(usize) -> usize) -> Error {
     match error {
-        // That the matrix of a part is diagonal is no concern of the host.
+        // The host need not know that the matrix of this part is diagonal.
         Error::Singular { dof, .. } => Error::Singular { matrix: "effective matrix", dof: whole(dof) },
         Error::Indefinite { curvature, dof } => Error::Indefinite { curvature, dof: whole(dof) },
         Error::Mass { dof, value } => Error::Mass { dof: whole(dof), value },
@@ -333,15 +334,15 @@ struct Factors<T: Real> {
     size: usize,
     height: usize,
     fingerprint: Fingerprint,
-    /// Columns of a part and of its interface: room for as many as were ever asked for, of the interface at least for
-    /// `COLUMNS`.
+    /// Columns of a part and of its interface: room for the most that were ever solved for, of the interface at least
+    /// for `COLUMNS`.
     columns: Vec<T>,
     on_interface: Vec<T>,
-    /// Whether threads are worth waking: single columns are then solved for part by part in memory of their own.
+    /// Whether threads are worthwhile: each part then solves for single columns in memory of its own.
     apart: bool,
 }
 
-/// Room for that many values; allocates if there was never need for so many.
+/// Room for that many values; allocates if there is less.
 fn room<T: Real>(scratch: &mut Vec<T>, size: usize) -> &mut [T] {
     if scratch.len() < size {
         scratch.resize(size, T::zero());
@@ -395,7 +396,7 @@ fn solve_apart<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     Ok(())
 }
 
-/// As `solve_apart`; dofs that are side by side are solved for in place.
+/// As `solve_apart`; contiguous dofs are solved for in place.
 fn solve_in_turn<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     for part in parts {
         match &part.dofs {
@@ -457,7 +458,7 @@ impl<T: Real> Condensation<T> for Factors<T> {
             for (forces, column) in forces.chunks_exact(*height).zip(columns.chunks_exact_mut(own)) {
                 part.interface.gather(forces, column);
             }
-            // A row of contact acts on two bodies, however many there are.
+            // A contact row acts on two bodies; all others have no force and are skipped.
             if columns.iter().all(|force| *force == T::zero()) {
                 continue;
             }

@@ -22,8 +22,8 @@ use std::ops::Range;
 /// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
 /// see `docs/design.md`.
 ///
-/// With the feature `rayon` large factors are computed and swept by the threads of the pool in which that is called.
-/// Results are the same bit for bit by any number of them.
+/// With the feature `rayon` large factors are computed and swept by the threads of the pool of the caller. Results are
+/// the same bit for bit with any number of threads.
 ///
 /// [`analyze`](LinearSolver::analyze) refuses, besides what the trait says, an order that does not fit the pattern:
 /// [`Error::Dimension`], [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
@@ -82,7 +82,7 @@ struct Factor<T: Real> {
     kind: Kind,
     values: Vec<T>,
     memory: MemBuffer,
-    /// What `memory` is made for.
+    /// The parallelism that `memory` has room for.
     par: Par,
     /// Right-hand sides that `memory` has room for.
     columns: usize,
@@ -91,11 +91,11 @@ struct Factor<T: Real> {
     /// The interior of a supernodal factor, and the work vectors of its supernodes.
     forest: Option<Forest>,
     work: Vec<T>,
-    /// One right-hand side in the order of elimination; what belongs to the forest is in `work`.
+    /// One right-hand side in the order of elimination; its entries in the forest are in `work`.
     sweep: Vec<T>,
     /// For each dof of the interface, its place among those eliminated last.
     interface: Vec<usize>,
-    /// Columns on the interface in the order of elimination; room for `COLUMNS`, or as many as were ever asked for.
+    /// Columns on the interface in the order of elimination; room for `COLUMNS`, or the most that were ever solved for.
     trailing: Vec<T>,
     /// Room for the rows below any supernode, for as many columns.
     below: Vec<T>,
@@ -103,8 +103,7 @@ struct Factor<T: Real> {
     cursor: Vec<usize>,
 }
 
-/// A pivot of a matrix with `n` dofs that keeps less than this share of its diagonal entry is what rounding leaves of
-/// zero.
+/// In a matrix with `n` dofs a pivot below this share of its diagonal entry is zero up to rounding.
 pub(super) fn negligible<T: Real>(n: usize) -> T {
     T::of(16.0 * (n as f64).sqrt()) * T::epsilon()
 }
@@ -208,7 +207,7 @@ impl<T: Real> Factor<T> {
         sweep(Sweep::Forward, (symbolic, values), behind..end, x, behind, below);
     }
 
-    /// Sweeps backward over the columns before `end`; those behind are solved for.
+    /// Sweeps backward over the columns before `end`; the columns behind are already solved for.
     fn backward(&mut self, end: usize) {
         let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
         let behind = forest.as_ref().map_or(0, |forest| forest.end);
@@ -250,7 +249,7 @@ enum Sweep {
     Backward,
 }
 
-/// Sweeps over `columns` for right-hand sides in the order of elimination; of each `skipped` entries are left out.
+/// Sweeps over `columns` for right-hand sides in the order of elimination, each without its first `skipped` entries.
 fn sweep<T: Real>(
     direction: Sweep,
     (symbolic, factor): (&SymbolicCholesky<usize>, &[T]),

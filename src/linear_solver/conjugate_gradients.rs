@@ -35,17 +35,16 @@ pub enum Preconditioner {
 /// Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky). Memory
 /// is that of half the matrix, where factors of solids hold ten to a hundred times as much.
 ///
-/// Every solve starts from zero and remembers nothing of earlier ones. Steps solve for the increment from the predicted
-/// motion, so that zero is the prediction: the start is as warm as a scheme can make it, and a run that is resumed from
-/// a clone goes on bit for bit.
+/// Every solve starts from zero and uses nothing of earlier ones. Steps solve for the increment from the predicted
+/// motion, so that zero is the prediction itself, and a run that is resumed from a clone goes on bit for bit.
 ///
 /// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), over that of the right-hand side, which
 /// does not depend on the units of the dofs: nearly the error in the energy norm of A. An iteration ends at the
-/// [`tolerance`](Self::tolerance), or where a step changes nothing more that the scalar resolves (as it always does in
+/// [`tolerance`](Self::tolerance), or where steps become too small for the scalar to resolve (as they always do in
 /// `f32` with the default tolerance).
 ///
 /// Offers no [`condensation`](Factorization::condensation): contact takes a full solve for each row that presses (kept
-/// as long as rows and matrix are) and one more a step. For hundreds of contacts that move, take a factorization.
+/// while rows and matrix do not change) and one more a step. For hundreds of contacts that move, take a factorization.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -70,10 +69,10 @@ pub enum Preconditioner {
 ///
 /// # Errors
 ///
-/// A factorization refuses what [`Cholesky`](super::Cholesky) refuses of entries and symmetry, and diagonal blocks
-/// that are not positive definite: [`Error::Singular`]. A solve fails with [`Error::LinearNotConverged`], and with
-/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is found out
-/// only if a right-hand side leads there. [`Error::Dimension`] for right-hand sides of another size.
+/// A factorization refuses what [`Cholesky`](super::Cholesky) refuses of entries and symmetry, and diagonal blocks that
+/// are not positive definite: [`Error::Singular`]. A solve fails with [`Error::LinearNotConverged`], and with
+/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is detected only
+/// by some right-hand sides. [`Error::Dimension`] for right-hand sides of another size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConjugateGradients {
     tolerance: f64,
@@ -92,10 +91,10 @@ impl ConjugateGradients {
     /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by
     /// default.
     ///
-    /// The default leaves energy, momentum and displacements of a run with impacts to about a fifth of itself of those
-    /// by
-    /// [`Cholesky`](super::Cholesky) (`cargo bench --bench iterative`): below the error of any step in practice, for an
-    /// iteration more a digit. Errors do not grow as steps become smaller: each solve is for the increment of its step.
+    /// With the default, energy, momentum and displacements of a run with impacts differ from those by
+    /// [`Cholesky`](super::Cholesky) by about a fifth of the tolerance (`cargo bench --bench iterative`): below the
+    /// error of any step in practice. Each further digit takes about one more iteration. Errors do not grow as steps
+    /// become smaller: each solve is for the increment of its step.
     ///
     /// # Errors
     ///
@@ -198,7 +197,8 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
         let dofs = check_analysis(pattern, last)?;
-        // The size that needs the least memory: zeros are stored in blocks, an index is half a number.
+        // The size that needs the least memory: larger blocks store zeros, smaller ones more indices of half a number
+        // each.
         let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
         for size in [3, 2, 1].into_iter().filter(|size| dofs.is_multiple_of(*size)) {
             let (pointers, columns) = blocks(pattern, size)?;
@@ -275,8 +275,8 @@ impl<T: Real> Matrix<T> {
     fn incomplete(&mut self) -> Result<()> {
         let Self { size, pointers, columns, values, factor, inverses, .. } = self;
         let lower = Blocks { pointers, columns, values };
-        // Doubled from a thousandth of the diagonal: with the shift the factor of any matrix with a unit diagonal
-        // exists in the end.
+        // The shift is doubled from a thousandth of the diagonal: for any matrix with a unit diagonal the factor exists
+        // once it is large enough.
         let shifts = std::iter::successors(Some(1e-3), |shift| Some(2.0 * shift)).take_while(|shift| *shift < 1e6);
         for shift in std::iter::once(0.0).chain(shifts) {
             if T::incomplete_cholesky(*size, &lower, T::of(shift), factor, inverses) {

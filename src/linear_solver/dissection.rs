@@ -64,7 +64,7 @@ fn dissect(graph: &Graph, mut bisect: impl FnMut(&Graph, &[usize]) -> Separator)
             let separator = bisect(&part, &names);
             let [one, other, _] = separator.weights;
             if one.min(other) * 8 < one + other {
-                // Hardly a bisection: nothing to be gained from separators.
+                // So unequal that separators gain nothing.
                 put(&minimum_degree(part.pattern())?);
                 continue;
             }
@@ -72,7 +72,7 @@ fn dissect(graph: &Graph, mut bisect: impl FnMut(&Graph, &[usize]) -> Separator)
             put(&all(BETWEEN));
             pieces = vec![all(0), all(1)];
         } else {
-            // Crumbs are ordered together.
+            // Small pieces are ordered together.
             let (small, large): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|piece| piece.len() <= LEAF);
             let crumbs = small.concat();
             let order = minimum_degree(part.part(&crumbs, &mut local).pattern())?;
@@ -90,7 +90,8 @@ fn dissect(graph: &Graph, mut bisect: impl FnMut(&Graph, &[usize]) -> Separator)
     Ok(order)
 }
 
-/// The vertices of a graph, and those with so many neighbors that every separator contains them: they go last.
+/// The vertices of a graph, and those with so many neighbors that every separator would contain them: they are
+/// eliminated last.
 fn without_dense(graph: &Graph) -> (Vec<usize>, Vec<usize>) {
     let n = graph.size();
     let many = 10.0 * (n as f64).sqrt().max(1.6);

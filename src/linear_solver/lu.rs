@@ -19,8 +19,9 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// units of translations and rotations, or on a stiff body beside a soft one.
 ///
 /// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16
-/// ε) (Hager's estimate of the 1-norm). A generic right-hand side shows it, so it takes one solve a factorization, and
-/// three more only where that one grows. The dof named is the one that moves most in the null vector.
+/// ε) (Hager's estimate of the 1-norm). The solution for a generic right-hand side reveals it: one solve a
+/// factorization, and two more only where that solution is large. The dof named is the one that moves most in the null
+/// vector.
 ///
 /// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
 /// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact takes a full
@@ -28,8 +29,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// holds for every choice of pivots; the factor may hold much less. Factorizing again does not allocate for long thin
 /// structures, where faer works column by column; for plates and solids it works in blocks and allocates some for each.
 ///
-/// An **indefinite** matrix is factorized without complaint: where a step is too long for a negative stiffness,
-/// Newton's method is not told so, as by Cholesky.
+/// An **indefinite** matrix is factorized without an error. [`Cholesky`](super::Cholesky) refuses it, from which
+/// Newton's method learns that a step is too long for a negative stiffness; with this solver it does not.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -137,7 +138,7 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
     let tree = qr::col_etree(pattern, order, &mut parents, stack);
     qr::postorder(&mut post, tree, stack);
     qr::column_counts_ata(&mut counts, &mut first, transposed.as_ref(), order, tree, &post, stack);
-    // Row i joins at its first column, and goes on to the parent of each column but for the pivot row left there.
+    // Row i joins at its first column; from each column all rows but one, the pivot row, pass on to the parent.
     let mut heights = vec![0_usize; n];
     for &column in first.iter().filter(|&&column| column < n) {
         heights[column] += 1;
@@ -150,17 +151,17 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
     Ok(heights.iter().sum::<usize>() + counts.iter().sum::<usize>())
 }
 
-/// Passes over the matrix to scale it, at most; each halves the logarithms of what is out of scale.
+/// The most passes that scale the matrix; each halves the logarithms of rows and columns out of scale.
 const PASSES: usize = 6;
 
-/// The power of two next to 1/√x for a positive number; one for those within a factor of four of one.
+/// The power of two next to 1/√x for a positive x; one for x within a factor of four of one.
 fn reciprocal_root<T: Real>(x: T) -> T {
     let (mantissa, exponent, _) = x.integer_decode();
     let exponent = i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed();
     T::of(2.0).powi(-(exponent / 2))
 }
 
-/// A number between −1 and 1 that looks as if drawn at random; never near zero.
+/// A pseudo-random number between −1 and 1, at least ½ in size.
 fn scatter<T: Real>(index: usize) -> T {
     let mixed = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -268,14 +269,14 @@ impl<T: Real> Factor<T> {
         T::lu_solve((symbolic, numeric), side, probe, 1, memory);
     }
 
-    /// Whether R A C has a condition number that leaves digits; `Err` holds the dof that moves most in its null vector,
-    /// and whether that is known.
+    /// Whether the condition number of R A C leaves significant digits; `Err` holds the dof that moves most in its null
+    /// vector, and whether that is known.
     fn judge(&mut self) -> std::result::Result<(), (usize, bool)> {
         let norm = (0..self.rows.len())
             .map(|dof| sum_of_sizes(&self.scaled[self.pattern.as_ref().col_range(dof)]))
             .fold(T::zero(), T::max);
         let verdict = |probe: &[T]| (largest(probe), T::all_finite(probe));
-        // A generic right-hand side: were the matrix singular, its null vector would outgrow all else.
+        // A generic right-hand side: for a singular matrix the null vector dominates the solution.
         self.probe.iter_mut().enumerate().for_each(|(i, x)| *x = scatter(i));
         let size = sum_of_sizes(&self.probe);
         self.solve_probe(Side::Given);
@@ -300,7 +301,7 @@ impl<T: Real> Factor<T> {
         }
     }
 
-    /// The dof to name where elimination has met an exact zero: that of the null vector of a matrix off by rounding.
+    /// The dof to name after an exactly zero pivot: that of the null vector of the matrix perturbed by rounding.
     fn name_singular(&mut self, found: usize) -> usize {
         for (at, value) in self.scaled.iter_mut().enumerate() {
             *value += *value * scatter::<T>(at) * T::of(8.0) * T::epsilon();

@@ -43,8 +43,8 @@ use faer::sparse::linalg::cholesky::{
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Ordering {
-    /// Minimum degree for chains, frames and plates; for solids what has less fill, minimum degree or nested
-    /// dissection. Never more fill than with [`MinimumDegree`](Self::MinimumDegree).
+    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has less
+    /// fill. Never more fill than with [`MinimumDegree`](Self::MinimumDegree).
     #[default]
     Automatic,
     /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and
@@ -126,8 +126,8 @@ fn check_order(order: &[usize], n: usize) -> Result<()> {
     })
 }
 
-/// With an order of the dofs that are not in `last`. (Those have a dense triangle of their own: any order of them will
-/// do.) A pattern that is not symmetric has none, and will be refused when it is factorized.
+/// With `interior`, an order of the dofs that are not in `last`. (The dofs of `last` fill a dense triangle in any
+/// order.) A pattern that is not symmetric has no such order, and is refused when it is factorized.
 fn dissected(
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
@@ -142,14 +142,15 @@ fn dissected(
     }
 }
 
-/// Of several orders in the manner of minimum degree the one with the least fill.
+/// Minimum degree with `last` behind, or, for structures as thin as a chain, the order toward the contact if it has
+/// less fill.
 fn by_degree(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<SymbolicCholesky<usize>> {
     if last.is_empty() {
         return factorize(pattern, SymmetricOrdering::Amd);
     }
     let degree = minimum_degree(pattern)?;
     let best = with_order(pattern, &moved_last(&degree, last))?;
-    // Structures as thin as a chain are eliminated toward the contact; a plate or a solid is not worth the try.
+    // Only structures as thin as a chain gain by elimination toward the contact.
     if !simplicial(&best) {
         return Ok(best);
     }

@@ -1,4 +1,4 @@
-//! Chains: L D Lᵀ of matrices whose dofs hang together like beads on strings.
+//! L D Lᵀ of matrices whose dofs form chains, here called strings.
 
 use super::cholesky::negligible;
 use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
@@ -13,9 +13,9 @@ use std::ops::Range;
 /// bars, and trains of masses and springs, in any numbering, any number of them. Contact may act on one end of a
 /// string.
 ///
-/// Two scalars a dof, no indices, and two strings at a time: faster than [`Cholesky`](super::Cholesky), whose errors it
-/// shares. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) takes it where it
-/// fits.
+/// Two scalars a dof, no indices, and two strings at a time: faster than [`Cholesky`](super::Cholesky), with the same
+/// errors. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) chooses it where
+/// the structure fits.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -53,7 +53,7 @@ impl<T: Real> LinearSolver<T> for Tridiagonal {
     }
 }
 
-/// The factorization, where the structure is one of strings.
+/// The factorization, if the structure is one of strings.
 pub(super) fn try_analyze<T: Real>(
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
@@ -110,14 +110,14 @@ fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Optio
         }
         begins.push([begin, begin + interior]);
     }
-    // What is left are rings.
+    // Dofs that are not in a string form rings.
     (order.len() == n).then_some(Strings { order, begins })
 }
 
 /// How the unknowns along the strings are numbered in the matrix.
 #[derive(Debug)]
 enum Numbering {
-    /// So many dofs side by side, from the first one upward, or downward.
+    /// Runs of consecutive dofs: where each begins along the strings, its dofs, and their direction.
     Runs(Vec<(usize, Range<usize>, Direction)>),
     List(Vec<usize>),
 }
@@ -128,7 +128,7 @@ enum Direction {
     Down,
 }
 
-/// Dofs a run has on average, from which on runs are worth it.
+/// Average number of dofs in a run from which runs are faster than a list.
 const RUN: usize = 8;
 
 impl Numbering {
@@ -261,8 +261,8 @@ fn two<T>(x: &mut [T], [first, second]: [Range<usize>; 2]) -> [&mut [T]; 2] {
 }
 
 impl<T: Real> Factor<T> {
-    /// Calls with two strings at a time (the second one of the last pair may be empty): all of them, and what is before
-    /// contact.
+    /// Calls with two strings at a time (the second one of the last pair may be empty): their whole ranges, and those
+    /// before the dofs of contact.
     fn pairs(begins: &[[usize; 2]], mut call: impl FnMut([Range<usize>; 2], [Range<usize>; 2])) {
         let count = begins.len() - 1;
         for first in (0..count).step_by(2) {
@@ -280,7 +280,7 @@ impl<T: Real> Factor<T> {
         });
     }
 
-    /// Up the strings from what is known behind `part` of them.
+    /// Backward over `part` of each string, from the solution behind it.
     fn backward(&mut self, part: Part) {
         let Self { begins, lower, inverse, x, .. } = self;
         Self::pairs(begins, |whole, interior| {
@@ -297,7 +297,7 @@ impl<T: Real> Factor<T> {
         });
     }
 
-    /// Solves at the ends of the strings, of `on_ends` that which the interior has left.
+    /// Solves in place for `on_ends`, the dofs of contact at the ends of the strings, with the interior eliminated.
     fn solve_ends(&mut self, direction: Ends) {
         let Self { begins, lower, inverse, ends, on_ends, .. } = self;
         for (ends, begins) in ends.windows(2).zip(begins.windows(2)).filter(|(ends, _)| ends[0] < ends[1]) {
@@ -352,7 +352,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
                     entry - lower[place] * coupling
                 }
             };
-            // (No pivot that is NaN is sound.)
+            // (False for NaN.)
             let sound = pivot > negligible * entry;
             if !sound && failed.is_none() {
                 failed = Some(dof);

@@ -1,4 +1,4 @@
-//! What masses without mass on some dofs are made of: lists of dofs, and matrices from lists of entries.
+//! Mass matrices assembled from lists of entries, and checks of lists of dofs.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -22,7 +22,7 @@ pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<V
     Ok(flags)
 }
 
-/// The square matrix of these entries (row, column, value), those in the same place added in their order.
+/// The square matrix of these entries (row, column, value), those in the same place summed in their order.
 pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
     entries.sort_by_key(|&(row, column, _)| (column, row));
     let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());

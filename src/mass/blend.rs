@@ -1,4 +1,4 @@
-//! Mass matrices between lumped and consistent, whose dispersion makes up for that of the scheme.
+//! Mass matrices between lumped and consistent, whose dispersion can cancel that of the scheme.
 
 use super::{InverseMass, Mass};
 use crate::analysis::period_elongation;
@@ -20,8 +20,7 @@ use faer::sparse::{SparseColMat, SparseColMatRef};
 ///
 /// [`Error::Parameter`] for a weight that is not finite; [`Error::Dimension`], [`Error::MatrixNotFinite`],
 /// [`Error::Asymmetric`] for the matrix; [`Error::Dimension`], [`Error::Mass`] for the lumped masses, which must be
-/// positive;
-/// [`Error::Singular`] if the weight is outside [0, 1] and the blend is not positive definite.
+/// positive; [`Error::Singular`] if the weight is outside [0, 1] and the blend is not positive definite.
 ///
 /// ```
 /// use contact_dynamics::{Error, faer::sparse::{SparseColMat, Triplet}, mass};
@@ -72,8 +71,8 @@ pub fn blend<T: Real>(
 ///
 /// [`Error::Parameter`] for a Courant number that is negative or not finite, and for a weight that reaches 3/2, beyond
 /// which no blend is positive definite (in two and three dimensions [`blend`] refuses smaller ones);
-/// [`Error::Incompatible`] for schemes whose free oscillations err at first order; [`Error::Tableau`] for what is no
-/// scheme.
+/// [`Error::Incompatible`] for schemes whose free oscillations err at first order; [`Error::Tableau`] for a tableau
+/// that defines no step.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, Newmark, TimeIntegrator, mass};
@@ -102,7 +101,7 @@ pub fn optimal_weight(tableau: &Tableau, courant: f64) -> Result<f64> {
     }
 }
 
-/// The weight of [`optimal_weight`] whether or not a blend with it is definite; `None` for schemes that err at first
+/// The weight of [`optimal_weight`], whether or not a blend with it is definite; `None` for schemes that err at first
 /// order.
 pub(crate) fn dispersion_weight(tableau: &Tableau, courant: f64) -> Option<f64> {
     period_elongation(tableau).map(|elongation| 0.5 + 12.0 * elongation * courant * courant)

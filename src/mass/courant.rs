@@ -14,8 +14,8 @@ use faer::sparse::SparseColMatRef;
 ///
 /// Exact at every node of a uniform bar of linear elements, at its ends too. In general it is a bound by Gershgorin's
 /// circles: no mode of the lumped system has Ω = ωh above twice the largest value, so central differences are stable if
-/// none exceeds 1, and a step for explicit schemes may be chosen by it. For dofs of unlike units (rotations) single
-/// values mean nothing, the bound holds.
+/// none exceeds 1, and a step for explicit schemes may be chosen by it. For dofs of different units (rotations) single
+/// values have no meaning, but the bound holds.
 ///
 /// In solids it exceeds the number of dilatational waves along the edges of an element: on blocks of equal square
 /// quadrilaterals (plane strain) with ν = 0.3 by 9 to 20 %, of cubic hexahedra by 17 to 37 %, while the highest mode is
@@ -31,7 +31,8 @@ use faer::sparse::SparseColMatRef;
 /// ```
 /// use contact_dynamics::{faer::sparse::{SparseColMat, Triplet}, mass::{self, Mass}};
 /// // Two bar elements with stiffness 100 and mass 4 each: c/h_e = √(100/4) = 5.
-/// let k = [(0, 0, 100.0), (0, 1, -100.0), (1, 0, -100.0), (1, 1, 200.0), (1, 2, -100.0), (2, 1, -100.0), (2, 2, 100.0)];
+/// let k = [(0, 0, 100.0), (0, 1, -100.0), (1, 0, -100.0), (1, 1, 200.0), (1, 2, -100.0), (2, 1, -100.0),
+///     (2, 2, 100.0)];
 /// let k = SparseColMat::try_new_from_triplets(3, 3, &k.map(|(i, j, k)| Triplet::new(i, j, k)))?;
 /// assert_eq!(mass::courant(Mass::Lumped(&[2.0, 4.0, 2.0]), k.as_ref(), 0.1)?, [0.5; 3]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -29,7 +29,7 @@ use faer::sparse::SparseColMat;
 /// order. The critical step of a free bar is 1/√r of the lumped one; elements with r < 1 allow larger steps, at the
 /// price of frequencies too low.
 ///
-/// Supports: leave rows and columns of fixed dofs out, as if they had no momentum; a bar fixed at one end keeps these
+/// Supports: leave out rows and columns of fixed dofs, as if they had no momentum; a bar fixed at one end keeps these
 /// orders (`tests/partitioned.rs`).
 ///
 /// Known failure: elements with row sums that are not positive (quadratic ones) are refused.
@@ -37,10 +37,9 @@ use faer::sparse::SparseColMat;
 /// # Errors
 ///
 /// [`Error::MissingDof`] for dofs beyond `size`, [`Error::Dimension`] for an element matrix of another size than its
-/// dofs,
-/// [`Error::MatrixNotFinite`], [`Error::Asymmetric`] (row and column are dofs of the system); [`Error::Mass`] for the
-/// row sum of an element that is not positive, and for a dof that no element has; [`Error::Singular`] for an element
-/// matrix that is not positive definite.
+/// dofs, [`Error::MatrixNotFinite`], [`Error::Asymmetric`] (row and column are dofs of the system); [`Error::Mass`] for
+/// the row sum of an element that is not positive, and for a dof that no element has; [`Error::Singular`] for an
+/// element matrix that is not positive definite.
 ///
 /// ```
 /// use contact_dynamics::mass;

@@ -8,7 +8,7 @@ use crate::sparse;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeMap;
 
-/// Who takes over the mass of the dofs that [`redistribute`] and [`redistribute_consistent`] make massless.
+/// Which dofs take over the mass of those that [`redistribute`] and [`redistribute_consistent`] make massless.
 ///
 /// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, that meets its conditions
 /// (theory, section 14); they differ in how far mass may go and in what is kept besides the total.
@@ -61,14 +61,13 @@ pub enum Redistribution<'a> {
 /// Takes the mass of some dofs and gives it to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech.
 /// A/Solids 27, 2008).
 ///
-/// Without mass at contact dofs the contact force has nothing to make jump: a semi-discrete solution has bounded
-/// accelerations and conserves energy, and impact costs none. The balance of such a dof is static, and M has no
-/// inverse.
+/// Without mass at contact dofs the contact force makes no velocity jump: a semi-discrete solution has bounded
+/// accelerations, and conserves energy also at impact. The balance of such a dof is static, and M has no inverse.
 ///
 /// `massless` lists dofs in any order: the contact nodes' in the normal direction if that is along an axis, otherwise
 /// in all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass stays among
-/// dofs with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Dofs with another
-/// number yet, such as supports, which would take mass out of the motion, take no part.
+/// dofs with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Groups without massless
+/// dofs take no part: give supports a number of their own, since mass given to them would be lost to the motion.
 ///
 /// The result is zero on massless dofs, positive on all others. Where only normal directions are massless the masses of
 /// a node differ from direction to direction: each direction keeps its own inertia, but for a node that turns far that
@@ -116,7 +115,7 @@ pub fn redistribute<T: Real>(
 ///
 /// Rows and columns of the massless dofs are left out. What another dof loses with them it gets back on its own
 /// diagonal, so that its row sum stays; the row sums of the massless dofs, which are their lumped masses, are then
-/// given away. Neighbors get their shares on the diagonal, in proportion to that of M. The other two options change the
+/// given away. Neighbors get their shares on the diagonal, in proportion to that of M. The other options change the
 /// density, Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix stays like one of a consistent mass, and a lumped mass is a special case.
 ///
 /// With [`Redistribution::Uniform`], lumping of the result gives what [`redistribute`] makes of the lumped mass; with
@@ -250,7 +249,7 @@ struct Loss<'a> {
     kept: Vec<(usize, usize, f64)>,
 }
 
-/// What becomes of what is kept: Mᵢⱼ ← (Mᵢⱼ + δᵢⱼ addedᵢ)(1 + ½ densityᵢ + ½ densityⱼ).
+/// The change of the entries that are kept: Mᵢⱼ ← (Mᵢⱼ + δᵢⱼ addedᵢ)(1 + ½ densityᵢ + ½ densityⱼ).
 struct Change {
     added: Vec<f64>,
     density: Vec<f64>,
@@ -279,7 +278,7 @@ impl<'a> Loss<'a> {
         (0..self.mass.len()).map(|dof| T::of(new(dof))).collect()
     }
 
-    /// Refuses masses that are not positive, but zero where it belongs.
+    /// Refuses masses that are not positive; zero is admitted on massless dofs.
     fn check<T: Real>(&self, mass: &[T]) -> Result<()> {
         let wrong = |(&m, &massless): (&T, &bool)| !((m > T::zero() || massless && m == T::zero()) && m.is_finite());
         match mass.iter().zip(&self.massless).position(wrong) {
@@ -288,10 +287,10 @@ impl<'a> Loss<'a> {
         }
     }
 
-    /// What gives the mass back; `epsilon` is that of the input.
+    /// The change that gives the lost mass back; `epsilon` is that of the scalar of the input.
     fn returned(&self, by: Redistribution<'_>, epsilon: f64) -> Result<Change> {
         let n = self.mass.len();
-        // A row that only loses couplings gets them back, the sum of a row that is lost goes to others.
+        // A row that only loses couplings gets them back on its diagonal; the sum of a massless row goes to other dofs.
         let (mut change, mut given) = (Change { added: vec![0.0; n], density: vec![0.0; n] }, vec![0.0; n]);
         for &(row, _, value) in &self.lost {
             let sums = if self.massless[row] { &mut given } else { &mut change.added };
@@ -317,7 +316,7 @@ impl<'a> Loss<'a> {
                 let mut sums = change.added.clone();
                 self.kept.iter().for_each(|&(row, _, value)| sums[row] += value);
                 for dof in (0..n).filter(|&dof| self.massless[dof]) {
-                    // A neighbor of several gives once.
+                    // A neighbor of several massless dofs gives only once.
                     for other in self.neighbors(graph, dof) {
                         let part = fraction * std::mem::take(&mut sums[other]);
                         change.added[other] -= part;
@@ -338,7 +337,7 @@ impl<'a> Loss<'a> {
         Ok(change)
     }
 
-    /// The dofs of the same group beside a dof that keep mass.
+    /// The neighbors of a dof that are in its group and keep mass.
     fn neighbors<'g>(
         &'g self,
         graph: SymbolicSparseColMatRef<'g, usize>,
@@ -348,7 +347,7 @@ impl<'a> Loss<'a> {
         graph.row_idx_of_col_raw(dof).iter().copied().filter(of_group)
     }
 
-    /// Gives what massless dofs have `given` to all others of their groups, as density.
+    /// Gives the mass `given` away by massless dofs to all others of their groups, as density.
     fn spread(&self, given: &[f64], change: &mut Change) -> Result<()> {
         for group in self.by_group(|_| true) {
             let kept = group.kept.iter().map(|entry| entry.2).sum::<f64>();
@@ -360,7 +359,7 @@ impl<'a> Loss<'a> {
         Ok(())
     }
 
-    /// The groups that lose mass, with those of their dofs that keep theirs and may `take` more.
+    /// The groups that lose mass, with those of their dofs that keep mass and may `take` more.
     fn by_group(&self, take: impl Fn(usize) -> bool) -> Vec<Group> {
         let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
         for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| self.massless[*dof]) {
@@ -388,8 +387,8 @@ impl<'a> Loss<'a> {
     ///
     /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) of the matrix B that is kept. With
     /// the weights mᵢ the functions aᵢ/mᵢ are made orthonormal one after the other (Gram and Schmidt, twice), and the b
-    /// with them; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start far
-    /// away.
+    /// transformed alike; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start
+    /// far away.
     fn least_squares(&self, group: &Group, motions: &[Vec<f64>], epsilon: f64, change: &mut Change) -> Result<()> {
         let tolerance = 1e3 * epsilon;
         let mass: Vec<f64> = group.receivers.iter().map(|&dof| self.mass[dof]).collect();
@@ -449,7 +448,7 @@ struct Group {
     /// At least one.
     massless: Vec<usize>,
     receivers: Vec<usize>,
-    /// Those of the matrix.
+    /// As in [`Loss`], of this group.
     lost: Vec<(usize, usize, f64)>,
     kept: Vec<(usize, usize, f64)>,
 }
@@ -468,7 +467,8 @@ fn refused(dof: usize, reason: &'static str) -> Error {
     Error::Incompatible { part: format!("redistribution of the mass of dof {dof}"), reason }
 }
 
-/// Refuses to take the mass of a dof if nobody is there for it: `weight` is their mass or number.
+/// Refuses to take the mass of a dof if no other may receive it; `weight` is the mass of the receivers, or their
+/// number.
 fn check_takers(dof: usize, weight: f64) -> Result<()> {
     match weight > 0.0 {
         true => Ok(()),

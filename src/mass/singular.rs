@@ -108,11 +108,12 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
 /// D⁻¹ C u̇, and ½ u̇ᵀ M u̇ is their kinetic energy.
 ///
 /// M is symmetric and positive semidefinite, and singular wherever C is: its null space is that of C. A dof whose
-/// column of C is empty has no mass: leave the contact dofs out of the functions that the velocities see. If C maps a
-/// uniform unit velocity to D 1 (velocities take up constants exactly) the total mass is Σ D_e.
+/// column of C is empty has no mass: leave contact dofs out of the velocities. If C maps a uniform unit velocity to D 1
+/// (velocities take up constants exactly) the total mass is Σ D_e.
 ///
-/// C must see every other motion: piecewise constant velocities on plain linear elements miss the alternating one, so
-/// that there a motion of the whole body has no mass (known failure; the function cannot see it).
+/// Every other motion must have a velocity in C: piecewise constant velocities on plain linear elements miss the
+/// alternating one, so that there a motion of the whole body has no mass (known failure, which this function does not
+/// detect).
 ///
 /// # Errors
 ///

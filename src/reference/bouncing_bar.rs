@@ -4,8 +4,8 @@
 /// Comput. 33, 2011, where the solution is a series).
 ///
 /// There the flight between the two contacts of a period lasts three round trips of the waves. The bar then leaves the
-/// first contact, in which the force rises, with uniform speed and twice the strain of its weight, and returns so; the
-/// second contact is the first one in reverse, and after it the bar rises undeformed to where it came from.
+/// first contact, in which the force rises, with uniform speed and twice the strain of its weight, and returns in that
+/// state; the second contact is the first one in reverse, and after it the bar rises undeformed to where it came from.
 ///
 /// ```
 /// use contact_dynamics::reference::BouncingBar;
@@ -63,7 +63,7 @@ impl BouncingBar {
         (2.0 * self.gravity * self.drop).sqrt()
     }
 
-    /// Touch, release, touch, release of one period.
+    /// Times of touch, release, touch and release in one period.
     pub fn events(&self) -> [f64; 4] {
         let (fall, contact) = (self.speed() / self.gravity, 2.0 * self.length / self.wave_speed());
         let flight = 2.0 * fall;
@@ -109,7 +109,7 @@ impl BouncingBar {
         }
     }
 
-    /// Total energy per section: elastic, kinetic and that of the height, which the motion keeps.
+    /// Total energy per section: elastic, kinetic and that of the height; constant in time.
     pub fn energy(&self) -> f64 {
         self.density * self.length * self.gravity * self.drop
     }

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Jumps the event loop may generate before it gives up.
+/// Events at the contact after which the solution is given up.
 pub(super) const MAX_EVENTS: usize = 200_000;
 
 /// Why a reference solution cannot be built.

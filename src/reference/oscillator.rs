@@ -1,4 +1,4 @@
-//! The free response of one degree of freedom, and that to a harmonic force.
+//! The response of one degree of freedom, free and to a harmonic force.
 
 /// Free response `[u, v, a]` at the time `t` of `u'' + 2 xi omega u' + omega² u = 0` from `u(0) = u0`, `u'(0) = v0`.
 ///
@@ -50,9 +50,9 @@ pub struct HarmonicForce {
 
 /// Response `[u, v, a]` at the time `t` of `u'' + 2 xi omega u' + omega² u = force(t)` from `u(0) = u0`, `u'(0) = v0`.
 ///
-/// It is the steady response plus the [free response](single_oscillator) to what that leaves of the initial values.
-/// Undamped resonance is solved exactly; next to it the two parts cancel, and the relative error grows as
-/// `f64::EPSILON omega / |omega - frequency|`.
+/// It is the steady response plus the [free response](single_oscillator) to the rest of the initial values. Undamped
+/// resonance is solved exactly; next to it the two parts cancel, and the relative error grows as `f64::EPSILON omega /
+/// |omega - frequency|`.
 ///
 /// # Example
 ///

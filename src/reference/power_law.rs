@@ -46,7 +46,7 @@ impl PowerLawImpact {
         2.0 * self.depth() / self.velocity * Self::shape(self.exponent + 1.0)
     }
 
-    /// ∫₀¹ (1 − x^q)^{−1/2} dx, with x = 1 − s² to take the root out, by Gauss–Legendre panels.
+    /// ∫₀¹ (1 − x^q)^{−1/2} dx, with x = 1 − s² to remove the singularity, by Gauss–Legendre panels.
     fn shape(q: f64) -> f64 {
         // Nodes and weights of five points on [−1, 1].
         let (inner, outer) =

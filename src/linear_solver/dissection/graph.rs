@@ -15,7 +15,7 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// A graph without vertices and room for some.
+    /// A graph without vertices, with room for some.
     pub(super) fn with_capacity(vertices: usize, entries: usize) -> Self {
         let mut starts = Vec::with_capacity(vertices + 1);
         starts.push(0);
@@ -41,7 +41,7 @@ impl Graph {
         self.weights.push(weight);
     }
 
-    /// Makes every edge as heavy as the number of neighbors that its ends have in common: pairs along such edges are
+    /// Makes every edge as heavy as the number of neighbors that its ends have in common: pairs along heavy edges are
     /// compact. Graphs so dense that this would take long are left as they are.
     pub(super) fn weigh_edges(&mut self) {
         let work: usize = (0..self.size()).map(|vertex| self.neighbors(vertex).len().pow(2)).sum();

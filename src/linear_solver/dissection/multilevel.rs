@@ -1,18 +1,18 @@
-//! Separators from the graph alone: found where the graph has been made small, and refined on the way back.
+//! Separators from the graph alone: found on a coarsened graph, and refined while it is made finer again.
 
 use super::graph::Graph;
 use super::separator::{Separator, grow, refine};
 
-/// Size of the graph that a separator is sought on from scratch.
+/// Number of vertices at which coarsening ends.
 const COARSEST: usize = 50;
 
-/// A vertex of it weighs no more than one part in so many of the whole.
+/// The weight of the whole over the largest weight of a coarse vertex.
 const HEAVIEST: i64 = 33;
 
-/// Vertices of it that a side is grown from.
+/// Vertices of the coarsest graph from which a side is grown, each for a try of its own.
 const STARTS: usize = 5;
 
-/// Numbers without a pattern, the same in every run (xorshift of Marsaglia, J. Stat. Softw. 8, 2003).
+/// Pseudo-random numbers, the same in every run (xorshift of Marsaglia, J. Stat. Softw. 8, 2003).
 #[derive(Clone, Debug)]
 pub(super) struct Random(u64);
 
@@ -60,11 +60,11 @@ pub(super) fn bisect(graph: &Graph, random: &mut Random) -> Separator {
 }
 
 /// A smaller graph, vertices joined in pairs along the heaviest edges, and for each vertex the one it became part of;
-/// nothing if hardly any can be joined without one that weighs more than `heaviest`.
+/// nothing if hardly any can be joined without exceeding the weight `heaviest`.
 fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, Vec<usize>)> {
     const FREE: usize = usize::MAX;
     let n = graph.size();
-    // In order of their numbers all pairs of a regular mesh would lie along one axis.
+    // Visited in order of their numbers, the vertices of a regular mesh would all be paired along one axis.
     let mut visits: Vec<usize> = (0..n).collect();
     random.shuffle(&mut visits);
     let mut coarse = vec![FREE; n];

@@ -34,13 +34,14 @@ impl Separator {
         Self { label, weights }
     }
 
-    /// What is minimized: first what a side weighs too much, then the separator, then the difference of the sides.
+    /// What is minimized: first the excess weight of a side, then the weight of the separator, then the difference of
+    /// the sides.
     pub(super) fn cost(&self) -> [i64; 3] {
         let [one, other, between] = self.weights;
         [(one.max(other) - self.limit()).max(0), between, (one - other).abs()]
     }
 
-    /// The separator of the finer graph whose vertices became those of this one's as `coarse` says.
+    /// The same separator in the finer graph, whose vertex i is part of vertex `coarse[i]` of this one's.
     pub(super) fn projected(&self, coarse: &[usize]) -> Self {
         Self { label: coarse.iter().map(|&vertex| self.label[vertex]).collect(), weights: self.weights }
     }
@@ -81,7 +82,7 @@ impl<'g> Mover<'g> {
         self.queue.push((self.gain(vertex), Reverse(vertex)));
     }
 
-    /// Takes a vertex of the separator up into the queue.
+    /// Adds a vertex of the separator to the queue.
     fn enter(&mut self, vertex: usize) {
         let other = 1 - self.side;
         let beyond = self.graph.neighbors(vertex).iter().filter(|&&next| self.separator.label[next] == other);
@@ -162,8 +163,8 @@ impl<'g> Mover<'g> {
 }
 
 /// Makes a separator lighter, or better balanced: passes toward one side and the other, the lighter one first, until
-/// neither helps. A pass that may go both ways at once would only toss vertices to and fro: a slanted separator becomes
-/// straight by wandering.
+/// neither helps. A slanted separator becomes straight by moving to one side and back; a pass that went both ways at
+/// once would only move vertices to and fro.
 pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
     let mut side = usize::from(separator.weights[1] < separator.weights[0]);
     let mut mover = Mover::new(graph, separator);

@@ -8,7 +8,7 @@ const RESTING: Bar = Bar { velocity: 0.0, ..BAR };
 /// Half of the symmetric pair with four contact nodes: Z = 1/4.
 const QUARTER: Bar = Bar { area: 0.25, velocity: 0.05, ..BAR };
 const V0: f64 = 0.05;
-/// A time after zero, a little later than the event whose consequences are looked at.
+/// A short time, to look just before an event.
 const LATER: f64 = 1e-6;
 
 fn close(value: f64, expected: f64, tolerance: f64) {
