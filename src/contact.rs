@@ -2,6 +2,7 @@
 
 mod gap_function;
 mod gaps;
+mod groups;
 mod law;
 mod linear_rows;
 #[cfg(feature = "search")]
@@ -14,6 +15,7 @@ mod surface;
 
 pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps, rounding};
+pub(crate) use groups::Groups;
 pub use law::ContactLaw;
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]

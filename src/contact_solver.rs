@@ -19,6 +19,9 @@ pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;
 
+/// Rows for which memory is reserved at build. More are rare, and get it when they first press.
+pub(crate) const FORESEEN: usize = 128;
+
 /// A solver of [`ContactProblem`]s.
 ///
 /// ```
@@ -39,8 +42,12 @@ use crate::real::Real;
 /// assert!((problem.gap(1, &lambda) - 2.0).abs() < 1e-15); // the second contact is pushed open
 /// ```
 pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
-    /// Reserves memory for problems of up to `size` rows, so that [`solve`](Self::solve) does not allocate.
-    fn reserve(&mut self, size: usize);
+    /// Announces problems of up to `size` rows: a solver that allocates no memory in [`solve`](Self::solve) reserves it
+    /// now. Called at build, and before the first problem with more rows than were announced; then for up to twice as
+    /// many. Default: nothing is reserved.
+    fn reserve(&mut self, size: usize) {
+        let _ = size;
+    }
 
     /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are taken as active first) and the solution on
     /// exit. The guess may change the work, never the result beyond rounding. Returns the number of iterations.

@@ -3,6 +3,7 @@
 mod buffers;
 mod contact_implicit;
 mod correction;
+mod group_problem;
 mod jump_projection;
 mod laursen_love;
 mod persistency;

@@ -18,6 +18,14 @@ pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Res
     Ok(vector)
 }
 
+/// Gives a vector `rows · columns` entries, new ones zero; its memory at least doubles when it must grow.
+pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, what: &'static str) -> Result<()> {
+    let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what })?;
+    vector.try_reserve(size.saturating_sub(vector.len())).map_err(|_| Error::OutOfMemory { what })?;
+    vector.resize(size, T::zero());
+    Ok(())
+}
+
 /// Scratch memory for faer's kernels; a clone starts empty.
 #[derive(Default)]
 pub(crate) struct Scratch {

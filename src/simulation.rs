@@ -30,6 +30,7 @@ mod path;
 mod program;
 mod rate_check;
 mod resample;
+mod responses;
 pub(crate) mod results;
 mod run;
 mod scheme;

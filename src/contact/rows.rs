@@ -110,7 +110,7 @@ impl<T: Real> ContactJacobian<T> {
     }
 
     /// The (place on the interface, weight) pairs of a row, without prescribed dofs.
-    fn located(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+    pub(crate) fn located(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
         let range = self.pointers[row]..self.pointers[row + 1];
         let entries = self.places[range.clone()].iter().copied().zip(self.weights[range].iter().copied());
         entries.filter(|&(place, _)| place != NO_RESPONSE)
@@ -119,6 +119,15 @@ impl<T: Real> ContactJacobian<T> {
     /// `G_row · x` for x on the interface.
     pub(crate) fn interface_product(&self, row: usize, x: &[T]) -> T {
         self.located(row).map(|(place, weight)| weight * x[place]).sum()
+    }
+
+    /// `G_i D G_jᵀ` with a diagonal D on the interface.
+    pub(crate) fn interface_coupling(&self, i: usize, j: usize, diagonal: &[T]) -> T {
+        let terms = self.located(i).flat_map(|(place, weight)| {
+            let shared = self.located(j).filter(move |(other, _)| *other == place);
+            shared.map(move |(_, other)| weight * other * diagonal[place])
+        });
+        terms.sum()
     }
 
     /// `Σ_j |G_row,j| |x_j|` for x on the interface.

@@ -1,7 +1,8 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
 use super::acceptance::{Acceptance, Settings};
-use super::{Bound, ContactFailure, ContactProblem, ContactSolver, Pivoting};
+use super::many_rows::ManyRows;
+use super::{Bound, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
@@ -28,10 +29,13 @@ use crate::real::Real;
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     factor: DenseCholesky<T>,
+    /// In place of a factor, on many rows.
+    many: ManyRows<T>,
     /// Whether W is symmetric, and the version of which that is known.
     symmetry: (u64, Symmetry),
-    /// The version of W and the rows that `factor` belongs to.
+    /// The version of W and the rows that `factor` or `many` belongs to, and which of the two.
     factored: (u64, Vec<usize>),
+    method: Method,
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
@@ -54,6 +58,18 @@ enum Symmetry {
     Symmetric,
     General,
 }
+
+/// How the equations of the active rows are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Method {
+    #[default]
+    Factor,
+    Iteration,
+}
+
+/// Active rows from which on the equations are solved by iteration, if they are independent of one another: a factor
+/// costs the cube of their number.
+const MANY: usize = 256;
 
 /// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is
 /// given.)
@@ -142,7 +158,9 @@ impl<T: Real> ActiveSet<T> {
         acceptance: &mut Acceptance<'_, T>,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { factor, symmetry, factored, active, rows, solution, y, own, noise, shift, offset, .. } = self;
+        let Self { factor, many, symmetry, factored, method, active, rows, solution, .. } = self;
+        let (y, own, noise, shift) = (&mut self.y, &mut self.own, &mut self.noise, &self.shift);
+        let offset = &self.offset;
         let (_, symmetry) = *symmetry;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
@@ -156,28 +174,47 @@ impl<T: Real> ActiveSet<T> {
             rows.extend((0..size).filter(|&i| active[i]));
             let known = problem.version > 0 && factored.0 == problem.version && factored.1 == *rows && !proximal;
             if !known {
-                let diagonal = |i: usize| if proximal { shift[i] } else { T::zero() };
-                let entry = |i: usize, j: usize| {
-                    let w = problem.row(rows[i])[rows[j]];
-                    if i == j { w + diagonal(rows[i]) } else { w }
-                };
                 factored.0 = 0;
-                let not_finite =
-                    |i: usize| ContactFailure::NotConverged { iterations: iteration, row: rows[i], residual: T::nan() };
-                match symmetry {
-                    Symmetry::Symmetric => factor.factorize(rows.len(), entry).map_err(not_finite)?,
-                    Symmetry::General => factor.factorize_general(rows.len(), entry).map_err(not_finite)?,
+                let iterates = rows.len() >= MANY && symmetry == Symmetry::Symmetric && !proximal;
+                *method = if iterates && many.prepare(problem, rows) { Method::Iteration } else { Method::Factor };
+            }
+            let right = |solution: &mut Vec<T>| {
+                solution.clear();
+                solution.extend(rows.iter().map(|&i| -offset[i]));
+            };
+            right(solution);
+            let iterated = *method == Method::Iteration && many.solve(problem, rows, solution).is_some();
+            if !iterated {
+                if !known || *method == Method::Iteration {
+                    *method = Method::Factor;
+                    factored.0 = 0;
+                    let diagonal = |i: usize| if proximal { shift[i] } else { T::zero() };
+                    let entry = |i: usize, j: usize| {
+                        let w = problem.row(rows[i])[rows[j]];
+                        if i == j { w + diagonal(rows[i]) } else { w }
+                    };
+                    let not_finite = |i: usize| ContactFailure::NotConverged {
+                        iterations: iteration,
+                        row: rows[i],
+                        residual: T::nan(),
+                    };
+                    match symmetry {
+                        Symmetry::Symmetric => factor.factorize(rows.len(), entry).map_err(not_finite)?,
+                        Symmetry::General => factor.factorize_general(rows.len(), entry).map_err(not_finite)?,
+                    }
                 }
-                factored.0 = if proximal { 0 } else { problem.version };
+                if symmetry == Symmetry::General && factor.is_singular() {
+                    // There is no solution of least norm from an LU.
+                    return Ok(Exchanges::Stuck(iteration));
+                }
+                right(solution);
+                factor.solve(solution);
+            }
+            if factored.0 == 0 && !proximal {
+                factored.0 = problem.version;
                 factored.1.clone_from(rows);
             }
-            if symmetry == Symmetry::General && factor.is_singular() {
-                // There is no solution of least norm from an LU.
-                return Ok(Exchanges::Stuck(iteration));
-            }
-            solution.clear();
-            solution.extend(rows.iter().map(|&i| -offset[i]));
-            factor.solve(solution);
+            let singular = !iterated && factor.is_singular();
             multipliers.fill(T::zero());
             for (&i, &lambda) in rows.iter().zip(solution.iter()) {
                 multipliers[i] = lambda;
@@ -195,7 +232,7 @@ impl<T: Real> ActiveSet<T> {
             }
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
             // go, one that is left violated waits for the others.
-            let open = |i: usize| factor.is_singular() && y[i] > noise[i];
+            let open = |i: usize| singular && y[i] > noise[i];
             let violates = |i: usize, active: bool| match problem.bounds[i] {
                 Bound::Free => false,
                 Bound::NonNegative if active => problem.delassus(i, i) * multipliers[i] < -noise[i] || open(i),
@@ -206,7 +243,7 @@ impl<T: Real> ActiveSet<T> {
             if count == 0 {
                 // What multipliers make of y as they grow beyond all bounds is no rounding.
                 let held = |i: usize| match (problem.bounds[i], active[i]) {
-                    _ if active[i] && factor.is_singular() && y[i].abs() > noise[i] => false,
+                    _ if active[i] && singular && y[i].abs() > noise[i] => false,
                     (Bound::Free, _) => acceptance.bears(i, y[i].abs()),
                     (_, true) => acceptance.bears(i, y[i].abs().max(-problem.delassus(i, i) * multipliers[i])),
                     (_, false) => acceptance.bears(i, -y[i]),
@@ -227,7 +264,7 @@ impl<T: Real> ActiveSet<T> {
                 }
                 return Ok(Exchanges::Solved(iteration));
             }
-            if factor.is_singular() && iteration > SEMIDEFINITE_TRIES {
+            if singular && iteration > SEMIDEFINITE_TRIES {
                 return Ok(Exchanges::Stuck(iteration));
             }
             if count < fewest {
@@ -303,10 +340,14 @@ impl<T: Real> ActiveSet<T> {
 impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     fn reserve(&mut self, size: usize) {
         let reals = || Vec::with_capacity(size);
+        // (Of large problems the dense ways are last resorts.)
+        let dense = if size < MANY { size } else { FORESEEN };
         let mut pivoting = Pivoting::default();
-        pivoting.reserve(size);
+        pivoting.reserve(dense);
         *self = Self {
-            factor: DenseCholesky::with_capacity(size),
+            factor: DenseCholesky::with_capacity(dense),
+            many: ManyRows::default(),
+            method: Method::Factor,
             symmetry: (0, Symmetry::Symmetric),
             factored: (0, Vec::with_capacity(size)),
             active: Vec::with_capacity(size),

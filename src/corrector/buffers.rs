@@ -1,7 +1,8 @@
 //! Memory of the corrections, reserved when a simulation is built.
 
+use super::group_problem::GroupProblem;
 use crate::contact::GapRates;
-use crate::contact_solver::Bound;
+use crate::contact_solver::{Bound, FORESEEN};
 use crate::real::Real;
 use crate::state::ContactState;
 
@@ -26,7 +27,9 @@ pub(crate) struct Buffers<T> {
     pub(super) impulses: Vec<T>,
     /// Forces that remove the acceleration jumps, one an engaged row.
     pub(super) forces: Vec<T>,
-    /// S = G M⁻¹ Gᵀ of the rows of such a problem.
+    /// The same of a group of rows.
+    pub(super) group: GroupProblem<T>,
+    /// S = G M⁻¹ Gᵀ of some rows.
     pub(super) s: Vec<T>,
     /// Rates and gaps as the constraints give them, one a candidate.
     pub(super) rates: Vec<GapRates<T>>,
@@ -53,7 +56,8 @@ impl<T: Real> Buffers<T> {
             tolerance: reals(rows),
             impulses: reals(rows),
             forces: reals(rows),
-            s: reals(rows * rows),
+            group: GroupProblem::new(rows),
+            s: reals(rows.min(FORESEEN) * rows.min(FORESEEN)),
             rates: vec![GapRates::default(); rows],
             gaps: vec![T::zero(); rows],
             change: vec![T::zero(); damped],

@@ -4,9 +4,10 @@
 mod energy;
 mod past;
 
+use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
 use crate::contact::{ContactJacobian, ErasedGaps, rounding};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error, no_response};
+use crate::contact_solver::{Bound, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
@@ -447,13 +448,10 @@ impl<T: Real> Correction<'_, T> {
             self.projection.solve(x);
             return Ok(());
         }
-        let Buffers { s, jump, tolerance, .. } = &mut *self.buffers;
-        self.projection.assemble(self.g, rows, s);
-        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance, version: 0 };
-        match self.solver.solve(&problem, x) {
-            Ok(_) => Ok(()),
-            Err(failure) => Err(contact_error(self.t, failure, |row| self.contacts.ids[rows[row]])),
-        }
+        let Buffers { group, jump, tolerance, .. } = &mut *self.buffers;
+        let jumps = Jumps { rows, bounds, jump, tolerance };
+        let ids = &self.contacts.ids;
+        group.solve((self.g, &mut *self.projection), &mut *self.solver, jumps, x, (self.t, |row| ids[row]))
     }
 
     fn no_response(&self, row: usize) -> Error {

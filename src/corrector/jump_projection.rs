@@ -1,11 +1,10 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
-use crate::contact::{ContactId, ContactJacobian};
+use crate::contact::{ContactId, ContactJacobian, Groups};
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::mass::{InverseMass, Mass};
-use crate::memory;
 use crate::real::Real;
 use crate::sparse;
 
@@ -48,14 +47,25 @@ use crate::sparse;
 pub struct JumpProjection<T: Real> {
     inverse: InverseMass<T>,
     dofs: usize,
-    /// M⁻¹ Gᵀ column by column, filled when a row is first closed; consistent masses only.
-    columns: Vec<T>,
-    computed: Vec<bool>,
+    /// For each row the column of M⁻¹ Gᵀ, made when it is first closed; consistent masses only.
+    slots: Vec<usize>,
+    columns: Vec<Vec<T>>,
+    /// Number of columns that belong to the present G.
+    computed: usize,
     closed: Vec<usize>,
-    factor: DenseCholesky<T>,
-    /// Whether `factor` belongs to `closed`.
+    /// The closed rows by the dofs that they share. S couples no two groups.
+    groups: Groups,
+    /// √S of groups of one row, and the factors of the others; one a group each.
+    roots: Vec<T>,
+    factors: Vec<DenseCholesky<T>>,
+    /// The right-hand side of a group.
+    gathered: Vec<T>,
+    /// Whether roots and factors belong to `closed`.
     factored: bool,
 }
+
+/// A row without a column.
+const NONE: usize = usize::MAX;
 
 impl<T: Real> JumpProjection<T> {
     /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those
@@ -82,7 +92,6 @@ impl<T: Real> JumpProjection<T> {
                 false => Error::Incompatible { part: what.into(), reason: "it is not ascending" },
             });
         }
-        memory::reserve::<T>(rows, rows, "the matrix S of a jump projection")?;
         Self::with(InverseMass::new(mass, prescribed)?, dofs, rows)
     }
 
@@ -94,17 +103,22 @@ impl<T: Real> JumpProjection<T> {
         Ok(Self {
             inverse,
             dofs,
-            columns: memory::zeros(stored, dofs, "the columns of M⁻¹Gᵀ")?,
-            computed: vec![false; stored],
+            slots: vec![NONE; stored],
+            columns: Vec::new(),
+            computed: 0,
             closed: Vec::with_capacity(rows),
-            factor: DenseCholesky::with_capacity(rows),
+            groups: Groups::default(),
+            roots: Vec::new(),
+            factors: Vec::new(),
+            gathered: Vec::new(),
             factored: false,
         })
     }
 
     /// Forgets everything computed from an earlier G.
     pub fn reset(&mut self) {
-        self.computed.fill(false);
+        self.slots.fill(NONE);
+        self.computed = 0;
         self.factored = false;
     }
 
@@ -127,7 +141,7 @@ impl<T: Real> JumpProjection<T> {
         // Of a consistent mass columns of M⁻¹Gᵀ are stored, one for each row announced.
         let stored = match self.inverse {
             InverseMass::Lumped(_) => usize::MAX,
-            InverseMass::Consistent { .. } => self.computed.len(),
+            InverseMass::Consistent { .. } => self.slots.len(),
         };
         for &row in rows {
             if row >= g.rows() {
@@ -152,9 +166,27 @@ impl<T: Real> JumpProjection<T> {
         self.closed.clear();
         self.closed.extend_from_slice(rows);
         self.prepare(g, rows);
-        let Self { inverse, columns, factor, closed, dofs, .. } = self;
-        let entry = |i: usize, j: usize| s_entry(inverse, columns, *dofs, g, closed[i], closed[j]);
-        factor.factorize(rows.len(), entry).map_err(|i| rows[i])?;
+        self.sort(g, rows);
+        let mut roots = std::mem::take(&mut self.roots);
+        let mut factors = std::mem::take(&mut self.factors);
+        roots.clear();
+        let (mut result, mut used) = (Ok(()), 0);
+        for group in 0..self.groups.len() {
+            let own = self.groups.group(group);
+            let entry = |i: usize, j: usize| self.entry(g, rows[own[i]], rows[own[j]]);
+            let root = if own.len() == 1 { entry(0, 0).sqrt() } else { T::zero() };
+            roots.push(root);
+            if own.len() == 1 && root.is_finite() {
+                continue;
+            }
+            if used == factors.len() {
+                factors.push(DenseCholesky::default());
+            }
+            result = result.and(factors[used].factorize(own.len(), entry).map_err(|i| rows[own[i]]));
+            used += 1;
+        }
+        (self.roots, self.factors) = (roots, factors);
+        result?;
         self.factored = true;
         Ok(())
     }
@@ -203,7 +235,41 @@ impl<T: Real> JumpProjection<T> {
 
     /// `b ← S⁻¹ b` on the closed rows.
     pub(crate) fn solve(&mut self, b: &mut [T]) {
-        self.factor.solve(b);
+        let Self { groups, roots, factors, gathered, .. } = self;
+        let mut factors = factors.iter_mut();
+        for (group, &root) in roots.iter().enumerate() {
+            let own = groups.group(group);
+            if let &[only] = own {
+                // (A row that nothing answers to gets nothing.)
+                b[only] = if root > T::zero() { b[only] / root / root } else { T::zero() };
+                continue;
+            }
+            gathered.clear();
+            gathered.extend(own.iter().map(|&position| b[position]));
+            if let Some(factor) = factors.next() {
+                factor.solve(gathered);
+            }
+            for (&position, &x) in own.iter().zip(gathered.iter()) {
+                b[position] = x;
+            }
+        }
+    }
+
+    /// Sorts rows into groups that S does not couple.
+    pub(crate) fn sort(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
+        match &self.inverse {
+            InverseMass::Lumped(inverse) => self.groups.sort(rows, self.dofs, |row| {
+                let acting = g.row(row).filter(|&(dof, weight)| weight != T::zero() && inverse[dof] != T::zero());
+                acting.map(|(dof, _)| dof)
+            }),
+            InverseMass::Consistent { .. } => self.groups.together(rows.len()),
+        }
+        self.factored = false;
+    }
+
+    /// The groups of the last [`sort`](Self::sort).
+    pub(crate) fn groups(&self) -> &Groups {
+        &self.groups
     }
 
     /// `x += c M⁻¹ G_rowᵀ`; the row must have been closed or prepared.
@@ -215,7 +281,7 @@ impl<T: Real> JumpProjection<T> {
                 }
             }
             InverseMass::Consistent { .. } => {
-                T::axpy(c, &self.columns[row * self.dofs..(row + 1) * self.dofs], x);
+                T::axpy(c, &self.columns[self.slots[row]], x);
             }
         }
     }
@@ -230,47 +296,45 @@ impl<T: Real> JumpProjection<T> {
         self.prepare(g, rows);
         s.clear();
         for &j in rows {
-            s.extend(rows.iter().map(|&i| s_entry(&self.inverse, &self.columns, self.dofs, g, i, j)));
+            s.extend(rows.iter().map(|&i| self.entry(g, i, j)));
         }
     }
 
     /// Makes the rows known to [`push`](Self::push).
     pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
-        if let InverseMass::Consistent { .. } = self.inverse {
+        let Self { inverse, slots, columns, computed, dofs, .. } = self;
+        if let InverseMass::Consistent { .. } = inverse {
             for &row in rows {
-                if !self.computed[row] {
-                    let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];
+                if slots[row] == NONE {
+                    if columns.len() == *computed {
+                        columns.push(vec![T::zero(); *dofs]);
+                    }
+                    let column = &mut columns[*computed];
                     column.fill(T::zero());
                     g.scatter(row, T::one(), column);
-                    self.inverse.apply(column);
-                    self.computed[row] = true;
+                    inverse.apply(column);
+                    slots[row] = *computed;
+                    *computed += 1;
                 }
             }
         }
     }
-}
 
-/// Entry (i, j) of S = G M⁻¹ Gᵀ.
-fn s_entry<T: Real>(
-    inverse: &InverseMass<T>,
-    columns: &[T],
-    dofs: usize,
-    g: &ContactJacobian<T>,
-    i: usize,
-    j: usize,
-) -> T {
-    match inverse {
-        InverseMass::Lumped(inverse) => {
-            let mut sum = T::zero();
-            for (dof, weight) in g.row(i) {
-                for (other, weight_j) in g.row(j) {
-                    if dof == other {
-                        sum += weight * weight_j * inverse[dof];
+    /// Entry (i, j) of S = G M⁻¹ Gᵀ; row j must be prepared.
+    fn entry(&self, g: &ContactJacobian<T>, i: usize, j: usize) -> T {
+        match &self.inverse {
+            InverseMass::Lumped(inverse) => {
+                let mut sum = T::zero();
+                for (dof, weight) in g.row(i) {
+                    for (other, weight_j) in g.row(j) {
+                        if dof == other {
+                            sum += weight * weight_j * inverse[dof];
+                        }
                     }
                 }
+                sum
             }
-            sum
+            InverseMass::Consistent { .. } => g.product(i, &self.columns[self.slots[j]]),
         }
-        InverseMass::Consistent { .. } => g.product(i, &columns[j * dofs..(j + 1) * dofs]),
     }
 }

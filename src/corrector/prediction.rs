@@ -1,9 +1,10 @@
 //! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the
 //! contact conditions.
 
+use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
 use crate::contact::{ContactId, ContactJacobian, ContactLaw, ErasedGaps, rounding};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error};
+use crate::contact_solver::{Bound, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
@@ -131,8 +132,7 @@ impl<T: Real> Prediction<'_, T> {
         self.advance(&[], &[]);
         self.read_gaps()?;
         let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
-        let Buffers { s, jump, tolerance, bounds, gaps, .. } = &mut **buffers;
-        projection.assemble(g, rows, s);
+        let Buffers { group, jump, tolerance, bounds, gaps, .. } = &mut **buffers;
         jump.clear();
         tolerance.clear();
         bounds.clear();
@@ -143,8 +143,7 @@ impl<T: Real> Prediction<'_, T> {
         }
         mu.clear();
         mu.resize(rows.len(), T::zero());
-        let problem = ContactProblem { delassus: s, offset: jump, bounds, tolerance, version: 0 };
-        let (t, ids) = (self.t, self.ids);
-        solver.solve(&problem, mu).map_err(|failure| contact_error(t, failure, |row| ids[rows[row]])).map(drop)
+        let (jumps, ids) = (Jumps { rows, bounds, jump, tolerance }, self.ids);
+        group.solve((g, &mut **projection), &mut **solver, jumps, mu, (self.t, |row| ids[row]))
     }
 }

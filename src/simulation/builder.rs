@@ -25,7 +25,7 @@ use crate::analysis;
 use crate::contact::ContactConstraint;
 #[cfg(doc)]
 use crate::contact::ContactLaw;
-use crate::contact_solver::{ActiveSet, ContactSolver};
+use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
 use crate::corrector::{Corrector, PersistencyCorrection};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
@@ -363,7 +363,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
         let Begun { state, history, adjustment } = begun;
-        contact_solver.reserve(rows);
+        contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
             correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
@@ -373,10 +373,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             Stability::Unchecked => StepLimit::Unchecked,
         };
 
-        let contact = (rows, constraints.interface());
+        let interface = constraints.interface();
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
         let h = history.clock.h;
-        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, contact };
+        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface };
         let program = compiler.compile(&scheme.tableau)?;
         let is_known = history.known == scheme.depth;
         let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;
@@ -385,8 +385,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let contact = ([rows, constraints.entries()], constraints.interface().len());
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, contact, slots);
         if follows {
-            let (name, contact) = (scheme.integrator.name(), (rows, constraints.interface()));
-            work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, contact)?);
+            let (name, interface) = (scheme.integrator.name(), constraints.interface());
+            work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, interface)?);
             work.contact.rows.on_massless = vec![false; rows];
         }
         work.massless = massless;

@@ -81,10 +81,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         };
         let rows = promised(ContactConstraint::max_candidates, "the contact problem")?;
         let entries = promised(ContactConstraint::max_entries, "the contact Jacobian")?;
-        // The largest blocks that are reserved later are tried here, so that absurd capacities are an error and not an
-        // abort.
-        memory::reserve::<T>(rows, rows.max(dofs), "the contact problem")?;
-        memory::reserve::<(usize, T)>(entries, 1, "the contact Jacobian")?;
+        // Asked for once, so that an absurd promise is an error and not an abort: the largest block that is reserved.
+        memory::reserve::<(usize, T)>(entries.max(rows), 1, "the contact Jacobian")?;
         let jacobian = ContactJacobian::with_capacity(rows, entries);
         let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
         let constraints = Self {

@@ -2,6 +2,7 @@
 
 use super::contact_rows::{ContactRowsWork, Measure};
 use super::contact_step::{ContactStep, ContactWork};
+use super::interface::InterfaceWork;
 use super::operator::Operator;
 use crate::contact::ContactLaw;
 use crate::contact_solver::{ContactFailure, ContactProblem};
@@ -124,6 +125,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             shift,
             enabled,
             in_problem,
+            sorted,
+            reserved,
             problem,
             versions,
             offset,
@@ -135,8 +138,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
             (&mut rows.bounds, &mut rows.multipliers, &mut rows.problem_tolerance);
         let count = constraints.len();
         loop {
+            sorted.clear();
+            sorted.extend((0..count).filter(|&row| in_problem[row]));
+            operator.sort(forces, sorted);
             problem.clear();
-            problem.extend((0..count).filter(|&row| in_problem[row]));
+            problem.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
             for buffer in [&mut *offset, &mut *problem_tolerance, &mut *multipliers] {
                 buffer.clear();
             }
@@ -148,19 +154,27 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 multipliers.push(trial.lambda_raw[j]);
                 bounds.push(constraints.law(j).into());
             }
-            let compliance_of = |k: usize| compliance[problem[k]] / weight[problem[k]];
-            let (delassus, version) = operator.delassus(forces, problem, compliance_of, versions)?;
-            let data = ContactProblem { delassus, offset, bounds, tolerance: problem_tolerance, version };
-            let solved = solver.solve(&data, multipliers);
-            statistics.contact_solves += 1;
-            statistics.contact_iterations +=
-                solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))? as u64;
-            interface.response.fill(T::zero());
-            for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
-                if lambda != T::zero() {
-                    T::axpy(lambda, operator.response(row), &mut interface.response);
+            let mut iterations = 0;
+            for group in 0..operator.groups().len() {
+                let range = operator.groups().range(group);
+                if range.len() > *reserved {
+                    *reserved = range.len().next_power_of_two();
+                    solver.reserve(*reserved);
                 }
+                let own = &problem[range.clone()];
+                let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
+                let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
+                let (offset, bounds) = (&offset[range.clone()], &bounds[range.clone()]);
+                let tolerance = &problem_tolerance[range.clone()];
+                let data = ContactProblem { delassus, offset, bounds, tolerance, version };
+                let solved = solver.solve(&data, &mut multipliers[range]);
+                let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[own[i]]));
+                iterations = iterations.max(spent?);
             }
+            statistics.contact_solves += 1;
+            statistics.contact_iterations += iterations as u64;
+            let InterfaceWork { pressing, response, .. } = &mut *interface;
+            operator.answer(forces, (problem, multipliers), pressing, response);
             let mut grown = false;
             for row in 0..count {
                 if enabled[row] && !in_problem[row] && weight[row] > T::zero() {

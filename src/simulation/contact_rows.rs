@@ -4,7 +4,7 @@ use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
 use super::program::{CompiledStage, ContactTarget};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::contact_solver::Bound;
+use crate::contact_solver::{Bound, FORESEEN};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -74,6 +74,10 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) on_massless: Vec<bool>,
     /// Rows of the problem, and its data, one entry a row of the problem.
     pub(super) problem: Vec<usize>,
+    /// The same rows, ascending.
+    pub(super) sorted: Vec<usize>,
+    /// Rows for which the contact solver has memory.
+    pub(super) reserved: usize,
     /// Number of Delassus operators assembled so far: the newest version.
     pub(super) versions: u64,
     pub(super) offset: Vec<T>,
@@ -110,6 +114,8 @@ impl<T: Real> ContactRowsWork<T> {
             in_problem: vec![false; rows],
             on_massless: Vec::new(),
             problem: Vec::with_capacity(rows),
+            sorted: Vec::with_capacity(rows),
+            reserved: rows.min(FORESEEN),
             versions: 0,
             offset: reserved(),
             problem_tolerance: reserved(),

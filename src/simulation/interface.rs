@@ -6,8 +6,9 @@ use crate::real::Real;
 pub(super) struct InterfaceWork<T> {
     /// The increment d: without contact at first, with it in the end.
     pub(super) increment: Vec<T>,
-    /// Forces of contact.
+    /// Forces of contact; and those of the contact problem that is being solved.
     pub(super) forces: Vec<T>,
+    pub(super) pressing: Vec<T>,
     /// Values at d = 0 of the displacements, of those of the balance where it holds elsewhere, and of what contact
     /// constrains.
     pub(super) displacement: Vec<T>,
@@ -28,6 +29,7 @@ impl<T: Real> InterfaceWork<T> {
         Self {
             increment: zero(),
             forces: zero(),
+            pressing: zero(),
             displacement: zero(),
             balance: zero(),
             target: zero(),

@@ -243,7 +243,7 @@ impl<T: Real> MasslessBlock<T> {
         integrator: &str,
         dofs: &[usize],
         at: &Motion<T>,
-        (rows, interface): (usize, &[usize]),
+        interface: &[usize],
     ) -> Result<Self> {
         let refuse = |reason| {
             Err(Error::Incompatible { part: format!("{integrator} with dof {} without mass", dofs[0]), reason })
@@ -266,7 +266,7 @@ impl<T: Real> MasslessBlock<T> {
         Ok(Self {
             dofs: dofs.to_vec(),
             columns: columns.without(dofs),
-            operator: Operator::of_part(Box::new(factor), rows, interface)?,
+            operator: Operator::of_part(Box::new(factor), interface)?,
             stage: CompiledStage::of_displacements(),
             massive: massive.map(|(place, &dof)| (dof, place)).collect(),
             places: dofs.iter().map(|dof| interface.binary_search(dof).unwrap_or(interface.len())).collect(),

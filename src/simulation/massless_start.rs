@@ -61,7 +61,7 @@ pub(super) fn balance_start<T: Real>(
             }
             Err(other) => return Err(other),
         };
-        let mut operator = Operator::of_part(Box::new(factor), constraints.capacity(), &interface)?;
+        let mut operator = Operator::of_part(Box::new(factor), &interface)?;
         operator.begin(&mut residual, &mut on_interface)?;
         let sliver = press_start(
             solver,
@@ -158,12 +158,7 @@ fn press_start<T: Real>(
         solver
             .solve(&data, &mut lambda)
             .map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))?;
-        response.fill(T::zero());
-        forces.fill(T::zero());
-        for (&row, &lambda) in problem.iter().zip(&lambda) {
-            T::axpy(lambda, operator.response(row), &mut response);
-            g.interface_scatter(row, lambda, forces);
-        }
+        operator.answer(g, (&problem, &lambda), forces, &mut response);
     }
     T::axpy(T::one(), &response, on_interface);
     // (Rows are taken to have unit weights: a gap is then as long as the displacement that closes it.)

@@ -1,7 +1,8 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 
+use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
-use crate::contact::ContactJacobian;
+use crate::contact::{ContactJacobian, Groups};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::mass::Mass;
@@ -30,12 +31,13 @@ pub(crate) struct Operator<T> {
     values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
-    /// For each contact row the interface part of A⁻¹ G_rowᵀ, if it has been computed.
-    columns: Vec<T>,
-    computed: Vec<bool>,
-    /// Version of the rows that these are responses to.
+    responses: Responses<T>,
+    /// Of a diagonal matrix the responses of the interface to unit forces, its reciprocals there; empty until needed.
+    reciprocals: Vec<T>,
+    /// Version of the rows that the Delassus operator belongs to.
     rows: u64,
     delassus: Delassus<T>,
+    groups: Groups,
     contact: ContactPath,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
@@ -48,15 +50,15 @@ enum ContactPath {
     Condensed,
     /// By full solves, a column a row.
     Full,
-    /// From a diagonal matrix: forces on the interface move nothing else.
+    /// From a diagonal matrix: a force moves the dof that it acts on, and nothing else.
     Apart,
 }
 
 /// Fill over that of a free order beyond which a matrix that is factorized often is not ordered for contact.
 const DEAR: f64 = 1.25;
 
-/// The Delassus operator of some rows, kept until they or their responses change.
-#[derive(Debug)]
+/// The Delassus operator of some rows, kept until they or their responses change. It grows with them.
+#[derive(Debug, Default)]
 struct Delassus<T> {
     rows: Vec<usize>,
     /// Row by row, with the compliances of the laws on the diagonal.
@@ -66,41 +68,27 @@ struct Delassus<T> {
     version: u64,
 }
 
-impl<T: Real> Delassus<T> {
-    /// Memory for `rows` rows.
-    fn new(rows: usize) -> Result<Self> {
-        Ok(Self {
-            rows: Vec::with_capacity(rows),
-            values: memory::reserve(rows, rows, "the Delassus operator")?,
-            diagonal: Vec::with_capacity(rows),
-            version: 0,
-        })
-    }
-}
-
 impl<T: Real> Operator<T> {
-    /// Assembles and factorizes; memory for the responses of `rows` contact rows on the `interface` is reserved.
+    /// Assembles and factorizes; contact may act on the `interface`.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         solver: &dyn LinearSolver<T>,
         weights: [f64; 3],
         h: f64,
         at: At<'_, T>,
-        (rows, interface): (usize, &[usize]),
+        interface: &[usize],
     ) -> Result<Self> {
         let (tangent, combination) = pattern(system, weights)?;
         let linearity = system.linearity();
         let varies = tangent == Tangent::Present && linearity == Linearity::Nonlinear;
         let (factor, contact) = analyze(solver, combination.pattern(), interface, varies)?;
-        let columns = memory::zeros(rows, interface.len(), "the responses of the contact rows")?;
         let full = match contact {
-            ContactPath::Full if rows > 0 => {
+            ContactPath::Full if !interface.is_empty() => {
                 memory::zeros(COLUMNS, system.dofs(), "the responses of the contact rows")?
             }
             _ => Vec::new(),
         };
-        let (interface, computed) = (interface.to_vec(), vec![false; rows]);
-        let delassus = Delassus::new(rows)?;
+        let unit = if varies { Unit::Row } else { Unit::Dof };
         let mut operator = Self {
             weights,
             tangent,
@@ -110,11 +98,12 @@ impl<T: Real> Operator<T> {
             end: Vec::new(),
             values: Vec::new(),
             factor,
-            interface,
-            columns,
-            computed,
+            interface: interface.to_vec(),
+            responses: Responses::new(unit, interface.len()),
+            reciprocals: Vec::new(),
             rows: 0,
-            delassus,
+            delassus: Delassus::default(),
+            groups: Groups::default(),
             contact,
             full,
         };
@@ -132,7 +121,7 @@ impl<T: Real> Operator<T> {
 
     /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it,
     /// it is not factorized again.
-    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, rows: usize, interface: &[usize]) -> Result<Self> {
+    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize]) -> Result<Self> {
         Ok(Self {
             weights: [f64::NAN; 3],
             tangent: Tangent::Absent,
@@ -143,10 +132,11 @@ impl<T: Real> Operator<T> {
             values: Vec::new(),
             factor,
             interface: interface.to_vec(),
-            columns: memory::zeros(rows, interface.len(), "the responses of the contact rows")?,
-            computed: vec![false; rows],
+            responses: Responses::new(Unit::Dof, interface.len()),
+            reciprocals: Vec::new(),
             rows: 0,
-            delassus: Delassus::new(rows)?,
+            delassus: Delassus::default(),
+            groups: Groups::default(),
             contact: ContactPath::Condensed,
             full: Vec::new(),
         })
@@ -263,32 +253,21 @@ impl<T: Real> Operator<T> {
         respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces)
     }
 
-    /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response) for ascending rows.
-    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
-        let mut rest = rows;
-        while let Some(&first) = rest.first() {
-            // Consecutive rows are solved for together.
-            let count = (0..rest.len().min(COLUMNS)).take_while(|&k| rest[k] == first + k && !self.computed[first + k]);
-            let end = first + count.count();
-            let size = self.interface.len();
-            for row in first..end {
-                let column = &mut self.columns[row * size..(row + 1) * size];
-                column.fill(T::zero());
-                g.interface_scatter(row, T::one(), column);
+    /// Sorts some rows into groups whose forces do not move each other's dofs: by the dofs that they share where A is
+    /// diagonal, else all of them in one.
+    pub(crate) fn sort(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
+        match self.contact {
+            ContactPath::Apart => {
+                let acts_on = |row| g.located(row).map(|(place, _)| place);
+                self.groups.sort(rows, self.interface.len(), acts_on);
             }
-            if end > first {
-                let values = &mut self.columns[first * size..end * size];
-                respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, values)?;
-                self.computed[first..end].fill(true);
-            }
-            rest = &rest[(end - first).max(1)..];
+            ContactPath::Condensed | ContactPath::Full => self.groups.together(rows.len()),
         }
-        Ok(())
     }
 
-    /// A⁻¹ G_rowᵀ on the interface.
-    pub(crate) fn response(&self, row: usize) -> &[T] {
-        &self.columns[row * self.interface.len()..(row + 1) * self.interface.len()]
+    /// The groups of the last [`sort`](Self::sort).
+    pub(crate) fn groups(&self) -> &Groups {
+        &self.groups
     }
 
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
@@ -300,26 +279,14 @@ impl<T: Real> Operator<T> {
         compliance: impl Fn(usize) -> T,
         versions: &mut u64,
     ) -> Result<(&[T], u64)> {
-        self.prepare(g, rows)?;
-        let Self { delassus: Delassus { rows: assembled, values, diagonal, version }, columns, interface, .. } = self;
-        let (size, on_interface) = (rows.len(), interface.len());
-        let mut changed = assembled != rows || *version == 0;
+        let mut changed = self.delassus.rows != rows || self.delassus.version == 0;
         if changed {
-            assembled.clear();
-            assembled.extend_from_slice(rows);
-            values.clear();
-            values.resize(size * size, T::zero());
-            diagonal.clear();
-            for (k, &j) in rows.iter().enumerate() {
-                let response = &columns[j * on_interface..(j + 1) * on_interface];
-                for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
-                    *entry = g.interface_product(i, response);
-                }
-                diagonal.push(values[k * size + k]);
-            }
+            self.delassus.version = 0;
+            self.assemble(g, rows)?;
         }
+        let Delassus { values, diagonal, version, .. } = &mut self.delassus;
         for (k, &own) in diagonal.iter().enumerate() {
-            let entry = &mut values[k * size + k];
+            let entry = &mut values[k * rows.len() + k];
             let value = own + compliance(k);
             changed |= *entry != value;
             *entry = value;
@@ -331,16 +298,83 @@ impl<T: Real> Operator<T> {
         Ok((values, *version))
     }
 
-    /// Forgets responses to other rows than those of this version.
+    /// Forms W of some rows, without compliances.
+    fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        self.prepare(g, rows)?;
+        let Self { delassus: Delassus { rows: assembled, values, diagonal, .. }, responses, reciprocals, .. } = self;
+        let size = rows.len();
+        assembled.clear();
+        values.clear();
+        memory::grow(values, size, size, "the Delassus operator")?;
+        for (k, &j) in rows.iter().enumerate() {
+            match self.contact {
+                ContactPath::Apart => {
+                    for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
+                        *entry = g.interface_coupling(i, j, reciprocals);
+                    }
+                }
+                ContactPath::Condensed | ContactPath::Full => {
+                    responses.add_coupling(g, j, rows, size, &mut values[k..]);
+                }
+            }
+        }
+        diagonal.clear();
+        diagonal.extend((0..size).map(|k| values[k * size + k]));
+        assembled.extend_from_slice(rows);
+        Ok(())
+    }
+
+    /// Makes responses to unit forces known on all dofs that some rows act on.
+    fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        let Self { contact, factor, interface, full, responses, reciprocals, .. } = self;
+        if *contact == ContactPath::Apart {
+            if reciprocals.is_empty() {
+                let mut units = memory::zeros(1, interface.len(), "the responses of contact")?;
+                units.fill(T::one());
+                respond((*contact, &mut **factor), interface, full, &mut units)?;
+                *reciprocals = units;
+            }
+            return Ok(());
+        }
+        responses.prepare(g, rows, |forces| respond((*contact, &mut **factor), interface, full, forces))
+    }
+
+    /// The response A⁻¹ Gᵀ λ on the interface of rows whose [`delassus`](Self::delassus) has been formed, and their
+    /// forces Gᵀ λ there.
+    pub(crate) fn answer(
+        &self,
+        g: &ContactJacobian<T>,
+        (rows, multipliers): (&[usize], &[T]),
+        forces: &mut [T],
+        response: &mut [T],
+    ) {
+        forces.fill(T::zero());
+        for (&row, &lambda) in rows.iter().zip(multipliers) {
+            g.interface_scatter(row, lambda, forces);
+        }
+        if self.contact == ContactPath::Apart {
+            response.fill(T::zero());
+            for ((response, &force), &reciprocal) in response.iter_mut().zip(&*forces).zip(&self.reciprocals) {
+                *response = force * reciprocal;
+            }
+            return;
+        }
+        self.responses.respond((rows, multipliers), forces, response);
+    }
+
+    /// Forgets the Delassus operator of other rows than those of this version.
     pub(crate) fn follow(&mut self, rows: u64) {
         if self.rows != rows {
             self.rows = rows;
-            self.reset();
+            self.responses.forget_rows();
+            self.delassus.version = 0;
         }
     }
 
+    /// Forgets what was computed with another matrix.
     fn reset(&mut self) {
-        self.computed.fill(false);
+        self.responses.reset();
+        self.reciprocals.clear();
         self.delassus.version = 0;
     }
 

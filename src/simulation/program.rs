@@ -258,8 +258,8 @@ pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) h: f64,
     /// Where tangents are first taken.
     pub(crate) at: At<'c, T>,
-    /// Contact rows to reserve responses for, and the dofs they act on.
-    pub(crate) contact: (usize, &'c [usize]),
+    /// The free dofs that contact may ever act on.
+    pub(crate) interface: &'c [usize],
 }
 
 impl<T: Real> Compiler<'_, T> {
@@ -292,7 +292,7 @@ impl<T: Real> Compiler<'_, T> {
                     weights,
                     self.h,
                     self.at,
-                    self.contact,
+                    self.interface,
                 )?);
             }
             let increment = stage.increment();

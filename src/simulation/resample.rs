@@ -9,6 +9,7 @@ use super::stability::{self, StepLimit};
 use super::start::{self, Begun, Start, Violation};
 use super::tangent::{At, TangentOf};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact_solver::FORESEEN;
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
 use crate::real::Real;
@@ -166,13 +167,13 @@ impl<T: Real> Simulation<'_, T> {
         let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
         let Begun { state: begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
-        let rows = constraints.capacity();
-        contact_solver.reserve(rows);
+        work.contact.rows.reserved = constraints.capacity().min(FORESEEN);
+        contact_solver.reserve(work.contact.rows.reserved);
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {
-            let contact = (rows, constraints.interface());
+            let interface = constraints.interface();
             let at = At { t, u: &begun.motion.u, v: &begun.motion.v, of: TangentOf::State };
-            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, contact };
+            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, interface };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);

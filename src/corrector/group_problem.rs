@@ -1,0 +1,73 @@
+//! The contact problem of S = G M⁻¹ Gᵀ, a group of rows at a time: S couples no two of them.
+
+use super::JumpProjection;
+use crate::contact::{ContactId, ContactJacobian};
+use crate::contact_solver::{Bound, ContactProblem, ContactSolver, FORESEEN, contact_error};
+use crate::error::Result;
+use crate::real::Real;
+
+/// Memory for the problem of a group.
+#[derive(Debug)]
+pub(super) struct GroupProblem<T> {
+    rows: Vec<usize>,
+    s: Vec<T>,
+    offset: Vec<T>,
+    bounds: Vec<Bound>,
+    tolerance: Vec<T>,
+    multipliers: Vec<T>,
+}
+
+/// Some rows, what their multipliers may be, and what multipliers must remove, with its rounding.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jumps<'j, T> {
+    pub(super) rows: &'j [usize],
+    pub(super) bounds: &'j [Bound],
+    pub(super) jump: &'j [T],
+    pub(super) tolerance: &'j [T],
+}
+
+impl<T: Real> GroupProblem<T> {
+    /// Room for the groups of up to so many rows, as far as they are not rare.
+    pub(super) fn new(rows: usize) -> Self {
+        let rows = rows.min(FORESEEN);
+        let reals = |n| Vec::with_capacity(n);
+        let (offset, tolerance, multipliers) = (reals(rows), reals(rows), reals(rows));
+        let bounds = Vec::with_capacity(rows);
+        Self { rows: Vec::with_capacity(rows), s: reals(rows * rows), offset, bounds, tolerance, multipliers }
+    }
+
+    /// Finds the multipliers x with S x + jump in its bounds; x holds a guess on entry. `id` names the contact of a row,
+    /// for the error at time t.
+    pub(super) fn solve(
+        &mut self,
+        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        solver: &mut dyn ContactSolver<T>,
+        jumps: Jumps<'_, T>,
+        x: &mut [T],
+        (t, id): (f64, impl Fn(usize) -> ContactId),
+    ) -> Result<()> {
+        let Self { rows, s, offset, bounds, tolerance, multipliers } = self;
+        projection.sort(g, jumps.rows);
+        for group in 0..projection.groups().len() {
+            rows.clear();
+            offset.clear();
+            bounds.clear();
+            tolerance.clear();
+            multipliers.clear();
+            for &position in projection.groups().group(group) {
+                rows.push(jumps.rows[position]);
+                offset.push(jumps.jump[position]);
+                bounds.push(jumps.bounds[position]);
+                tolerance.push(jumps.tolerance[position]);
+                multipliers.push(x[position]);
+            }
+            projection.assemble(g, rows, s);
+            let problem = ContactProblem { delassus: s, offset, bounds, tolerance, version: 0 };
+            solver.solve(&problem, multipliers).map_err(|failure| contact_error(t, failure, |row| id(rows[row])))?;
+            for (&position, &multiplier) in projection.groups().group(group).iter().zip(multipliers.iter()) {
+                x[position] = multiplier;
+            }
+        }
+        Ok(())
+    }
+}

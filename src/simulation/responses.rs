@@ -1,0 +1,142 @@
+//! Responses of the interface to unit forces, kept for what has been pressed.
+//!
+//! Where the matrix stays they belong to dofs: rows that turn cost products then, and no solve. Where it changes with
+//! every iteration they are solved for again anyway, and belong to rows, of which there are fewer.
+
+use crate::contact::ContactJacobian;
+use crate::error::Result;
+use crate::linear_solver::COLUMNS;
+use crate::memory;
+use crate::real::Real;
+
+/// What a column is the response to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unit {
+    /// A unit force on a dof of the interface.
+    Dof,
+    /// A unit multiplier of a row.
+    Row,
+}
+
+/// Columns of displacements of the interface, filled when first needed.
+#[derive(Debug)]
+pub(super) struct Responses<T> {
+    unit: Unit,
+    /// Number of dofs on the interface.
+    size: usize,
+    /// For each dof there, or each row, the number of its column.
+    slots: Vec<usize>,
+    /// The columns, in blocks: none is moved when more are needed.
+    blocks: Vec<Vec<T>>,
+    columns: usize,
+    /// The dofs or rows whose columns are missing.
+    missing: Vec<usize>,
+}
+
+/// A dof or row without a column, and one that is about to get one.
+const NONE: usize = usize::MAX;
+const MISSING: usize = usize::MAX - 1;
+
+impl<T: Real> Responses<T> {
+    /// For an interface of so many dofs.
+    pub(super) fn new(unit: Unit, size: usize) -> Self {
+        Self { unit, size, slots: Vec::new(), blocks: Vec::new(), columns: 0, missing: Vec::new() }
+    }
+
+    /// Forgets all columns: they belong to another matrix. Their memory is used again.
+    pub(super) fn reset(&mut self) {
+        self.slots.clear();
+        self.columns = 0;
+    }
+
+    /// Forgets columns that belong to other rows.
+    pub(super) fn forget_rows(&mut self) {
+        if self.unit == Unit::Row {
+            self.reset();
+        }
+    }
+
+    /// Makes known what [`add_coupling`](Self::add_coupling) and [`respond`](Self::respond) need of some rows
+    /// (ascending); `solve` replaces up to [`COLUMNS`] columns of forces by their responses.
+    pub(super) fn prepare(
+        &mut self,
+        g: &ContactJacobian<T>,
+        rows: &[usize],
+        mut solve: impl FnMut(&mut [T]) -> Result<()>,
+    ) -> Result<()> {
+        let Self { unit, size, slots, blocks, columns, missing } = self;
+        slots.resize(if *unit == Unit::Row { g.rows() } else { *size }, NONE);
+        missing.clear();
+        let mut ask = |index: usize| {
+            if slots[index] == NONE {
+                slots[index] = MISSING;
+                missing.push(index);
+            }
+        };
+        for &row in rows {
+            match unit {
+                Unit::Row => ask(row),
+                Unit::Dof => g.located(row).for_each(|(place, _)| ask(place)),
+            }
+        }
+        // (Should a solve fail nothing is known of these.)
+        missing.iter().for_each(|&index| slots[index] = NONE);
+        let mut rest = &missing[..];
+        while !rest.is_empty() {
+            // Blocks are full but for the last one, which is filled up first.
+            let filled = *columns % COLUMNS;
+            let count = rest.len().min(COLUMNS - filled);
+            if blocks.len() * COLUMNS == *columns {
+                blocks.push(memory::zeros(COLUMNS, *size, "the responses of contact")?);
+            }
+            let block = &mut blocks[*columns / COLUMNS][filled * *size..(filled + count) * *size];
+            block.fill(T::zero());
+            for (&index, column) in rest.iter().zip(block.chunks_exact_mut(*size)) {
+                match unit {
+                    Unit::Row => g.interface_scatter(index, T::one(), column),
+                    Unit::Dof => column[index] = T::one(),
+                }
+            }
+            solve(block)?;
+            for &index in &rest[..count] {
+                slots[index] = *columns;
+                *columns += 1;
+            }
+            rest = &rest[count..];
+        }
+        Ok(())
+    }
+
+    /// The column of a dof or row that has one.
+    fn column(&self, index: usize) -> &[T] {
+        let (block, place) = (self.slots[index] / COLUMNS, self.slots[index] % COLUMNS);
+        &self.blocks[block][place * self.size..(place + 1) * self.size]
+    }
+
+    /// Column j of W = G A⁻¹ Gᵀ: adds G_i A⁻¹ G_jᵀ of all `rows` i to `out`, whose entries are `stride` apart.
+    pub(super) fn add_coupling(&self, g: &ContactJacobian<T>, j: usize, rows: &[usize], stride: usize, out: &mut [T]) {
+        let mut add = |weight: T, column: &[T]| {
+            for (entry, &i) in out.iter_mut().step_by(stride).zip(rows) {
+                *entry += weight * g.interface_product(i, column);
+            }
+        };
+        match self.unit {
+            Unit::Row => add(T::one(), self.column(j)),
+            Unit::Dof => g.located(j).for_each(|(place, weight)| add(weight, self.column(place))),
+        }
+    }
+
+    /// A⁻¹ Gᵀ λ of some rows, whose forces Gᵀ λ on the interface are known.
+    pub(super) fn respond(&self, (rows, multipliers): (&[usize], &[T]), forces: &[T], response: &mut [T]) {
+        response.fill(T::zero());
+        let mut add = |index: usize, factor: T| {
+            if factor != T::zero() {
+                T::axpy(factor, self.column(index), response);
+            }
+        };
+        match self.unit {
+            Unit::Row => rows.iter().zip(multipliers).for_each(|(&row, &lambda)| add(row, lambda)),
+            Unit::Dof => forces.iter().enumerate().for_each(|(place, &force)| add(place, force)),
+        }
+    }
+}
