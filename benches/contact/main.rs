@@ -1,7 +1,10 @@
 //! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the
 //! work on the interface alone: condensation, responses, the contact solver.
 //!
-//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20)
+//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed` for the steps with few and many
+//! pressed contacts alone.
+
+mod pressed;
 
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
 use contact_dynamics::{Composite, Factorization, LinearRows, PersistencyCorrection, Simulation};
@@ -22,6 +25,10 @@ const INTERFACE: &[Ratio] = &[Ratio { heading: "/ bare solve", to: &["bare solve
 
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
+    pressed::measure(&arguments);
+    if std::env::args().any(|argument| argument == "pressed") {
+        return;
+    }
     for &n in &arguments.sizes {
         measure(n, &arguments);
     }
