@@ -2,7 +2,7 @@
 
 use contact_dynamics_scenes::tables;
 
-const PAGE: &str = include_str!("../docs/schemes.md");
+const PAGE: &str = include_str!("../../docs/schemes.md");
 
 #[test]
 fn tables_of_the_page_are_those_of_the_code() {

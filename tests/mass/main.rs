@@ -1,0 +1,4 @@
+//! Masses: lumped, blended, redistributed, singular and reciprocal ones.
+
+mod blend;
+mod redistribution;
