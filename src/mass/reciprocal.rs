@@ -30,7 +30,7 @@ use faer::sparse::SparseColMat;
 /// price of frequencies too low.
 ///
 /// Supports: leave rows and columns of fixed dofs out, as if they had no momentum; a bar fixed at one end keeps these
-/// orders (`tests/partitioned/main.rs`).
+/// orders (`tests/mass/reciprocal.rs`).
 ///
 /// Known failure: elements with row sums that are not positive (quadratic ones) are refused.
 ///

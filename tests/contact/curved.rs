@@ -2,13 +2,13 @@
 //! corrected.
 
 use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::ContactLevel;
 use contact_dynamics::{
     Corrector, EnergyMomentum, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::curved::{Drift, SCENES, Scene};
 use contact_dynamics_scenes::schemes::{self, Listed};
+use contact_dynamics_scenes::sparse::matrix;
 
 type Correctors = Vec<Box<dyn Corrector<f64>>>;
 
@@ -83,7 +83,7 @@ fn schemes_that_conserve_energy_conserve_it_on_curves() {
 #[test]
 fn single_precision_follows_to_its_own_rounding() {
     let bowl = Sphere::new([0.0_f32, 0.0], 1.0, Side::Inside).unwrap();
-    let none = SparseColMat::<usize, f32>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let none = matrix::<f32>(2, [(0, 0, 0.0)]);
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
         [|| Box::new(Newmark::trapezoidal()), || Box::new(EnergyMomentum)];
     for make in schemes {

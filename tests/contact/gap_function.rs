@@ -2,18 +2,9 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactId, ContactJacobian, GapFunction, GapRates};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::{
-    ContactConstraint, ContactLaw, Error, LinearSystem, Newmark, PersistencyCorrection, Simulation, verify,
-};
+use contact_dynamics::{ContactConstraint, ContactLaw, Error, Newmark, PersistencyCorrection, Simulation, verify};
+use contact_dynamics_scenes::sparse::free;
 use proptest::prelude::*;
-
-/// Free masses.
-fn masses(count: usize) -> LinearSystem<'static, f64> {
-    let none: Vec<_> = (0..count).map(|i| Triplet::new(i, i, 0.0)).collect();
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(count, count, &none).unwrap();
-    LinearSystem::lumped(vec![1.0; count], k).unwrap()
-}
 
 /// Two points of the plane at most `length` apart, which shrinks with time.
 fn rope(places: [f64; 4], length: f64) -> impl FnMut(f64, &[f64], &[f64], &mut [f64]) -> [f64; 3] + Send {
@@ -121,7 +112,7 @@ fn wrong_sizes_are_refused() {
     contact.check(6).unwrap();
     assert!(matches!(contact.search(0.0, &[0.0; 3], &[0.0; 3], 0.0), Err(Error::MissingDof { .. })));
     assert!(matches!(contact.follow(0.0, &[0.0; 3]), Err(Error::MissingDof { .. })));
-    let built = Simulation::builder(masses(4), Newmark::trapezoidal(), 0.1).constraint(both()).build();
+    let built = Simulation::builder(free(&[1.0; 4]), Newmark::trapezoidal(), 0.1).constraint(both()).build();
     assert!(matches!(built, Err(Error::MissingDof { .. })));
     for scale in [0.0, -1.0, f64::NAN] {
         assert!(matches!(both().scale(scale), Err(Error::Parameter { .. })));
@@ -149,7 +140,7 @@ fn gaps_that_are_no_numbers_fail_the_step() {
     assert_eq!(contact.follow(0.0, &[-0.4]).unwrap(), Candidates::Unchanged);
     assert_eq!(gaps(&mut contact, 0.0, &[-0.4]), [0.6]);
     let name = ContactId { constraint: 0, feature: 0, candidate: 0 };
-    let mut run = Simulation::builder(masses(1), Newmark::trapezoidal(), 0.1)
+    let mut run = Simulation::builder(free(&[1.0; 1]), Newmark::trapezoidal(), 0.1)
         .velocity(vec![-1.0])
         .constraint(GapFunction::new(&[0], broken))
         .build()
@@ -159,7 +150,7 @@ fn gaps_that_are_no_numbers_fail_the_step() {
     assert!(failed.is_recoverable());
 
     let unwritten = GapFunction::new(&[0], |_, x: &[f64], _: &[f64], _: &mut [f64]| [1.0 + x[0], 0.0, 0.0]);
-    let built = Simulation::builder(masses(1), Newmark::trapezoidal(), 0.1).constraint(unwritten).build();
+    let built = Simulation::builder(free(&[1.0; 1]), Newmark::trapezoidal(), 0.1).constraint(unwritten).build();
     assert!(matches!(built, Err(Error::ContactNotFinite { .. })));
 }
 
@@ -172,7 +163,7 @@ fn a_tether_holds_two_particles_on_a_circle() {
         [value[0], 0.0, value[2] + 0.2]
     };
     let run = |h: f64| {
-        let mut run = Simulation::builder(masses(4), Newmark::trapezoidal(), h)
+        let mut run = Simulation::builder(free(&[1.0; 4]), Newmark::trapezoidal(), h)
             .velocity(vec![0.0, -speed, 0.0, speed])
             .constraint(GapFunction::new(&[0, 1, 2, 3], tether).scale(length).unwrap())
             .corrector(PersistencyCorrection::new())

@@ -1,24 +1,19 @@
 //! Contact laws: compliant ones against springs and Hertz' impact, restitution against bouncing balls and cradles.
 
 use contact_dynamics::contact::{ContactLaw, GapOffset};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{
     CdLagrange, CentralDifference, Composite, Error, GeneralizedAlpha, LinearRows, LinearSystem, MoreauJean, Newmark,
     PersistencyCorrection, Simulation, TchamwaWielgosz, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes;
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 /// Masses on springs to their neighbors and to the ground.
 fn chain(mass: &[f64], ground: &[f64], between: f64) -> LinearSystem<'static, f64> {
     let n = mass.len();
-    let mut triplets: Vec<_> = ground.iter().enumerate().map(|(i, &k)| Triplet::new(i, i, k)).collect();
-    for i in 1..n {
-        for (r, c, sign) in [(i - 1, i - 1, 1.0), (i, i, 1.0), (i - 1, i, -1.0), (i, i - 1, -1.0)] {
-            triplets.push(Triplet::new(r, c, sign * between));
-        }
-    }
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).unwrap();
+    let ground = ground.iter().enumerate().map(|(i, &k)| (i, i, k));
+    let k = matrix(n, ground.chain(springs(n, between)));
     LinearSystem::lumped(mass.to_vec(), k).unwrap()
 }
 

@@ -3,23 +3,10 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactId, ContactJacobian, ContactLaw, Facet, GapRates, NodeToFacet};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{Composite, ContactConstraint, Error, LinearSystem, PersistencyCorrection, Simulation};
+use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::sparse::{matrix, spring};
 use proptest::prelude::*;
-
-/// Uniform numbers in [−1, 1), the same in every run.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self, length: usize, size: f64) -> Vec<f64> {
-        (0..length).map(|_| size * self.next()).collect()
-    }
-}
 
 /// Nodes with dofs in their order, and facets.
 #[derive(Clone, Debug, Default)]
@@ -93,10 +80,10 @@ fn grid(n: usize, cells: Cells, z: impl Fn(f64, f64) -> f64) -> Mesh<3> {
 }
 
 /// The surface of a cube [−1, 1]³ of quadrilaterals with displaced corners: warped and closed.
-fn box_of_quadrilaterals(random: &mut Random, warp: f64) -> Mesh<3> {
+fn box_of_quadrilaterals(random: &mut Congruential, warp: f64) -> Mesh<3> {
     let mut mesh = Mesh::default();
     mesh.nodes(
-        (0..8).map(|k| std::array::from_fn(|i| if k >> i & 1 == 0 { -1.0 } else { 1.0 } + warp * random.next())),
+        (0..8).map(|k| std::array::from_fn(|i| if k >> i & 1 == 0 { -1.0 } else { 1.0 } + warp * random.signed())),
     );
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     mesh.facets.extend(sides.map(Facet::from));
@@ -158,7 +145,7 @@ fn imbalance<const D: usize>(contact: &NodeToFacet<f64>, positions: &[[f64; D]])
     worst
 }
 
-fn check_derivative<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Random) {
+fn check_derivative<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Congruential) {
     let (step, reach) = (1e-6, 0.8);
     let mut contact = mesh.contact(nodes, reach);
     let u = random.vector(mesh.size(), 0.05);
@@ -193,30 +180,33 @@ fn check_derivative<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mu
 
 #[test]
 fn rows_are_derivatives_of_the_gap() {
-    let mut random = Random(1);
+    let mut random = Congruential(1);
     for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
         // Flat, then curved; facets move as well.
         for height in [0.0, 0.3] {
             let mut mesh = grid(4, cells, |x, y| height * (x * 1.3).sin() * (y * 0.9).cos());
-            let nodes: Vec<_> =
-                (0..60).map(|_| [2.0 + 1.9 * random.next(), 2.0 + 1.9 * random.next(), 0.5 * random.next()]).collect();
+            let nodes: Vec<_> = (0..60)
+                .map(|_| [2.0 + 1.9 * random.signed(), 2.0 + 1.9 * random.signed(), 0.5 * random.signed()])
+                .collect();
             let nodes = mesh.nodes(nodes);
             check_derivative(&mesh, &nodes, &mut random);
         }
     }
     let mut mesh = polygon(9);
-    let nodes: Vec<_> = (0..60).map(|_| [random.next(), random.next()]).map(|x: [f64; 2]| x.map(|x| 1.1 * x)).collect();
+    let nodes: Vec<_> =
+        (0..60).map(|_| [random.signed(), random.signed()]).map(|x: [f64; 2]| x.map(|x| 1.1 * x)).collect();
     let nodes = mesh.nodes(nodes);
     check_derivative(&mesh, &nodes, &mut random);
 }
 
 #[test]
 fn translations_leave_gaps_and_rows_balance() {
-    let mut random = Random(2);
+    let mut random = Congruential(2);
     for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
         let mut mesh = grid(5, cells, |x, y| 0.2 * (x * 1.7).sin() + 0.1 * (y * y * 0.3).cos());
-        let cloud: Vec<_> =
-            (0..200).map(|_| [2.5 + 2.6 * random.next(), 2.5 + 2.6 * random.next(), 0.8 * random.next()]).collect();
+        let cloud: Vec<_> = (0..200)
+            .map(|_| [2.5 + 2.6 * random.signed(), 2.5 + 2.6 * random.signed(), 0.8 * random.signed()])
+            .collect();
         let nodes = mesh.nodes(cloud);
         let mut contact = mesh.contact(&nodes, 0.7);
         let u = random.vector(mesh.size(), 0.1);
@@ -269,10 +259,10 @@ fn sampled_distance(mesh: &Mesh<3>, p: [f64; 3]) -> f64 {
 
 #[test]
 fn closest_points_of_warped_quadrilaterals_are_those_of_brute_force() {
-    let mut random = Random(3);
+    let mut random = Congruential(3);
     for warp in [0.0, 0.2, 0.35] {
         let mut mesh = box_of_quadrilaterals(&mut random, warp);
-        let cloud: Vec<[f64; 3]> = (0..40).map(|_| std::array::from_fn(|_| 1.8 * random.next())).collect();
+        let cloud: Vec<[f64; 3]> = (0..40).map(|_| std::array::from_fn(|_| 1.8 * random.signed())).collect();
         let shell = mesh.clone();
         let nodes = mesh.nodes(cloud);
         let mut contact = mesh.contact(&nodes, 3.0);
@@ -293,7 +283,7 @@ fn closest_points_of_warped_quadrilaterals_are_those_of_brute_force() {
 
 /// The surface of an octahedron, its triangles halved in both directions, with corners at random distances from the
 /// origin.
-fn star(random: &mut Random) -> Mesh<3> {
+fn star(random: &mut Congruential) -> Mesh<3> {
     let mut mesh = Mesh::<3>::default();
     let mut node = |x: [f64; 3]| match mesh.coordinates.iter().position(|y| *y == x) {
         Some(node) => node,
@@ -314,7 +304,7 @@ fn star(random: &mut Random) -> Mesh<3> {
     }
     mesh.facets = facets;
     for x in &mut mesh.coordinates {
-        let stretch = (1.0 + 0.6 * random.next()) / x[0].hypot(x[1]).hypot(x[2]);
+        let stretch = (1.0 + 0.6 * random.signed()) / x[0].hypot(x[1]).hypot(x[2]);
         *x = x.map(|x| stretch * x);
     }
     mesh
@@ -336,12 +326,12 @@ fn is_inside(mesh: &Mesh<3>, p: [f64; 3]) -> bool {
 
 #[test]
 fn signs_on_jagged_bodies_are_right() {
-    let mut random = Random(6);
+    let mut random = Congruential(6);
     let (mut inside, mut outside) = (0, 0);
     for _ in 0..30 {
         let mut mesh = star(&mut random);
         let shell = mesh.clone();
-        let cloud: Vec<[f64; 3]> = (0..100).map(|_| std::array::from_fn(|_| 1.1 * random.next())).collect();
+        let cloud: Vec<[f64; 3]> = (0..100).map(|_| std::array::from_fn(|_| 1.1 * random.signed())).collect();
         let nodes = mesh.nodes(cloud);
         let mut contact = mesh.contact(&nodes, 4.0);
         let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
@@ -476,12 +466,13 @@ fn beyond_the_rim_there_is_no_row() {
 
 #[test]
 fn kept_lists_find_what_all_facets_give() {
-    let mut random = Random(4);
+    let mut random = Congruential(4);
     for cells in [Cells::Quadrilaterals, Cells::Mixed] {
         let mut mesh = grid(8, cells, |x, y| 0.3 * (x + 0.5 * y).sin());
         let surface = mesh.coordinates.len();
-        let cloud: Vec<_> =
-            (0..150).map(|_| [4.0 + 4.0 * random.next(), 4.0 + 4.0 * random.next(), 0.6 * random.next()]).collect();
+        let cloud: Vec<_> = (0..150)
+            .map(|_| [4.0 + 4.0 * random.signed(), 4.0 + 4.0 * random.signed(), 0.6 * random.signed()])
+            .collect();
         let nodes = mesh.nodes(cloud);
         let mut kept = mesh.contact(&nodes, 0.4).skin(0.2).unwrap();
         // A skin that is never used up: every node looks at every facet.
@@ -539,10 +530,10 @@ fn far_bodies_have_no_candidates_and_flying_bodies_keep_their_lists() {
 
 #[test]
 fn searches_between_rebuilds_do_not_allocate() {
-    let mut random = Random(7);
+    let mut random = Congruential(7);
     let mut mesh = grid(6, Cells::Mixed, |x, y| 0.2 * (x * y).sin());
     let cloud: Vec<_> =
-        (0..60).map(|_| [3.0 + 3.0 * random.next(), 3.0 + 3.0 * random.next(), 0.3 * random.next()]).collect();
+        (0..60).map(|_| [3.0 + 3.0 * random.signed(), 3.0 + 3.0 * random.signed(), 0.3 * random.signed()]).collect();
     let nodes = mesh.nodes(cloud);
     let mut contact = mesh.contact(&nodes, 0.4);
     let mut u = vec![0.0; mesh.size()];
@@ -551,7 +542,7 @@ fn searches_between_rebuilds_do_not_allocate() {
     let counted = allocation_counter::measure(|| {
         for _ in 0..50 {
             for u in &mut u {
-                *u += 0.001 * random.next();
+                *u += 0.001 * random.signed();
             }
             changes += usize::from(contact.search(0.0, &u, &u, 0.0).unwrap() == Candidates::Changed);
             candidates += contact.candidates();
@@ -563,7 +554,7 @@ fn searches_between_rebuilds_do_not_allocate() {
 
 #[test]
 fn two_passes_treat_both_surfaces_alike() {
-    let mut random = Random(5);
+    let mut random = Congruential(5);
     // Two wavy surfaces that face each other; the upper one looks down.
     let mut mesh = grid(5, Cells::Mixed, |x, y| 0.1 * (2.0 * x).sin() * y.cos());
     let lower_facets = std::mem::take(&mut mesh.facets);
@@ -637,14 +628,15 @@ fn pressure_on_matching_meshes_is_passed_on() {
 
 #[test]
 fn a_run_may_start_with_touching_surfaces() {
-    let mut random = Random(8);
+    let mut random = Congruential(8);
     // A tilted plane, and nodes on it: coordinates carry rounding of either sign.
     let mut mesh = grid(4, Cells::Mixed, |_, _| 0.0);
     let tilt = |[x, y, _]: [f64; 3]| [0.6 * x - 0.3 * y + 7.0, 0.7 * y, 0.8 * x + 0.1 * y - 3.0];
     for x in &mut mesh.coordinates {
         *x = tilt(*x);
     }
-    let touching: Vec<_> = (0..50).map(|_| tilt([2.0 + 1.9 * random.next(), 2.0 + 1.9 * random.next(), 0.0])).collect();
+    let touching: Vec<_> =
+        (0..50).map(|_| tilt([2.0 + 1.9 * random.signed(), 2.0 + 1.9 * random.signed(), 0.0])).collect();
     let nodes = mesh.nodes(touching);
     let mut contact = mesh.contact(&nodes, 0.3);
     let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
@@ -652,7 +644,7 @@ fn a_run_may_start_with_touching_surfaces() {
     assert!(found.iter().all(|row| row.1.abs() < 1e-14), "{found:?}");
     // A run may start there, and rests.
     let masses = vec![1.0; mesh.size()];
-    let stiffness = SparseColMat::try_new_from_triplets(mesh.size(), mesh.size(), &[]).unwrap();
+    let stiffness = matrix(mesh.size(), []);
     let system = LinearSystem::lumped(masses, stiffness).unwrap();
     let mut run = Simulation::builder(system, Composite, 1e-3).constraint(contact).build().unwrap();
     run.step().unwrap();
@@ -787,13 +779,8 @@ fn a_run_with_candidates_that_change() {
     let coordinates = [[2.0, 0.0], [1.0, 0.05], [0.0, 0.0], [0.4, 0.2]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
     let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(0.1).unwrap();
-    let mut triplets = Vec::new();
-    for (i, j) in [(0, 2), (1, 3), (2, 4), (3, 5), (0, 4), (1, 5)] {
-        for (row, column, k) in [(i, i, 50.0), (j, j, 50.0), (i, j, -50.0), (j, i, -50.0)] {
-            triplets.push(Triplet::new(row, column, k));
-        }
-    }
-    let stiffness = SparseColMat::try_new_from_triplets(8, 8, &triplets).unwrap();
+    let ties = [(0, 2), (1, 3), (2, 4), (3, 5), (0, 4), (1, 5)];
+    let stiffness = matrix(8, ties.into_iter().flat_map(|(i, j)| spring(i, j, 50.0)));
     let mass = vec![2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.0];
     let start = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0];
     let system = LinearSystem::lumped(mass, stiffness).unwrap();
@@ -822,8 +809,8 @@ fn a_run_with_candidates_that_change() {
 }
 
 /// Displacements that differ from others by up to `size`.
-fn shaken(u: &[f64], random: &mut Random, size: f64) -> Vec<f64> {
-    u.iter().map(|u| u + size * random.next()).collect()
+fn shaken(u: &[f64], random: &mut Congruential, size: f64) -> Vec<f64> {
+    u.iter().map(|u| u + size * random.signed()).collect()
 }
 
 fn gaps_now(contact: &mut NodeToFacet<f64>, u: &[f64]) -> Vec<f64> {
@@ -868,11 +855,12 @@ fn check_follow(contact: &mut NodeToFacet<f64>, fresh: &mut NodeToFacet<f64>, fr
 
 #[test]
 fn followed_rows_are_those_of_a_search() {
-    let mut random = Random(11);
+    let mut random = Congruential(11);
     for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
         let mut mesh = grid(6, cells, |x, y| 0.3 * (x * 1.3).sin() * (y * 0.9).cos());
-        let cloud: Vec<_> =
-            (0..100).map(|_| [3.0 + 2.0 * random.next(), 3.0 + 2.0 * random.next(), 0.6 * random.next()]).collect();
+        let cloud: Vec<_> = (0..100)
+            .map(|_| [3.0 + 2.0 * random.signed(), 3.0 + 2.0 * random.signed(), 0.6 * random.signed()])
+            .collect();
         let nodes = mesh.nodes(cloud);
         let (mut contact, mut fresh) = (mesh.contact(&nodes, 1.0), mesh.contact(&nodes, 1.0));
         let u = random.vector(mesh.size(), 0.05);
@@ -884,7 +872,7 @@ fn followed_rows_are_those_of_a_search() {
 
 #[test]
 fn both_passes_are_followed() {
-    let mut random = Random(12);
+    let mut random = Congruential(12);
     let mut mesh = grid(5, Cells::Mixed, |x, y| 0.1 * (2.0 * x).sin() * y.cos());
     let other = grid(3, Cells::Quadrilaterals, |x, y| 0.15 + 0.1 * x.cos() * (1.5 * y).sin());
     let upper = mesh.nodes(other.coordinates.iter().map(|x| [0.95 + x[0], 0.87 + x[1], x[2]]));
@@ -908,21 +896,21 @@ proptest! {
     /// On closed bodies no node is lost, however it moves: through the body, over sides and vertices.
     #[test]
     fn any_motion_on_a_closed_body_is_followed(seed in any::<u64>(), start in 0.0..0.2_f64, motion in 0.0..0.6_f64) {
-        let mut random = Random(seed);
+        let mut random = Congruential(seed);
         let mut mesh = box_of_quadrilaterals(&mut random, 0.2);
-        let cloud: Vec<[f64; 3]> = (0..20).map(|_| std::array::from_fn(|_| 1.5 * random.next())).collect();
+        let cloud: Vec<[f64; 3]> = (0..20).map(|_| std::array::from_fn(|_| 1.5 * random.signed())).collect();
         let nodes = mesh.nodes(cloud);
         let u = random.vector(mesh.size(), start);
         // Facets stay convex.
         let mut to = shaken(&u, &mut random, motion.min(0.2));
         for u in &mut to[24..] {
-            *u += motion * random.next();
+            *u += motion * random.signed();
         }
         let [compared, _] = check_follow(&mut mesh.contact(&nodes, 4.0), &mut mesh.contact(&nodes, 4.0), &u, &to);
         prop_assert_eq!(compared, 20);
 
         let mut mesh = polygon(7);
-        let cloud: Vec<[f64; 2]> = (0..20).map(|_| [1.5 * random.next(), 1.5 * random.next()]).collect();
+        let cloud: Vec<[f64; 2]> = (0..20).map(|_| [1.5 * random.signed(), 1.5 * random.signed()]).collect();
         let nodes = mesh.nodes(cloud);
         let u = random.vector(mesh.size(), start);
         let to = shaken(&u, &mut random, motion.min(0.3));
@@ -1066,10 +1054,10 @@ fn accelerations(contact: &mut NodeToFacet<f64>, u: &[f64], v: &[f64]) -> Vec<f6
 
 #[test]
 fn following_and_rates_do_not_allocate() {
-    let mut random = Random(13);
+    let mut random = Congruential(13);
     let mut mesh = grid(6, Cells::Mixed, |x, y| 0.2 * (x * y).sin());
     let cloud: Vec<_> =
-        (0..60).map(|_| [3.0 + 2.5 * random.next(), 3.0 + 2.5 * random.next(), 0.3 * random.next()]).collect();
+        (0..60).map(|_| [3.0 + 2.5 * random.signed(), 3.0 + 2.5 * random.signed(), 0.3 * random.signed()]).collect();
     let nodes = mesh.nodes(cloud);
     let mut contact = mesh.contact(&nodes, 0.4);
     let mut u = vec![0.0; mesh.size()];
@@ -1078,7 +1066,7 @@ fn following_and_rates_do_not_allocate() {
     let counted = allocation_counter::measure(|| {
         for _ in 0..20 {
             for u in &mut u {
-                *u += 0.001 * random.next();
+                *u += 0.001 * random.signed();
             }
             assert_eq!(contact.follow(0.0, &u).unwrap(), Candidates::Changed);
             contact.rates(0.0, &u, &u, &mut rates);
@@ -1090,7 +1078,7 @@ fn following_and_rates_do_not_allocate() {
 
 /// Compares rates with differences of gaps that are searched for along u + s v; returns how many rows were compared,
 /// and how many of them on a side or a vertex.
-fn check_acceleration<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Random) -> [usize; 2] {
+fn check_acceleration<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &mut Congruential) -> [usize; 2] {
     let step = 2e-3;
     let mut contact = mesh.contact(nodes, 0.8);
     let u = random.vector(mesh.size(), 0.05);
@@ -1133,12 +1121,13 @@ fn check_acceleration<const D: usize>(mesh: &Mesh<D>, nodes: &[usize], random: &
 
 #[test]
 fn rates_are_the_second_derivatives_of_gaps() {
-    let mut random = Random(14);
+    let mut random = Congruential(14);
     for cells in [Cells::Quadrilaterals, Cells::Triangles, Cells::Mixed] {
         for height in [0.0, 0.4] {
             let mut mesh = grid(4, cells, |x, y| height * (x * 1.9).sin() * (y * 1.4).cos());
-            let cloud: Vec<_> =
-                (0..150).map(|_| [2.0 + 1.9 * random.next(), 2.0 + 1.9 * random.next(), 0.7 * random.next()]).collect();
+            let cloud: Vec<_> = (0..150)
+                .map(|_| [2.0 + 1.9 * random.signed(), 2.0 + 1.9 * random.signed(), 0.7 * random.signed()])
+                .collect();
             let nodes = mesh.nodes(cloud);
             let [compared, around] = check_acceleration(&mesh, &nodes, &mut random);
             assert!(compared > 60, "{compared}");
@@ -1146,7 +1135,7 @@ fn rates_are_the_second_derivatives_of_gaps() {
         }
     }
     let mut mesh = polygon(6);
-    let cloud: Vec<[f64; 2]> = (0..100).map(|_| [1.3 * random.next(), 1.3 * random.next()]).collect();
+    let cloud: Vec<[f64; 2]> = (0..100).map(|_| [1.3 * random.signed(), 1.3 * random.signed()]).collect();
     let nodes = mesh.nodes(cloud);
     let [compared, around] = check_acceleration(&mesh, &nodes, &mut random);
     assert!(compared > 40 && around > 5, "{compared} {around}");
@@ -1154,17 +1143,17 @@ fn rates_are_the_second_derivatives_of_gaps() {
 
 #[test]
 fn bodies_that_turn_together_have_no_gap_acceleration() {
-    let mut random = Random(15);
+    let mut random = Congruential(15);
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     for touching in [false, true] {
         let mut mesh = grid(4, Cells::Mixed, |x, y| if touching { 0.0 } else { 0.4 * (x * 1.9).sin() * y.cos() });
         let cloud: Vec<_> = (0..100)
             .map(|k| {
-                let z = if touching { 0.0 } else { 0.5 * random.next() };
+                let z = if touching { 0.0 } else { 0.5 * random.signed() };
                 // Some on sides and vertices.
                 let round = |x: f64| if k % 3 == 0 { x.round() } else { x };
-                [round(2.0 + 1.9 * random.next()), 2.0 + 1.9 * random.next(), z]
+                [round(2.0 + 1.9 * random.signed()), 2.0 + 1.9 * random.signed(), z]
             })
             .collect();
         let nodes = mesh.nodes(cloud);
@@ -1196,8 +1185,7 @@ fn a_bead_on_a_turning_rod_is_pushed_by_it() {
         let coordinates = [[4.0, 0.0], [0.0, 0.0], [0.5, 0.0]];
         let dofs = [[0, 1], [2, 3], [4, 5]];
         let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[0, 1]]).unwrap();
-        let none: Vec<_> = (0..6).map(|i| Triplet::new(i, i, 0.0)).collect();
-        let stiffness = SparseColMat::try_new_from_triplets(6, 6, &none).unwrap();
+        let stiffness = matrix(6, (0..6).map(|i| (i, i, 0.0)));
         let end = move |axis: usize| {
             move |t: f64| {
                 let (sin, cos) = (omega * t).sin_cos();

@@ -2,20 +2,18 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
     PersistencyCorrection, Result, Simulation, verify,
 };
+use contact_dynamics_scenes::sparse::free;
 use proptest::prelude::*;
 
 /// Free particles in D dimensions under gravity along the last axis.
 fn particles<const D: usize>(count: usize, gravity: f64) -> LinearSystem<'static, f64> {
     let n = D * count;
-    let none: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &none).unwrap();
     let load = move |_: f64, f: &mut [f64]| (0..n).for_each(|i| f[i] = if i % D == D - 1 { -gravity } else { 0.0 });
-    LinearSystem::lumped(vec![1.0; n], k).unwrap().load(load)
+    free(&vec![1.0; n]).load(load)
 }
 
 /// Particles at these places on an obstacle.

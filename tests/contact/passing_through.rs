@@ -3,11 +3,11 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Cylinder, Obstacle, Plane, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     ContactConstraint, ContactLaw, Error, LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
     StepControl,
 };
+use contact_dynamics_scenes::sparse::free;
 
 /// Largest error of the energy after the impact, over that before, and of the place, over the way of a step.
 const ENERGY: f64 = 0.12;
@@ -33,10 +33,7 @@ fn along<const D: usize>(x: [f64; D], s: f64, v: [f64; D]) -> [f64; D] {
 /// A particle and further dofs that are held.
 fn particle<const D: usize>(held: usize) -> LinearSystem<'static, f64> {
     let n = D + held;
-    let none: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &none).unwrap();
-    let free = LinearSystem::lumped(vec![1.0; n], k).unwrap();
-    (D..n).fold(free, |system, dof| system.fix(dof).unwrap())
+    (D..n).fold(free(&vec![1.0; n]), |system, dof| system.fix(dof).unwrap())
 }
 
 /// Flies until the particle has met something, or for the time given. What it does against a surface that moves with

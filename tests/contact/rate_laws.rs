@@ -3,14 +3,14 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactLaw, GapOffset, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
+use contact_dynamics::tableau::{ContactLevel, Rows, U, V, Z};
 use contact_dynamics::{
     Bathe, Bdf2, Composite, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
     NodesOnObstacle, PersistencyCorrection, Real, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::{Record, figures, record_run};
-use contact_dynamics_scenes::schemes::Listed;
+use contact_dynamics_scenes::schemes::{Listed, Tabulated};
+use contact_dynamics_scenes::sparse::{free, matrix, springs};
 use contact_dynamics_scenes::truss::Truss;
 use contact_dynamics_scenes::{Bars, schemes};
 
@@ -49,13 +49,7 @@ fn impact(law: ContactLaw, bars: &Bars, scheme: impl TimeIntegrator + 'static) -
 /// Free masses on a line, tied to their neighbors by springs.
 fn chain(mass: &[f64], between: f64) -> LinearSystem<'static, f64> {
     let n = mass.len();
-    let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
-    for i in 1..n {
-        for (r, c, sign) in [(i - 1, i - 1, 1.0), (i, i, 1.0), (i - 1, i, -1.0), (i, i - 1, -1.0)] {
-            triplets.push(Triplet::new(r, c, sign * between));
-        }
-    }
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).unwrap();
+    let k = matrix(n, (0..n).map(|i| (i, i, 0.0)).chain(springs(n, between)));
     LinearSystem::lumped(mass.to_vec(), k).unwrap()
 }
 
@@ -471,9 +465,7 @@ fn followed_rows_meet_the_laws_where_the_step_ends() {
         let run = |newton: Option<Newton>, scheme: Box<dyn TimeIntegrator>| {
             let bowl = Sphere::new([0.0, radius], radius, Side::Inside).unwrap();
             let contact = NodesOnObstacle::new(bowl, &[start], &[[0, 1]], &[0]).unwrap().with_law(law);
-            let none: Vec<_> = (0..2).map(|i| Triplet::new(i, i, 0.0)).collect();
-            let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none).unwrap();
-            let system = LinearSystem::lumped(vec![1.0; 2], k).unwrap().load(move |_, f| f[1] = -g);
+            let system = free(&[1.0; 2]).load(move |_, f| f[1] = -g);
             let builder = Simulation::builder(system, scheme, h).constraint(contact);
             let builder = match newton {
                 Some(newton) => builder.newton(newton),
@@ -603,20 +595,6 @@ fn a_body_that_leaves_from_inside_is_open() {
     }
 }
 
-/// Displacements by the unknown, velocities of the past.
-#[derive(Debug)]
-struct Lagging;
-
-impl TimeIntegrator for Lagging {
-    fn name(&self) -> String {
-        "lagging".into()
-    }
-
-    fn tableau(&self) -> Tableau {
-        Tableau::single(Stage::new(Rows { u: Z, v: U[0] - U[1], a: Z - U[0] - V[0] }))
-    }
-}
-
 #[test]
 fn schemes_take_the_laws_they_can_serve() {
     let build = |scheme: Box<dyn TimeIntegrator>, law: ContactLaw| {
@@ -639,7 +617,9 @@ fn schemes_take_the_laws_they_can_serve() {
             }
         }
     }
-    assert!(build(Box::new(Lagging), ContactLaw::RateCondition).is_ok());
-    let refused = build(Box::new(Lagging), ContactLaw::PersistencySwitch).unwrap_err();
+    // Displacements by the unknown, velocities of the past.
+    let lagging = Tabulated::single("lagging", Rows { u: Z, v: U[0] - U[1], a: Z - U[0] - V[0] });
+    assert!(build(Box::new(lagging.clone()), ContactLaw::RateCondition).is_ok());
+    let refused = build(Box::new(lagging), ContactLaw::PersistencySwitch).unwrap_err();
     assert!(refused.to_string().contains("do not contain the unknown"), "{refused}");
 }

@@ -4,21 +4,8 @@ use contact_dynamics::Real;
 use contact_dynamics::contact_solver::{
     ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
-
-/// Reproducible numbers (Knuth's linear congruential generator).
-struct Random(u64);
-
-impl Random {
-    /// In [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-}
+use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::sparse::product;
 
 #[derive(Clone, Debug)]
 struct Problem<T = f64> {
@@ -69,7 +56,7 @@ fn gram(rows: &[Vec<f64>]) -> Vec<f64> {
 ///
 /// B has `rank` random rows of `columns` entries, then sums and differences of these. Many columns make W well
 /// conditioned, as Gauss–Seidel needs; with as few as `rank` or less it is as ill conditioned as random matrices are.
-fn random(random: &mut Random, size: usize, rank: usize, columns: usize, free: f64) -> (Problem, Vec<f64>) {
+fn random(random: &mut Congruential, size: usize, rank: usize, columns: usize, free: f64) -> (Problem, Vec<f64>) {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for i in 0..size {
         let row = if i < rank {
@@ -121,7 +108,7 @@ fn solve<T: Real>(
 /// Name, solver, and how far its y may be from the solution's, as a fraction of the largest |q_i|.
 type Listed<T> = (&'static str, Box<dyn ContactSolver<T>>, f64);
 
-/// Random rows can be nearly redundant as well, which is where Gauss–Seidel is slow.
+/// Congruential rows can be nearly redundant as well, which is where Gauss–Seidel is slow.
 const SWEEPS: usize = 100_000;
 
 /// The solvers that take redundant rows.
@@ -149,7 +136,7 @@ fn assert_solves(listed: &mut Listed<f64>, problem: &Problem, gaps: &[f64], gues
 
 #[test]
 fn solvers_agree_on_independent_rows() {
-    let (mut numbers, mut solvers) = (Random(1), general());
+    let (mut numbers, mut solvers) = (Congruential(1), general());
     for size in 1..=40 {
         for free in [0.0, 0.3] {
             let (problem, gaps) = random(&mut numbers, size, size, 2 * size + 2, free);
@@ -162,7 +149,7 @@ fn solvers_agree_on_independent_rows() {
 
 #[test]
 fn solvers_agree_on_redundant_rows() {
-    let (mut numbers, mut solvers) = (Random(2), general());
+    let (mut numbers, mut solvers) = (Congruential(2), general());
     for size in 2..=40_usize {
         for (rank, free) in [(size.div_ceil(2), 0.0), (size - 1, 0.0), (size.div_ceil(3), 0.2), (1, 0.1)] {
             let (problem, gaps) = random(&mut numbers, size, rank, 2 * rank + 2, free);
@@ -175,7 +162,7 @@ fn solvers_agree_on_redundant_rows() {
 
 #[test]
 fn exact_and_gradient_solvers_bear_bad_condition() {
-    let mut numbers = Random(3);
+    let mut numbers = Congruential(3);
     let mut solvers = general();
     solvers.retain(|(name, ..)| !name.contains("Gauss"));
     for size in 2..=40_usize {
@@ -191,7 +178,7 @@ fn exact_and_gradient_solvers_bear_bad_condition() {
 /// Nearly dependent rows, free ones among them, and far more rows than rank: where rounding can mislead pivots.
 #[test]
 fn pivoting_bears_nearly_dependent_rows() {
-    let (mut numbers, mut solver) = (Random(12), Pivoting::default());
+    let (mut numbers, mut solver) = (Congruential(12), Pivoting::default());
     for case in 0..1500_usize {
         let size = 1 + case % 60;
         let columns = [6, size / 2 + 1, 3 * size / 4 + 1][case % 3];
@@ -223,10 +210,10 @@ fn pivoting_shares_the_load_where_the_active_rows_know_too_little() {
 /// Small whole numbers, many of them zero: ties in every ratio, rows at λ = y = 0, equal and opposite rows.
 #[test]
 fn pivoting_solves_degenerate_problems() {
-    let mut numbers = Random(4);
+    let mut numbers = Congruential(4);
     for case in 0..3000 {
         let (size, columns) = (1 + case % 16, 1 + case % 5);
-        let digit = |numbers: &mut Random, low: f64, high: f64| numbers.within(low, high + 1.0).floor();
+        let digit = |numbers: &mut Congruential, low: f64, high: f64| numbers.within(low, high + 1.0).floor();
         let rows: Vec<Vec<f64>> =
             (0..size).map(|_| (0..columns).map(|_| digit(&mut numbers, -1.0, 1.0)).collect()).collect();
         let delassus = gram(&rows);
@@ -326,7 +313,7 @@ fn pivoting_judges_a_row_at_rest_beside_a_loaded_one() {
 
 #[test]
 fn guess_does_not_change_the_result() {
-    let (mut numbers, mut solvers) = (Random(5), general());
+    let (mut numbers, mut solvers) = (Congruential(5), general());
     for (size, rank) in [(1, 1), (5, 5), (12, 12), (12, 6), (30, 20)] {
         let (problem, gaps) = random(&mut numbers, size, rank, 2 * rank + 2, 0.2);
         let wild: Vec<f64> = (0..size).map(|_| numbers.within(-100.0, 100.0)).collect();
@@ -352,7 +339,7 @@ fn guess_does_not_change_the_result() {
 #[test]
 fn units_do_not_matter() {
     // Powers of two: the arithmetic is the same to the last bit.
-    let (problem, _) = random(&mut Random(6), 20, 15, 32, 0.2);
+    let (problem, _) = random(&mut Congruential(6), 20, 15, 32, 0.2);
     let (length, force) = (2_f64.powi(-40), 2_f64.powi(30));
     let mut scaled = problem.clone();
     scaled.delassus.iter_mut().for_each(|w| *w *= length / force);
@@ -366,7 +353,7 @@ fn units_do_not_matter() {
 
 #[test]
 fn single_precision_runs() {
-    let mut numbers = Random(7);
+    let mut numbers = Congruential(7);
     for size in 1..=30_usize {
         for rank in [size, size.div_ceil(2)] {
             let (exact, gaps) = random(&mut numbers, size, rank, 2 * rank + 2, 0.2);
@@ -388,7 +375,7 @@ fn single_precision_runs() {
 
 #[test]
 fn numbers_that_are_not_finite_are_refused() {
-    let (problem, _) = random(&mut Random(8), 6, 6, 14, 0.2);
+    let (problem, _) = random(&mut Congruential(8), 6, 6, 14, 0.2);
     for (name, mut solver, _) in general::<f64>() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for at in 0..36 {
@@ -414,7 +401,7 @@ fn numbers_that_are_not_finite_are_refused() {
 
 #[test]
 fn problems_without_a_solution_are_refused() {
-    let mut numbers = Random(9);
+    let mut numbers = Congruential(9);
     let mut solvers: Vec<Listed<f64>> = vec![
         ("Gauss-Seidel", Box::new(GaussSeidel::default().sweeps(300)), 0.0),
         ("projected gradient", Box::new(ProjectedGradient::default().iterations(300)), 0.0),
@@ -457,7 +444,7 @@ fn problems_without_a_solution_are_refused() {
 /// this is beside the condition of W, in whatever unit each row is, nobody accepts it. Without the share all is well.
 #[test]
 fn small_contradictions_among_nearly_dependent_rows_are_no_rounding() {
-    let (mut numbers, mut active, mut pivoting) = (Random(13), ActiveSet::default(), Pivoting::default());
+    let (mut numbers, mut active, mut pivoting) = (Congruential(13), ActiveSet::default(), Pivoting::default());
     let (mut refused, mut solved) = (0, 0);
     for case in 0..3000_usize {
         let size = 2 + case % 12;
@@ -516,7 +503,7 @@ fn single_precision_judges_many_coupled_rows() {
 
 #[test]
 fn limits_are_kept_and_told() {
-    let (problem, _) = random(&mut Random(10), 20, 20, 42, 0.0);
+    let (problem, _) = random(&mut Congruential(10), 20, 20, 42, 0.0);
     let solvers: [Box<dyn ContactSolver<f64>>; 2] =
         [Box::new(GaussSeidel::default().sweeps(3)), Box::new(ProjectedGradient::default().iterations(3))];
     for mut solver in solvers {
@@ -542,7 +529,7 @@ fn limits_are_kept_and_told() {
 
 #[test]
 fn solving_allocates_nothing() {
-    let (problem, _) = random(&mut Random(11), 25, 18, 40, 0.2);
+    let (problem, _) = random(&mut Congruential(11), 25, 18, 40, 0.2);
     for (name, mut solver, _) in general::<f64>() {
         solver.reserve(25);
         let mut multipliers = [0.0; 25];

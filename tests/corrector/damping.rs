@@ -2,7 +2,7 @@
 #![allow(clippy::float_cmp)] // forces that are exactly zero
 
 use contact_dynamics::corrector::{ContactImplicit, ContactStabilized, LaursenLove, Release};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{
     Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
     Simulation, TimeIntegrator,
@@ -41,8 +41,7 @@ const GRAVITY: f64 = 0.5;
 
 fn matrix(n: usize, links: impl Iterator<Item = (usize, f64)>) -> SparseColMat<usize, f64> {
     let entries = links.flat_map(|(i, k)| [(i, i, k), (i + 1, i + 1, k), (i, i + 1, -k), (i + 1, i, -k)]);
-    let entries: Vec<_> = entries.map(|(i, j, k)| Triplet::new(i, j, k)).collect();
-    SparseColMat::try_new_from_triplets(n, n, &entries).unwrap()
+    matrix(n, entries)
 }
 
 fn masses() -> Vec<f64> {

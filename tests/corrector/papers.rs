@@ -4,12 +4,12 @@ use contact_dynamics::contact::GapOffset;
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Composite, Corrector, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
     PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::{Figures, figures, record_run};
+use contact_dynamics_scenes::sparse::{free, matrix, spring, springs};
 use contact_dynamics_scenes::{Bars, MassKind, Record};
 
 const H: f64 = 1e-3;
@@ -91,8 +91,7 @@ fn contact_implicit_steps_are_those_of_the_papers() {
         for (projected, corrector) in
             [(false, Box::new(ContactImplicit) as Box<dyn Corrector<f64>>), (true, Box::new(ContactStabilized::new()))]
         {
-            let k = [(0, 0, 40.0), (1, 1, 40.0), (0, 1, -40.0), (1, 0, -40.0)].map(|(i, j, k)| Triplet::new(i, j, k));
-            let k = SparseColMat::try_new_from_triplets(2, 2, &k).unwrap();
+            let k = matrix(2, springs(2, 40.0));
             let system = LinearSystem::lumped(vec![0.5, 2.0], k).unwrap().load(|_, f| f[1] = -3.0);
             let mut run = Simulation::builder(system, Newmark::new(beta, gamma).unwrap(), 0.05)
                 .velocity(vec![-1.0; 2])
@@ -242,13 +241,9 @@ fn zero_acceleration_is_the_acceleration_part_between_equal_bars_alone() {
 #[test]
 fn wave_release_is_the_impulse_of_the_last_force() {
     // One mass on the floor that a load presses down, then pulls up: S and λ are known.
-    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
-    let system = LinearSystem::lumped(vec![2.0], k).unwrap();
-    let system = system.load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
+    let system = free(&[2.0]).load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
     let path = |corrector: Box<dyn Corrector<f64>>| {
-        let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
-        let system = LinearSystem::lumped(vec![2.0], k).unwrap();
-        let system = system.load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
+        let system = free(&[2.0]).load(|t, f| f[0] = if t < 0.099 { -7.0 } else { 5.0 });
         let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0).unwrap(), 0.01)
             .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.0))
             .corrector(corrector)
@@ -268,7 +263,7 @@ fn wave_release_is_the_impulse_of_the_last_force() {
 fn impedances_give_the_rate_of_opening_and_take_no_momentum() {
     let masses = [2.0, 0.3];
     let path = |corrector: Box<dyn Corrector<f64>>| {
-        let zero = SparseColMat::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let zero = matrix(2, [(0, 0, 0.0)]);
         let system = LinearSystem::lumped(masses.to_vec(), zero).unwrap();
         let system = system.load(|t, f| {
             let force = if t < 0.099 { 7.0 } else { -5.0 };
@@ -402,8 +397,7 @@ fn only_the_full_projection_moves_bodies_that_meet_for_the_first_time() {
 
 /// Two masses on a spring, the first of which meets a wall that comes, as a driven dof or as a gap that closes.
 fn wall(driven: bool, equality: bool, until: f64, corrector: Box<dyn Corrector<f64>>) -> Vec<f64> {
-    let entries = [(1, 1, 40.0), (2, 2, 40.0), (1, 2, -40.0), (2, 1, -40.0), (0, 0, 0.0)];
-    let k = SparseColMat::try_new_from_triplets(3, 3, &entries.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+    let k = matrix(3, spring(1, 2, 40.0).into_iter().chain([(0, 0, 0.0)]));
     let system = LinearSystem::lumped(vec![1.0, 0.5, 2.0], k).unwrap();
     let motion = |t: f64| [0.3 * t + t * t, 0.3 + 2.0 * t, 2.0];
     let system = if driven { system.drive(0, motion).unwrap() } else { system.fix(0).unwrap() };
@@ -447,8 +441,7 @@ fn predictions_see_supports_where_they_will_be() {
 #[test]
 fn energy_taken_by_an_impact_is_counted_from_that_impact() {
     // A light foot on a spring under a heavy mass, under gravity: it lands several times.
-    let k = [(0, 0, 400.0), (1, 1, 400.0), (0, 1, -400.0), (1, 0, -400.0)].map(|(i, j, k)| Triplet::new(i, j, k));
-    let k = SparseColMat::try_new_from_triplets(2, 2, &k).unwrap();
+    let k = matrix(2, springs(2, 400.0));
     let system = LinearSystem::lumped(vec![0.2, 2.0], k).unwrap().load(|_, f| (f[0], f[1]) = (-2.0, -20.0));
     let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1e-3)
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.5))
@@ -477,8 +470,7 @@ fn energy_taken_by_an_impact_is_counted_from_that_impact() {
 fn what_release_gives_back_does_not_depend_on_the_motion_of_the_observer() {
     // A foot with mass on a spring lands on a floor at rest, or on one that moves as all else does.
     let bounce = |speed: f64| {
-        let k = [(0, 0, 400.0), (1, 1, 400.0), (0, 1, -400.0), (1, 0, -400.0)].map(|(i, j, k)| Triplet::new(i, j, k));
-        let k = SparseColMat::try_new_from_triplets(2, 2, &k).unwrap();
+        let k = matrix(2, springs(2, 400.0));
         let floor = GapOffset::moving(move |t| [0.1 - speed * t, -speed, 0.0]);
         let mut run =
             Simulation::builder(LinearSystem::lumped(vec![0.5, 2.0], k).unwrap(), Newmark::trapezoidal(), 1e-3)

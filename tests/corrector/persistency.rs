@@ -3,21 +3,14 @@
 
 use approx::assert_relative_eq;
 use contact_dynamics::corrector::Parts;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Bathe, Composite, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, Mass, Newmark, Park, PersistencyCorrection,
     Simulation, System, TimeIntegrator,
 };
+use contact_dynamics_scenes::sparse::{free, matrix, springs};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 const FULL: PersistencyCorrection = PersistencyCorrection::with_history_projection();
-
-fn free(masses: &[f64]) -> LinearSystem<'static, f64> {
-    let n = masses.len();
-    let zero: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &zero).unwrap();
-    LinearSystem::lumped(masses.to_vec(), k).unwrap()
-}
 
 fn start<'a>(
     bars: &Bars,
@@ -223,14 +216,8 @@ fn a_bar_against_a_wall_is_half_of_a_symmetric_pair() {
         let mut both = start(&pair, integrator(), FULL, 1e-3);
         // The left bar alone: the wall is the symmetry plane.
         let n = 30;
-        let mut triplets = Vec::new();
         let k = 100.0 * 0.25 / (10.0 / n as f64);
-        for e in 0..n {
-            for (i, j, x) in [(e, e, k), (e + 1, e + 1, k), (e, e + 1, -k), (e + 1, e, -k)] {
-                triplets.push(Triplet::new(i, j, x));
-            }
-        }
-        let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &triplets).unwrap();
+        let stiffness = matrix(n + 1, springs(n + 1, k));
         let mass = pair.lumped_mass::<f64>()[..=n].to_vec();
         let mut single = Simulation::builder(LinearSystem::lumped(mass, stiffness).unwrap(), integrator(), 1e-3)
             .velocity(vec![0.05; n + 1])
@@ -310,8 +297,7 @@ fn mass_views_multiply_as_matrices() {
         assert_relative_eq!(*y, 2.0 * m, max_relative = 1e-14);
     }
     // A diagonal matrix is recognized as lumped.
-    let diagonal: Vec<_> = (0..bars.dofs()).map(|i| Triplet::new(i, i, 1.0 + i as f64)).collect();
-    let diagonal = SparseColMat::<usize, f64>::try_new_from_triplets(bars.dofs(), bars.dofs(), &diagonal).unwrap();
+    let diagonal = matrix(bars.dofs(), (0..bars.dofs()).map(|i| (i, i, 1.0 + i as f64)));
     let system = LinearSystem::new(diagonal, bars.stiffness()).unwrap();
     assert!(matches!(system.mass(), Mass::Lumped(mass) if mass.len() == bars.dofs() && mass[2] == 3.0));
     let system = LinearSystem::new(consistent, bars.stiffness()).unwrap();

@@ -2,12 +2,12 @@
 
 use contact_dynamics::contact::{GapOffset, NodesOnObstacle, Plane};
 use contact_dynamics::corrector::Release;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Bathe, Bdf2, Composite, GeneralizedAlpha, Gssss, Houbolt, LinearRows, LinearSystem, Newmark, Park,
     PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::sparse::{matrix, spring};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
 
@@ -88,14 +88,8 @@ enum Wall {
 fn observed(make: Make, wall: Wall, speed: f64) -> Vec<f64> {
     const N: usize = 12;
     let second = if matches!(wall, Wall::Chain) { N } else { 1 };
-    let mut entries: Vec<_> = (0..N + second).map(|i| Triplet::new(i, i, 0.0)).collect();
-    let springs = (0..N - 1).chain(N..N + second - 1);
-    for i in springs {
-        for (r, c, k) in [(i, i, 900.0), (i + 1, i + 1, 900.0), (i, i + 1, -900.0), (i + 1, i, -900.0)] {
-            entries.push(Triplet::new(r, c, k));
-        }
-    }
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(N + second, N + second, &entries).unwrap();
+    let springs = (0..N - 1).chain(N..N + second - 1).flat_map(|i| spring(i, i + 1, 900.0));
+    let k = matrix(N + second, (0..N + second).map(|i| (i, i, 0.0)).chain(springs));
     let mut system = LinearSystem::lumped(vec![0.1; N + second], k).unwrap();
     let mut velocity = vec![speed - 1.0; N];
     velocity.resize(N + second, speed);

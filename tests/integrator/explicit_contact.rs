@@ -2,7 +2,6 @@
 //! Moreau–Jean, Noh–Bathe; and position-level contact of Chung–Lee and Hulbert–Chung.
 
 use contact_dynamics::contact::GapOffset;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::Side;
 use contact_dynamics::tableau::{ContactLevel, Stage, Tableau};
 use contact_dynamics::{
@@ -11,6 +10,8 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::{Figures, figures, record};
+use contact_dynamics_scenes::schemes::Tabulated;
+use contact_dynamics_scenes::sparse::{free, matrix};
 
 const F0: f64 = 0.0125;
 
@@ -125,31 +126,18 @@ fn correction_of_explicit_position_level_contact_removes_the_impulse() {
     }
 }
 
-/// Noh and Bathe's rows with contact on the velocities of either stage.
-#[derive(Debug)]
-struct AtVelocityLevel;
-
-impl TimeIntegrator for AtVelocityLevel {
-    fn name(&self) -> String {
-        "Noh–Bathe at velocity level".into()
-    }
-
-    fn tableau(&self) -> Tableau {
-        let level = |stage: Stage| {
-            let contact = ContactLevel::Velocity { lead: 0.0, forecast: stage.recovery.u, forecast_at: stage.end };
-            stage.with_contact(contact)
-        };
-        let shipped = NohBathe::new(0.54).unwrap().tableau();
-        Tableau::staged(shipped.stages.into_iter().map(level).collect())
-    }
-}
-
 /// Why the scheme is shipped with forward increments: the multipliers of two stages at velocity level fight.
 #[test]
 fn forward_increments_of_two_stages_are_smoother_than_velocity_conditions() {
     let bars = Bars::paper(20);
     let ahead = run(&bars, NohBathe::new(0.54).unwrap(), 1e-3);
-    let at_velocity_level = run(&bars, AtVelocityLevel, 1e-3);
+    let level = |stage: Stage| {
+        let contact = ContactLevel::Velocity { lead: 0.0, forecast: stage.recovery.u, forecast_at: stage.end };
+        stage.with_contact(contact)
+    };
+    let shipped = NohBathe::new(0.54).unwrap().tableau();
+    let rows = Tableau::staged(shipped.stages.into_iter().map(level).collect());
+    let at_velocity_level = run(&bars, Tabulated("Noh–Bathe at velocity level", rows), 1e-3);
     assert!((ahead.force_rms - 0.127).abs() < 0.005, "{ahead:?}");
     assert!((at_velocity_level.force_rms - 1.49).abs() < 0.05, "{at_velocity_level:?}");
     assert!(at_velocity_level.variation > 10.0 * ahead.variation);
@@ -188,7 +176,7 @@ fn an_approach_at_the_start_is_met_by_the_first_forces() {
 
 /// A mass 2 under the force −20, `gap` above a stop.
 fn mass_above_stop(scheme: Box<dyn TimeIntegrator>, gap: f64, velocity: f64) -> Simulation<'static, f64> {
-    let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let free = matrix(1, [(0, 0, 0.0)]);
     let system = LinearSystem::lumped(vec![2.0], free).unwrap().load(|_, force| force[0] = -20.0);
     Simulation::builder(system, scheme, 1e-2)
         .velocity(vec![velocity])
@@ -209,7 +197,7 @@ fn a_moving_wall_takes_a_mass_along() {
         [0.5 * t - 0.1 + late * late, 0.5 + 2.0 * late, if t < 0.5 { 0.0 } else { 2.0 }]
     };
     for make in schemes {
-        let free = |n: usize| SparseColMat::try_new_from_triplets(n, n, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let free = |n: usize| matrix(n, [(0, 0, 0.0)]);
         let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().drive(1, wall).unwrap();
         let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
         let by_support = Simulation::builder(driven, make(), 1e-3).constraint(rows).build().unwrap();
@@ -258,7 +246,7 @@ fn forward_increments_follow_a_shaking_table_exactly() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
         [|| Box::new(CentralDifference), || Box::new(NohBathe::new(0.54).unwrap())];
     for make in schemes {
-        let free = |n: usize| SparseColMat::try_new_from_triplets(n, n, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let free = |n: usize| matrix(n, [(0, 0, 0.0)]);
         let load = |_: f64, force: &mut [f64]| force[0] = -100.0;
         let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().load(load).drive(1, table).unwrap();
         let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
@@ -290,7 +278,7 @@ fn velocity_conditions_follow_a_shaking_table_exactly() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
         [|| Box::new(MoreauJean::new(0.5).unwrap()), || Box::new(CdLagrange)];
     for (make, lead) in schemes.into_iter().zip([0.0, 0.5]) {
-        let free = SparseColMat::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let free = matrix(2, [(0, 0, 0.0)]);
         let system = LinearSystem::lumped(vec![3.0, 3.0], free)
             .unwrap()
             .load(|_, force| force[0] = -100.0)
@@ -320,7 +308,7 @@ fn velocity_conditions_follow_a_shaking_table_exactly() {
 /// The first multiplier of central differences pushes a second contact in, which was not violated by itself.
 #[test]
 fn contacts_that_others_push_in_take_part_in_the_start() {
-    let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let free = matrix(2, [(0, 0, 0.0)]);
     let system = LinearSystem::lumped(vec![1.0, 1.0], free).unwrap().load(|_, force| force[0] = -20.0);
     let run = Simulation::builder(system, CentralDifference, 1e-3)
         .constraint(LinearRows::new().unilateral(&[(0, 1.0), (1, 1.0)], 0.0).unilateral(&[(1, -1.0)], 0.0))

@@ -1,13 +1,13 @@
 //! Momentum in the form each scheme conserves, and the closure of impulses.
 
 use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
     ActiveSet, Bathe, Bdf2, Composite, ContactSolver, Corrector, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem,
     Newmark, Park, PersistencyCorrection, Simulation, TimeIntegrator,
 };
-use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::schemes::{Listed, Tabulated, all};
+use contact_dynamics_scenes::sparse::matrix;
 use contact_dynamics_scenes::{Bars, MassKind, Record, record};
 use std::sync::{Arc, Mutex};
 
@@ -181,21 +181,12 @@ fn terms_that_cancel_in_increment_form_are_gone() {
 }
 
 /// The composite rows behind a first stage that they do not read: two stages, two operators, a past of two steps.
-#[derive(Debug)]
-struct CompositeInTwoStages;
-
-impl TimeIntegrator for CompositeInTwoStages {
-    fn name(&self) -> String {
-        "composite behind a half step".into()
-    }
-
-    fn tableau(&self) -> Tableau {
-        let v = 4.0 * (Z - U[0]) - V[0];
-        let half = Stage::new(Rows { u: Z, v, a: 16.0 * (Z - U[0] - 0.5 * V[0]) - A[0] }).ending_at(0.5);
-        let v = 1.5 * Z - 2.0 * U[1] + 0.5 * U[2];
-        let a = (Z - 2.0 * U[1] + U[2]) + (v - 2.0 * V[1] + V[2]);
-        Tableau::staged(vec![half, Stage::new(Rows { u: Z, v, a })])
-    }
+fn composite_in_two_stages() -> Tabulated {
+    let v = 4.0 * (Z - U[0]) - V[0];
+    let half = Stage::new(Rows { u: Z, v, a: 16.0 * (Z - U[0] - 0.5 * V[0]) - A[0] }).ending_at(0.5);
+    let v = 1.5 * Z - 2.0 * U[1] + 0.5 * U[2];
+    let a = (Z - 2.0 * U[1] + U[2]) + (v - 2.0 * V[1] + V[2]);
+    Tabulated("composite behind a half step", Tableau::staged(vec![half, Stage::new(Rows { u: Z, v, a })]))
 }
 
 #[test]
@@ -207,7 +198,7 @@ fn stages_between_drop_out_of_the_past() {
         run.run_until(2.0, &mut ()).unwrap();
         run.state().clone()
     };
-    let (one, two) = (run(Box::new(Composite)), run(Box::new(CompositeInTwoStages)));
+    let (one, two) = (run(Box::new(Composite)), run(Box::new(composite_in_two_stages())));
     for (x, y) in one.displacement().iter().zip(two.displacement()) {
         assert!((x - y).abs() < 1e-13, "{x} {y}");
     }
@@ -219,7 +210,7 @@ fn stages_between_drop_out_of_the_past() {
         for correction in corrections() {
             let found = record::<f64>(
                 &bars,
-                CompositeInTwoStages,
+                composite_in_two_stages(),
                 correction.map(|c| Box::new(c) as Box<dyn Corrector<f64>>),
                 1e-3,
                 0.5,
@@ -259,7 +250,7 @@ fn impulse_weights_are_what_a_run_books() {
         let (name, tableau) = (scheme.name(), scheme.tableau());
         let weights = tableau.momentum().impulse_weights().to_vec();
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {weights:?}");
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 3.0)]).unwrap();
+        let k = matrix(2, [(0, 0, 3.0)]);
         let system =
             LinearSystem::lumped(vec![0.7, 1.9], k).unwrap().load(|t, force| force[0] += 2.0 + (9.0 * t).sin());
         let heard = Heard::default();

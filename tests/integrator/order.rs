@@ -1,11 +1,11 @@
 //! Observed order of u, v and a on smooth motion: damped forced oscillator, and several dofs at once.
 
 use contact_dynamics::analysis::order;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::tableau::StartUp;
 use contact_dynamics::{LinearSystem, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 const OMEGA: f64 = 2.0;
 const XI: f64 = 0.05;
@@ -13,7 +13,7 @@ const FORCE: HarmonicForce = HarmonicForce { frequency: 1.3, cosine: 0.7, sine: 
 
 /// Errors of (u, v, a) at t = 8 of the oscillator that starts with force and displacement.
 fn oscillator_error(scheme: Box<dyn TimeIntegrator>, start: StartUp, steps: u32) -> [f64; 3] {
-    let scalar = |x| SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, x)]).unwrap();
+    let scalar = |x| matrix(1, [(0, 0, x)]);
     let mass = 3.0;
     let system = LinearSystem::lumped(vec![mass], scalar(mass * OMEGA * OMEGA))
         .unwrap()
@@ -75,15 +75,7 @@ fn a_taylor_past_keeps_the_order_of_multistep_schemes() {
 fn several_dofs_are_second_order_from_the_first_step() {
     // K of a fixed-free chain has eigenvectors sin((2j−1)π(i)/(2n+1)); M = 1.
     let n = 3;
-    let mut triplets = Vec::new();
-    for i in 0..n {
-        triplets.push(Triplet::new(i, i, if i + 1 == n { 1.0 } else { 2.0 }));
-        if i + 1 < n {
-            triplets.push(Triplet::new(i, i + 1, -1.0));
-            triplets.push(Triplet::new(i + 1, i, -1.0));
-        }
-    }
-    let stiffness = || SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).unwrap();
+    let stiffness = || matrix(n, springs(n, 1.0).chain([(0, 0, 1.0)]));
     let (alpha, beta) = (0.02, 0.03);
     let modes: Vec<(f64, Vec<f64>)> = (1..=n)
         .map(|j| {

@@ -2,13 +2,14 @@
 #![allow(clippy::float_cmp)] // the same to the last bit is meant
 
 use contact_dynamics::contact::Plane;
-use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::{
     ByBody, Cholesky, Composite, ConjugateGradients, Error, Factorization, LinearSolver, LinearSystem, Newmark,
     NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, SimulationBuilder, StepControl,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{Entry, entries, factorized, matrix, spring, springs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -17,20 +18,6 @@ const ALL: [Preconditioner; 3] =
     [Preconditioner::Nodes, Preconditioner::GaussSeidel, Preconditioner::IncompleteCholesky];
 
 type Matrix<T> = SparseColMat<usize, T>;
-type Entry = (usize, usize, f64);
-
-fn matrix<T: Real>(n: usize, entries: impl IntoIterator<Item = Entry>) -> Matrix<T> {
-    let triplets: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
-    let (pattern, values) = Matrix::<f64>::try_new_from_triplets(n, n, &triplets).unwrap().into_parts();
-    SparseColMat::new(pattern, values.into_iter().map(T::of).collect())
-}
-
-fn entries(a: &Matrix<f64>) -> Vec<Entry> {
-    let a = a.as_ref();
-    let column = |j: usize| a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)).map(move |(&i, &x)| (i, j, x));
-    (0..a.ncols()).flat_map(column).collect()
-}
-
 /// M/dt² + K of a solid at a Courant number.
 fn effective<const D: usize>(solid: &Solid<D>, size: f64, courant: f64) -> Vec<Entry> {
     let inertia = 4.0 * (SOFT.wave_speed() / (courant * size)).powi(2);
@@ -40,18 +27,11 @@ fn effective<const D: usize>(solid: &Solid<D>, size: f64, courant: f64) -> Vec<E
 }
 
 fn chain(n: usize, shift: f64) -> Vec<Entry> {
-    let springs = (1..n).flat_map(|i| [(i - 1, i - 1, 1.0), (i, i, 1.0), (i - 1, i, -1.0), (i, i - 1, -1.0)]);
-    springs.chain((0..n).map(|i| (i, i, shift))).collect()
+    springs(n, 1.0).chain((0..n).map(|i| (i, i, shift))).collect()
 }
 
 fn rhs<T: Real>(n: usize) -> Vec<T> {
     (0..n).map(|i| T::of((i as f64 * 0.7).sin() + 0.3 * (i as f64 * 2.9).cos())).collect()
-}
-
-fn factorized<T: Real>(solver: &dyn LinearSolver<T>, a: &Matrix<T>) -> Box<dyn Factorization<T>> {
-    let mut factor = solver.analyze(a.symbolic(), &[]).unwrap();
-    factor.factorize(a.as_ref()).unwrap();
-    factor
 }
 
 /// Largest difference, over the largest entry of the second.

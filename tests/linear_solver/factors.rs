@@ -1,23 +1,19 @@
 //! Linear solvers on every kind of factor: chains, arrows, grids (simplicial and supernodal), dense blocks; both
 //! precisions.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use contact_dynamics::faer::sparse::SparseColMat;
+use contact_dynamics::faer::sparse::SparseColMatRef;
 use contact_dynamics::{
     Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result, Tridiagonal,
 };
+use contact_dynamics_scenes::hosts::Uncondensed;
+use contact_dynamics_scenes::sparse::{matrix, spring};
 
 /// A symmetric positive definite matrix with the given pairs as off-diagonal entries.
-fn matrix<T: Real>(n: usize, pairs: &[(usize, usize)], shift: f64) -> SparseColMat<usize, T> {
-    let mut triplets: Vec<Triplet<usize, usize, f64>> = (0..n).map(|i| Triplet::new(i, i, shift)).collect();
-    for (k, &(i, j)) in pairs.iter().enumerate() {
-        let stiffness = 1.0 + 0.5 * ((k * 37 % 11) as f64);
-        for (r, c, x) in [(i, i, stiffness), (j, j, stiffness), (i, j, -stiffness), (j, i, -stiffness)] {
-            triplets.push(Triplet::new(r, c, x));
-        }
-    }
-    let (pattern, values) = SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap().into_parts();
-    SparseColMat::new(pattern, values.into_iter().map(T::of).collect())
+fn tied<T: Real>(n: usize, pairs: &[(usize, usize)], shift: f64) -> SparseColMat<usize, T> {
+    let stiffness = |k: usize| 1.0 + 0.5 * ((k * 37 % 11) as f64);
+    let ties = pairs.iter().enumerate().flat_map(|(k, &(i, j))| spring(i, j, stiffness(k)));
+    matrix(n, (0..n).map(|i| (i, i, shift)).chain(ties))
 }
 
 fn chain(n: usize) -> Vec<(usize, usize)> {
@@ -62,12 +58,12 @@ fn dense(n: usize) -> Vec<(usize, usize)> {
 }
 
 fn check<T: Real>(solver: &dyn LinearSolver<T>, n: usize, pairs: &[(usize, usize)], tolerance: f64) {
-    let pattern_of = matrix::<T>(n, pairs, 0.1);
+    let pattern_of = tied::<T>(n, pairs, 0.1);
     let mut factor = solver.analyze(pattern_of.symbolic(), &[]).unwrap();
     assert!(factor.stored_values() >= n);
     // The same analysis serves other values.
     for shift in [0.1, 3.0] {
-        let a = matrix::<T>(n, pairs, shift);
+        let a = tied::<T>(n, pairs, shift);
         factor.factorize(a.as_ref()).unwrap();
         for columns in [1, 3] {
             let x: Vec<T> = (0..n * columns).map(|i| T::of((i as f64 * 0.7).sin())).collect();
@@ -132,7 +128,7 @@ fn bodies() -> Vec<(usize, Vec<(usize, usize)>)> {
 fn cholesky_refuses_what_is_not_symmetric_positive_definite() {
     for pairs in [chain(30), grid(30), dense(30)] {
         let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
-        let good = matrix::<f64>(n, &pairs, 1.0);
+        let good = tied::<f64>(n, &pairs, 1.0);
         let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), good.symbolic(), &[]).unwrap();
         let (pattern, values) = good.into_parts();
         let broken = |change: &dyn Fn(usize, usize, f64) -> f64| {
@@ -161,15 +157,15 @@ fn cholesky_refuses_what_is_not_symmetric_positive_definite() {
 
 #[test]
 fn diagonal_solver_takes_diagonal_matrices_only() {
-    let a = matrix::<f64>(3, &[], 4.0);
+    let a = tied::<f64>(3, &[], 4.0);
     let mut factor = LinearSolver::<f64>::analyze(&Diagonal, a.symbolic(), &[]).unwrap();
     factor.factorize(a.as_ref()).unwrap();
     let mut x = [4.0, 8.0, -2.0, 1.0, 2.0, 3.0];
     factor.solve(&mut x).unwrap();
     assert!(x.iter().zip([1.0, 2.0, -0.5, 0.25, 0.5, 0.75]).all(|(x, y)| (x - y).abs() < 1e-15));
-    let chain = matrix::<f64>(3, &chain(3), 1.0);
+    let chain = tied::<f64>(3, &chain(3), 1.0);
     assert!(matches!(LinearSolver::<f64>::analyze(&Diagonal, chain.symbolic(), &[]), Err(Error::Incompatible { .. })));
-    let zero = matrix::<f64>(3, &[], 0.0);
+    let zero = tied::<f64>(3, &[], 0.0);
     assert!(matches!(factor.factorize(zero.as_ref()), Err(Error::Singular { dof: 0, .. })));
 }
 
@@ -179,7 +175,7 @@ fn free_bodies_are_recognized_by_a_pivot_of_rounding() {
     for n in 2..60 {
         for pairs in [chain(n), shuffled_chain(n), arrow(n.max(3)), dense(n)] {
             let n = 1 + pairs.iter().map(|&(i, j)| i.max(j)).max().unwrap();
-            let a = matrix::<f64>(n, &pairs, 0.0);
+            let a = tied::<f64>(n, &pairs, 0.0);
             let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic(), &[]).unwrap();
             let found = factor.factorize(a.as_ref());
             assert!(matches!(found, Err(Error::Singular { .. })), "{n} dofs, {} pairs", pairs.len());
@@ -195,7 +191,7 @@ fn check_condensation<T: Real>(
     last: &[usize],
     tolerance: f64,
 ) {
-    let a = matrix::<T>(n, pairs, 0.1);
+    let a = tied::<T>(n, pairs, 0.1);
     let mut plain = LinearSolver::<T>::analyze(&Automatic, a.symbolic(), &[]).unwrap();
     let mut factor = solver.analyze(a.symbolic(), last).unwrap();
     plain.factorize(a.as_ref()).unwrap();
@@ -304,42 +300,16 @@ fn bodies_are_condensed_one_by_one() {
     }
 }
 
-/// Cholesky without its condensation, which counts the matrices it has analyzed.
-#[derive(Debug, Default)]
-struct Plain(std::sync::Arc<std::sync::Mutex<Vec<usize>>>);
-
-#[derive(Debug)]
-struct PlainFactor(Box<dyn Factorization<f64>>);
-
-impl LinearSolver<f64> for Plain {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, _: &[usize]) -> Result<Box<dyn Factorization<f64>>> {
-        self.0.lock().unwrap().push(pattern.ncols());
-        Ok(Box::new(PlainFactor(Cholesky::default().analyze(pattern, &[])?)))
-    }
-}
-
-impl Factorization<f64> for PlainFactor {
-    fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
-        self.0.factorize(a)
-    }
-    fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
-        self.0.solve(rhs)
-    }
-    fn stored_values(&self) -> usize {
-        self.0.stored_values()
-    }
-}
-
 #[test]
 fn every_body_may_have_its_own_solver() {
     // Chains of 5 and 6 dofs, a point mass (dof 5) between them.
     let pairs: Vec<_> = chain(5).into_iter().chain((7..12).map(|i| (i - 1, i))).collect();
-    let a = matrix::<f64>(12, &pairs, 0.5);
-    let analyzed = std::sync::Arc::default();
-    let plain = || Plain(std::sync::Arc::clone(&analyzed));
+    let a = tied::<f64>(12, &pairs, 0.5);
+    let plain = Uncondensed::new(Cholesky::default());
+    let analyzed = &plain.analyzed;
     for (dofs, expected) in [(vec![], vec![]), (vec![3], vec![5]), ((5..12).collect(), vec![6]), (vec![5], vec![])] {
         analyzed.lock().unwrap().clear();
-        let solver = ByBody::new(Automatic).body(dofs.clone(), plain());
+        let solver = ByBody::new(Automatic).body(dofs.clone(), plain.clone());
         // Only a body that contact acts on needs a solver that condenses.
         for last in [vec![4], vec![5, 6], vec![4, 6]] {
             let mut factor = solver.analyze(a.symbolic(), &last).unwrap();
@@ -355,7 +325,7 @@ fn every_body_may_have_its_own_solver() {
     }
     // A solver for all: point masses are divided through.
     analyzed.lock().unwrap().clear();
-    ByBody::new(plain()).analyze(a.symbolic(), &[]).unwrap();
+    ByBody::new(plain.clone()).analyze(a.symbolic(), &[]).unwrap();
     assert_eq!(*analyzed.lock().unwrap(), [5, 6]);
     let refused = |solver: ByBody<'_, f64>| solver.analyze(a.symbolic(), &[]).map(|_| ()).unwrap_err();
     assert!(matches!(refused(ByBody::new(Diagonal)), Error::Incompatible { .. }));
@@ -369,7 +339,7 @@ fn errors_of_a_body_name_dofs_of_the_system() {
     for (n, pairs) in bodies().into_iter().skip(3) {
         let (body, dof) = (pairs[pairs.len() - 1], pairs[pairs.len() - 1].1);
         let single = (0..n).find(|&i| pairs.iter().all(|&(a, b)| i != a && i != b));
-        let good = matrix::<f64>(n, &pairs, 1.0);
+        let good = tied::<f64>(n, &pairs, 1.0);
         let mut factor = ByBody::<f64>::default().analyze(good.symbolic(), &[0]).unwrap();
         let (pattern, values) = good.into_parts();
         let mut factorize = |change: &dyn Fn(usize, usize, f64) -> f64| {
@@ -399,13 +369,13 @@ fn errors_of_a_body_name_dofs_of_the_system() {
     }
     // Body by body a free one is found beside a stiff one.
     let pairs: Vec<_> = chain(5).into_iter().chain((6..10).map(|i| (i - 1, i))).collect();
-    let a = matrix::<f64>(10, &pairs, 0.0);
+    let a = tied::<f64>(10, &pairs, 0.0);
     let mut values = a.val().to_vec();
     values[a.symbolic().col_range(0).start] += 1.0;
     let mut factor = ByBody::<f64>::default().analyze(a.symbolic(), &[]).unwrap();
     let found = factor.factorize(SparseColMatRef::new(a.symbolic(), &values));
     assert!(matches!(found, Err(Error::Singular { dof: 5..10, .. })), "{found:?}");
-    let other = matrix::<f64>(10, &chain(10), 1.0);
+    let other = tied::<f64>(10, &chain(10), 1.0);
     assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Dimension { .. })));
 }
 
@@ -433,7 +403,7 @@ fn strings_are_solved_in_any_numbering() {
 #[test]
 fn what_is_no_string_is_refused_by_the_tridiagonal_solver() {
     let refused = |n: usize, pairs: &[(usize, usize)], last: &[usize]| {
-        let a = matrix::<f64>(n, pairs, 1.0);
+        let a = tied::<f64>(n, pairs, 1.0);
         let analyzed: Result<Box<dyn Factorization<f64>>> = Tridiagonal.analyze(a.symbolic(), last);
         assert!(matches!(analyzed, Err(Error::Incompatible { .. })), "{pairs:?}, {last:?}");
         // The automatic choice takes another solver then, with the same solution.
@@ -448,29 +418,27 @@ fn what_is_no_string_is_refused_by_the_tridiagonal_solver() {
     refused(12, &chain(12), &[3, 10, 11]);
 
     // One-sided patterns are no strings; a matrix with unequal halves is refused when it is factorized.
-    let one_sided = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0)].map(|(i, j, x)| Triplet::new(i, j, x));
-    let one_sided = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &one_sided).unwrap();
+    let one_sided = matrix(2, [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0)]);
     let analyzed: Result<Box<dyn Factorization<f64>>> = Tridiagonal.analyze(one_sided.symbolic(), &[]);
     assert!(matches!(analyzed, Err(Error::Incompatible { .. })));
-    let unequal = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -0.9), (1, 1, 2.0)].map(|(i, j, x)| Triplet::new(i, j, x));
-    let unequal = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &unequal).unwrap();
+    let unequal = matrix(2, [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -0.9), (1, 1, 2.0)]);
     let mut factor: Box<dyn Factorization<f64>> = Tridiagonal.analyze(unequal.symbolic(), &[]).unwrap();
     assert!(matches!(factor.factorize(unequal.as_ref()), Err(Error::Asymmetric { .. })));
 }
 
 #[test]
 fn free_and_indefinite_strings_name_the_pivot() {
-    let a = matrix::<f64>(30, &chain(30), 0.0);
+    let a = tied::<f64>(30, &chain(30), 0.0);
     let mut factor: Box<dyn Factorization<f64>> = Tridiagonal.analyze(a.symbolic(), &[]).unwrap();
     assert!(matches!(factor.factorize(a.as_ref()), Err(Error::Singular { dof: 29, .. })));
-    let negative = matrix::<f64>(30, &chain(30), -0.5);
+    let negative = tied::<f64>(30, &chain(30), -0.5);
     assert!(matches!(factor.factorize(negative.as_ref()), Err(Error::Singular { .. })));
     let mut values = a.val().to_vec();
     values[0] = f64::NAN;
     let broken = SparseColMat::new(a.symbolic().to_owned().unwrap(), values);
     assert!(factor.factorize(broken.as_ref()).is_err());
     // None of this spoils the analysis.
-    let good = matrix::<f64>(30, &chain(30), 1.0);
+    let good = tied::<f64>(30, &chain(30), 1.0);
     factor.factorize(good.as_ref()).unwrap();
     let mut x = vec![1.0; 30];
     factor.solve(&mut x).unwrap();
@@ -482,7 +450,7 @@ fn contact_at_the_ends_of_chains_costs_no_fill() {
     // Two chains one behind the other with contact between them: as many values as without contact.
     let n = 200;
     let pairs: Vec<_> = chain(n).into_iter().filter(|&(i, _)| i != n / 2 - 1).collect();
-    let a = matrix::<f64>(n, &pairs, 0.1);
+    let a = tied::<f64>(n, &pairs, 0.1);
     let size = |last: &[usize]| LinearSolver::<f64>::analyze(&Automatic, a.symbolic(), last).unwrap().stored_values();
     assert_eq!(size(&[n / 2 - 1, n / 2]), size(&[]));
 }

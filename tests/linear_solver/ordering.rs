@@ -1,38 +1,29 @@
 //! Elimination orders: fill, solutions that do not depend on them, and orders that cannot be used.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::linear_solver::Ordering;
 use contact_dynamics::{
     Cholesky, Composite, Error, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation,
 };
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{entries, matrix, spring};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
 type Matrix = SparseColMat<usize, f64>;
 
 /// A diagonally dominant matrix with the given pairs off the diagonal.
-fn matrix(n: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
-    let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 1.0)).collect();
-    for (k, (i, j)) in pairs.into_iter().filter(|(i, j)| i != j).enumerate() {
-        let stiffness = 1.0 + (k * 37 % 11) as f64 / 4.0;
-        for (row, column, x) in [(i, i, stiffness), (j, j, stiffness), (i, j, -stiffness), (j, i, -stiffness)] {
-            triplets.push(Triplet::new(row, column, x));
-        }
-    }
-    Matrix::try_new_from_triplets(n, n, &triplets).unwrap()
+fn tied(n: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
+    let stiffness = |k: usize| 1.0 + (k * 37 % 11) as f64 / 4.0;
+    let pairs = pairs.into_iter().filter(|(i, j)| i != j).enumerate();
+    matrix(n, (0..n).map(|i| (i, i, 1.0)).chain(pairs.flat_map(|(k, (i, j))| spring(i, j, stiffness(k)))))
 }
 
 /// A positive definite matrix of a body: K plus the identity.
 fn of_solid<const D: usize>(solid: &Solid<D>) -> Matrix {
-    let k = solid.stiffness::<f64>();
-    let mut triplets: Vec<_> = (0..solid.dofs()).map(|i| Triplet::new(i, i, 1.0)).collect();
-    for j in 0..solid.dofs() {
-        let k = k.as_ref();
-        triplets.extend(k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(|(&i, &x)| Triplet::new(i, j, x)));
-    }
-    Matrix::try_new_from_triplets(solid.dofs(), solid.dofs(), &triplets).unwrap()
+    let n = solid.dofs();
+    matrix(n, (0..n).map(|i| (i, i, 1.0)).chain(entries(&solid.stiffness())))
 }
 
 fn block(n: usize) -> Solid<3> {
@@ -126,9 +117,9 @@ fn plates_have_no_more_fill_dissected_than_by_minimum_degree() {
 #[test]
 fn the_automatic_order_never_fills_more_than_minimum_degree() {
     let mut cases: Vec<Matrix> =
-        vec![of_solid(&block(4)), of_solid(&block(9)), matrix(400, (1..400).map(|i| (i - 1, i)))];
+        vec![of_solid(&block(4)), of_solid(&block(9)), tied(400, (1..400).map(|i| (i - 1, i)))];
     // Random graphs have no small separators.
-    cases.extend([300, 900, 4000].map(|pairs| matrix(600, strewn(600, pairs, 11))));
+    cases.extend([300, 900, 4000].map(|pairs| tied(600, strewn(600, pairs, 11))));
     for a in cases {
         for last in [vec![], (0..40).collect::<Vec<_>>()] {
             let [automatic, degree] =
@@ -141,8 +132,8 @@ fn the_automatic_order_never_fills_more_than_minimum_degree() {
 #[test]
 fn chains_and_stars_fill_as_little_as_they_can() {
     let n = 3000;
-    let chain = matrix(n, (1..n).map(|i| (i - 1, i)));
-    let star = matrix(n, (1..n).map(|i| (0, i)));
+    let chain = tied(n, (1..n).map(|i| (i - 1, i)));
+    let star = tied(n, (1..n).map(|i| (0, i)));
     for a in [&chain, &star] {
         assert_eq!(estimate(Ordering::Automatic, a, &[]), 2 * n - 1);
     }
@@ -160,9 +151,9 @@ fn solutions_do_not_depend_on_the_order() {
     let cases = [
         (of_solid(&solid), places(&solid), face(&solid)),
         (of_solid(&plate), places(&plate), face(&plate)),
-        (matrix(n, strewn(n, 500, 3)), (0..n).map(|_| [random(), random(), random()]).collect(), (10..50).collect()),
-        (matrix(40, (0..40).flat_map(|i| (0..i).map(move |j| (j, i)))), vec![[0.0; 3]; 40], vec![3, 17]),
-        (matrix(50, []), vec![[1.0, 2.0, 3.0]; 50], vec![0, 49]),
+        (tied(n, strewn(n, 500, 3)), (0..n).map(|_| [random(), random(), random()]).collect(), (10..50).collect()),
+        (tied(40, (0..40).flat_map(|i| (0..i).map(move |j| (j, i)))), vec![[0.0; 3]; 40], vec![3, 17]),
+        (tied(50, []), vec![[1.0, 2.0, 3.0]; 50], vec![0, 49]),
     ];
     for (a, places, face) in cases {
         let n = a.nrows();
@@ -248,7 +239,7 @@ fn runs_do_not_depend_on_the_order() {
 
 #[test]
 fn orders_that_do_not_fit_are_refused() {
-    let a = matrix(4, [(0, 1), (1, 2), (2, 3)]);
+    let a = tied(4, [(0, 1), (1, 2), (2, 3)]);
     let refusal = |order| Cholesky::ordered(order).estimate(a.symbolic(), &[2]).unwrap_err();
     assert!(matches!(refusal(Ordering::Given(vec![0, 1, 2])), Error::Dimension { expected: 4, found: 3, .. }));
     assert!(matches!(refusal(Ordering::Given(vec![0, 1, 2, 4])), Error::MissingDof { dof: 4, dofs: 4, .. }));
@@ -268,8 +259,7 @@ fn orders_that_do_not_fit_are_refused() {
 #[test]
 fn one_sided_patterns_are_refused_by_the_factorization() {
     let n = 900;
-    let entries = (0..n).map(|i| Triplet::new(i, i, 4.0)).chain((1..n).map(|i| Triplet::new(i, i / 2, 1.0)));
-    let a = Matrix::try_new_from_triplets(n, n, &entries.collect::<Vec<_>>()).unwrap();
+    let a = matrix::<f64>(n, (0..n).map(|i| (i, i, 4.0)).chain((1..n).map(|i| (i, i / 2, 1.0))));
     for order in [Ordering::Automatic, Ordering::NestedDissection, Ordering::Coordinates(vec![[0.0; 3]; n])] {
         let mut factor: Box<dyn Factorization<f64>> = Cholesky::ordered(order).analyze(a.symbolic(), &[]).unwrap();
         assert!(matches!(factor.factorize(a.as_ref()), Err(Error::Asymmetric { .. })));

@@ -1,7 +1,7 @@
 //! Lumped and blended masses, dispersion, and Courant numbers, against closed forms.
 
 use contact_dynamics::analysis::{order, period_and_damping, period_elongation};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::{Mat, Side};
 use contact_dynamics::mass::{self, Mass};
 use contact_dynamics::observer::{Control, StepView};
@@ -14,24 +14,17 @@ use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::{figures, record_run};
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{element, matrix};
 
 type Matrix = SparseColMat<usize, f64>;
 
-fn assembled(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
-    let triplets: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
-    Matrix::try_new_from_triplets(n, n, &triplets).unwrap()
-}
-
 /// Linear bar elements of the lengths given, ρA = EA = 1: consistent mass and stiffness.
 fn bar(lengths: &[f64]) -> [Matrix; 2] {
-    let matrix = |entries: &dyn Fn(f64) -> [f64; 2]| {
-        let element = |(e, length): (usize, &f64)| {
-            let [diagonal, off] = entries(*length);
-            [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)]
-        };
-        assembled(lengths.len() + 1, lengths.iter().enumerate().flat_map(element))
+    let assembled = |entries: &dyn Fn(f64) -> [f64; 2]| {
+        let element = |(e, &length): (usize, &f64)| element(e, e + 1, entries(length));
+        matrix(lengths.len() + 1, lengths.iter().enumerate().flat_map(element))
     };
-    [matrix(&|l| [l / 3.0, l / 6.0]), matrix(&|l| [1.0 / l, -1.0 / l])]
+    [assembled(&|l| [l / 3.0, l / 6.0]), assembled(&|l| [1.0 / l, -1.0 / l])]
 }
 
 fn close(found: &[f64], expected: &[f64], tolerance: f64) {
@@ -53,7 +46,7 @@ fn serendipity() -> Matrix {
     let entries = points.flat_map(|(at, weight)| {
         (0..64).map(move |k| (k / 8, k % 8, weight * shape(nodes[k / 8], at) * shape(nodes[k % 8], at)))
     });
-    assembled(8, entries)
+    matrix(8, entries)
 }
 
 #[test]
@@ -95,7 +88,7 @@ fn diagonal_scaling_and_row_sums_agree_on_linear_elements_with_constant_jacobian
 #[test]
 fn each_group_keeps_its_total() {
     // Dofs 0 and 2 a bar of mass 6, dofs 1 and 3 one of mass 60 with another shape of the matrix.
-    let m = assembled(
+    let m = matrix(
         4,
         [(0, 0, 2.0), (0, 2, 1.0), (2, 0, 1.0), (2, 2, 2.0), (1, 1, 30.0), (3, 3, 10.0), (1, 3, 10.0), (3, 1, 10.0)],
     );
@@ -125,7 +118,7 @@ fn blends_interpolate_in_either_precision() {
     let (m, lumped) = (bars.consistent_mass::<f32>(), bars.lumped_mass::<f32>());
     assert_eq!(mass::blend(m.as_ref(), &lumped, 1.0).unwrap().val(), m.val());
     // A diagonal consistent matrix without stored off-diagonals, and one without stored diagonal.
-    let empty = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[]).unwrap();
+    let empty = matrix::<f64>(2, []);
     assert_eq!(mass::blend(empty.as_ref(), &[2.0, 4.0], 0.5).unwrap().val(), [1.0, 2.0]);
     assert_eq!(mass::blend(m.as_ref(), &lumped, 0.0).unwrap().val().iter().filter(|m| **m != 0.0).count(), 8);
 }
@@ -384,9 +377,9 @@ fn wrong_input_is_refused_with_its_numbers() {
         };
     }
     refused!(mass::lump_diagonal(m.as_ref(), &[0; 2]), Error::Dimension { expected: 3, found: 2, .. });
-    let hollow = assembled(2, [(0, 0, 1.0), (1, 1, 0.0)]);
+    let hollow = matrix::<f64>(2, [(0, 0, 1.0), (1, 1, 0.0)]);
     refused!(mass::lump_diagonal(hollow.as_ref(), &[0; 2]), Error::Mass { dof: 1, .. });
-    let negative = assembled(2, [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -2.0), (1, 0, -2.0)]);
+    let negative = matrix::<f64>(2, [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -2.0), (1, 0, -2.0)]);
     refused!(mass::lump_diagonal(negative.as_ref(), &[0; 2]), Error::Mass { dof: 0, .. });
 
     for weight in [f64::NAN, f64::INFINITY] {
@@ -394,7 +387,7 @@ fn wrong_input_is_refused_with_its_numbers() {
     }
     refused!(mass::blend(m.as_ref(), &lumped[..2], 0.5), Error::Dimension { expected: 3, found: 2, .. });
     refused!(mass::blend(m.as_ref(), &[0.5, 0.0, 0.5], 0.5), Error::Mass { dof: 1, .. });
-    refused!(mass::blend(assembled(1, [(0, 0, f64::NAN)]).as_ref(), &[1.0], 0.5), Error::MatrixNotFinite { .. });
+    refused!(mass::blend(matrix(1, [(0, 0, f64::NAN)]).as_ref(), &[1.0], 0.5), Error::MatrixNotFinite { .. });
 
     let rule = Newmark::trapezoidal().tableau();
     for courant in [-0.1, f64::NAN, f64::INFINITY] {
@@ -411,6 +404,6 @@ fn wrong_input_is_refused_with_its_numbers() {
     }
     refused!(courant(&lumped[..2], &k, 0.1), Error::Dimension { .. });
     refused!(courant(&[0.5, -1.0, 0.5], &k, 0.1), Error::Mass { dof: 1, .. });
-    refused!(courant(&[1.0; 2], &assembled(2, [(0, 1, 1.0)]), 0.1), Error::Asymmetric { .. });
+    refused!(courant(&[1.0; 2], &matrix(2, [(0, 1, 1.0)]), 0.1), Error::Asymmetric { .. });
     refused!(mass::courant(Mass::Consistent(hollow.as_ref()), hollow.as_ref(), 0.1), Error::Mass { dof: 1, .. });
 }

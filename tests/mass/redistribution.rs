@@ -1,10 +1,11 @@
 //! Massless contact dofs: redistributed, singular and mixed mass matrices, against closed forms.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::{Mat, Side};
 use contact_dynamics::mass::{self, Mass, Redistribution};
 use contact_dynamics::{ContactLaw, Error, Real};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{diagonal, element, matrix, rectangular};
 
 type Matrix = SparseColMat<usize, f64>;
 
@@ -19,25 +20,15 @@ macro_rules! refused {
     };
 }
 
-fn matrix(shape: [usize; 2], entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
-    let triplets: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
-    Matrix::try_new_from_triplets(shape[0], shape[1], &triplets).unwrap()
-}
-
 /// The consistent mass of linear bar elements, ρA = 1.
 fn bar(lengths: &[f64]) -> Matrix {
-    let element =
-        |(e, l): (usize, &f64)| [(e, e, l / 3.0), (e + 1, e + 1, l / 3.0), (e, e + 1, l / 6.0), (e + 1, e, l / 6.0)];
-    matrix([lengths.len() + 1; 2], lengths.iter().enumerate().flat_map(element))
+    let element = |(e, l): (usize, &f64)| element(e, e + 1, [l / 3.0, l / 6.0]);
+    matrix(lengths.len() + 1, lengths.iter().enumerate().flat_map(element))
 }
 
 fn dense(m: &Matrix) -> Vec<Vec<f64>> {
     let dense = m.to_dense();
     (0..m.nrows()).map(|i| (0..m.ncols()).map(|j| dense[(i, j)]).collect()).collect()
-}
-
-fn diagonal(m: &[f64]) -> Matrix {
-    matrix([m.len(); 2], m.iter().enumerate().map(|(i, &m)| (i, i, m)))
 }
 
 fn row_sums(m: &Matrix) -> Vec<f64> {
@@ -348,14 +339,14 @@ fn lumping_and_redistribution_commute() {
 #[test]
 fn quadratic_elements_may_lose_mass_where_couplings_are_negative() {
     let rows = [[4.0, 2.0, -1.0], [2.0, 16.0, 2.0], [-1.0, 2.0, 4.0]];
-    let m = matrix([3; 2], (0..9).map(|k| (k / 3, k % 3, rows[k / 3][k % 3])));
+    let m: Matrix = matrix(3, (0..9).map(|k| (k / 3, k % 3, rows[k / 3][k % 3])));
     let found =
         mass::redistribute_consistent(m.as_ref(), &[0], &[0; 3], Redistribution::Neighbors(m.symbolic())).unwrap();
     close(found.val(), &[16.0 + 2.0 + 4.0, 2.0, 2.0, 4.0 - 1.0 + 1.0], 1e-14);
     // Losing a negative coupling makes this one indefinite: [0.72 0.9; 0.9 1].
     let entries = [(0, 0, 0.5), (0, 1, -0.28), (1, 0, -0.28), (1, 1, 1.0), (1, 2, 0.9), (2, 1, 0.9), (2, 2, 1.0)];
-    let m = matrix([4; 2], entries.into_iter().chain([(3, 3, 1.0)]));
-    let pattern = matrix([4; 2], [(3, 0, 1.0), (0, 3, 1.0)]);
+    let m: Matrix = matrix(4, entries.into_iter().chain([(3, 3, 1.0)]));
+    let pattern: Matrix = matrix(4, [(3, 0, 1.0), (0, 3, 1.0)]);
     let by = Redistribution::Neighbors(pattern.symbolic());
     refused!(mass::redistribute_consistent(m.as_ref(), &[0], &[0; 4], by), Error::Singular { dof: 1 | 2, .. });
 }
@@ -447,11 +438,11 @@ fn wrong_input_of_redistribution_is_refused_with_its_numbers() {
 
     let consistent =
         |m: &Matrix, massless: &[usize]| mass::redistribute_consistent(m.as_ref(), massless, &[0; 2], near);
-    refused!(consistent(&matrix([2; 2], [(0, 1, 1.0)]), &[0]), Error::Asymmetric { .. });
-    refused!(consistent(&matrix([2; 2], [(0, 0, f64::NAN)]), &[0]), Error::MatrixNotFinite { .. });
-    refused!(consistent(&matrix([2; 2], [(0, 0, 1.0)]), &[0]), Error::Mass { dof: 1, .. });
-    refused!(consistent(&matrix([2, 3], [(0, 0, 1.0)]), &[0]), Error::Dimension { .. });
-    refused!(consistent(&matrix([2; 2], [(0, 0, 1.0), (1, 1, 1.0)]), &[2]), Error::MissingDof { .. });
+    refused!(consistent(&matrix(2, [(0, 1, 1.0)]), &[0]), Error::Asymmetric { .. });
+    refused!(consistent(&matrix(2, [(0, 0, f64::NAN)]), &[0]), Error::MatrixNotFinite { .. });
+    refused!(consistent(&matrix(2, [(0, 0, 1.0)]), &[0]), Error::Mass { dof: 1, .. });
+    refused!(consistent(&rectangular(2, 3, [(0, 0, 1.0)]), &[0]), Error::Dimension { .. });
+    refused!(consistent(&matrix(2, [(0, 0, 1.0), (1, 1, 1.0)]), &[2]), Error::MissingDof { .. });
 
     let coordinates = [[0.0, 1.0], [2.0, 3.0]];
     refused!(mass::affine_motions(4, &coordinates, &[[0, 1]]), Error::Dimension { expected: 2, found: 1, .. });
@@ -548,7 +539,7 @@ fn wrong_elements_are_refused_with_their_numbers() {
 fn mixed_mass_of_a_bar() {
     let n = 6;
     let halves = (1..n).flat_map(|e| [(e, e, 0.5), (e, e + 1, 0.5)]);
-    let c = matrix([n, n + 1], halves.chain([(0, 1, 1.0), (0, 0, 0.0)]));
+    let c = rectangular(n, n + 1, halves.chain([(0, 1, 1.0), (0, 0, 0.0)]));
     let m = mass::mixed(c.as_ref(), &vec![1.0; n]).unwrap();
     check_singular(&m, &[0]);
     close(&row_sums(&m), &[0.0, 1.5, 1.0, 1.0, 1.0, 1.0, 0.5], 1e-15);
@@ -556,7 +547,7 @@ fn mixed_mass_of_a_bar() {
 
     // Any C and D: entry by entry, symmetric to the last bit.
     let value = |e: usize, i: usize| ((e * 7 + i * 5) % 4) as f64 - 1.3;
-    let c = matrix([4, 5], (0..20).filter(|k| k % 3 > 0).map(|k| (k / 5, k % 5, value(k / 5, k % 5))));
+    let c = rectangular(4, 5, (0..20).filter(|k| k % 3 > 0).map(|k| (k / 5, k % 5, value(k / 5, k % 5))));
     let d = [0.3, 2.0, 0.7, 1.1];
     let (m, c_dense) = (dense(&mass::mixed(c.as_ref(), &d).unwrap()), dense(&c));
     for i in 0..5 {
@@ -571,9 +562,9 @@ fn mixed_mass_of_a_bar() {
     for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         refused!(mass::mixed(c.as_ref(), &[0.3, 2.0, wrong, 1.1]), Error::Mass { dof: 2, .. });
     }
-    let broken = matrix([1, 3], [(0, 2, f64::NAN)]);
+    let broken = rectangular(1, 3, [(0, 2, f64::NAN)]);
     refused!(mass::mixed(broken.as_ref(), &[1.0]), Error::MatrixNotFinite { row: 0, column: 2, .. });
-    let huge = matrix([1, 1], [(0, 0, 1e200)]);
+    let huge = matrix(1, [(0, 0, 1e200)]);
     refused!(mass::mixed(huge.as_ref(), &[1.0]), Error::MatrixNotFinite { .. });
 }
 
@@ -611,7 +602,7 @@ fn bipenalty_keeps_the_critical_step() {
     let law = ContactLaw::Bipenalty { stiffness: 8.0, mass: mass::bipenalty(8.0, 0.5).unwrap() };
     assert_eq!(law, ContactLaw::Bipenalty { stiffness: 8.0, mass: 0.5 });
     // Twice the Courant number of a mesh is a bound of Ω: the step is that of the largest one.
-    let k = matrix([2; 2], [(0, 0, 100.0), (0, 1, -100.0), (1, 0, -100.0), (1, 1, 100.0)]);
+    let k = matrix(2, [(0, 0, 100.0), (0, 1, -100.0), (1, 0, -100.0), (1, 1, 100.0)]);
     let courant = mass::courant(Mass::Lumped(&[2.0, 2.0]), k.as_ref(), 0.2).unwrap();
     close(&courant, &[1.0; 2], 1e-15);
 }

@@ -2,13 +2,13 @@
 //! and redundant contacts.
 
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{
     ActiveSet, Composite, ContactSolver, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::record_run;
+use contact_dynamics_scenes::sparse::{block, free};
 use contact_dynamics_scenes::wall_bar::WallBar;
 use contact_dynamics_scenes::{Bars, Record};
 
@@ -224,17 +224,7 @@ fn impedances_a_million_apart_and_the_rigid_limit() {
             // The same bar against a wall: the limit, to the ratio of the impedances.
             let [left, _] = bars.contact_dofs();
             let split = left + 1;
-            let entries: Vec<_> = {
-                let k = bars.stiffness::<f64>();
-                let k = k.as_ref();
-                (0..split)
-                    .flat_map(|j| {
-                        let column = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
-                        column.map(move |(&i, &x)| Triplet::new(i, j, x)).collect::<Vec<_>>()
-                    })
-                    .collect()
-            };
-            let k = SparseColMat::<usize, f64>::try_new_from_triplets(split, split, &entries).unwrap();
+            let k = block(&(0..split), &[(1.0, &bars.stiffness())]);
             let system = LinearSystem::lumped(bars.lumped_mass()[..split].to_vec(), k).unwrap();
             let mut run = Simulation::builder(system, scheme(), h)
                 .velocity(vec![0.1; split])
@@ -301,13 +291,11 @@ fn redundant_contacts_give_the_motion_of_one() {
 fn a_rigid_face_on_four_supports_shares_its_force() {
     // Heave and two rotations of a rigid plate on four corners: three dofs, four rows, one of them twice.
     let corners = [[1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, -1.0, -1.0]];
-    let none: Vec<_> = (0..3).map(|i| Triplet::new(i, i, 0.0)).collect();
     for corrected in [false, true] {
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &none).unwrap();
         let rows = corners.iter().fold(LinearRows::new(), |rows, c| {
             rows.unilateral(&[(0, c[0]), (1, c[1]), (2, c[2])], if corrected { 0.0305 } else { 0.0 })
         });
-        let system = LinearSystem::lumped(vec![4.0, 1.0, 2.0], k).unwrap().load(|_, f| f[0] = -40.0);
+        let system = free(&[4.0, 1.0, 2.0]).load(|_, f| f[0] = -40.0);
         // An impact, or rest from the start.
         let speed = if corrected { -1.0 } else { 0.0 };
         let builder = Simulation::builder(system, Composite, 0.01).velocity(vec![speed, 0.0, 0.0]).constraint(rows);

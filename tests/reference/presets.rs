@@ -1,12 +1,12 @@
 //! Presets against the exact impact of two bars, at every phase of the step, and over many bounces.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::{self, Mass};
 use contact_dynamics::{
     CdLagrange, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Preset, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::record_run;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{element, matrix};
 use contact_dynamics_scenes::{Bars, MassKind, Record};
 
 const H: f64 = 1e-3;
@@ -164,12 +164,7 @@ fn the_explicit_preset_takes_any_courant_number() {
 fn six_bounces(preset: Preset) -> f64 {
     let (n, young, length, gravity, height) = (100, 900.0, 10.0, 10.0, 5.0);
     let size = length / n as f64;
-    let matrix = |diagonal: f64, off: f64| {
-        let entries =
-            (0..n).flat_map(|e| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)]);
-        let entries: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
-        SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &entries).unwrap()
-    };
+    let matrix = |diagonal: f64, off: f64| matrix(n + 1, (0..n).flat_map(|e| element(e, e + 1, [diagonal, off])));
     let (k, m) = (matrix(young / size, -young / size), matrix(size / 3.0, size / 6.0));
     let h = 0.5 * size / 30.0;
     let m = preset.mass(m.as_ref(), k.symbolic(), &[0], &vec![0; n + 1], 0.5).unwrap();

@@ -3,12 +3,12 @@
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
-use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Automatic, Composite, ContactLaw, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection,
-    Result, Simulation, TimeIntegrator,
+    Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::drops::{Drop, DropFigures, LANDINGS, Landing};
+use contact_dynamics_scenes::hosts::Uncondensed;
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 const SOFT: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
@@ -60,31 +60,6 @@ fn all_contact_solvers_land_the_block_alike() {
     }
 }
 
-/// A linear solver that does not know how to condense.
-#[derive(Debug)]
-struct Plain;
-
-#[derive(Debug)]
-struct PlainFactor(Box<dyn Factorization<f64>>);
-
-impl LinearSolver<f64> for Plain {
-    fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, _: &[usize]) -> Result<Box<dyn Factorization<f64>>> {
-        Ok(Box::new(PlainFactor(Automatic.analyze(pattern, &[])?)))
-    }
-}
-
-impl Factorization<f64> for PlainFactor {
-    fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
-        self.0.factorize(a)
-    }
-    fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
-        self.0.solve(rhs)
-    }
-    fn stored_values(&self) -> usize {
-        self.0.stored_values()
-    }
-}
-
 /// A block squeezed between floor, a tilted wall and a ball above: three zones, normals along and across the axes.
 fn squeezed(solver: impl LinearSolver<f64> + 'static) -> Simulation<'static, f64> {
     let solid = Solid::block([1.0, 0.8, 1.2], [4, 3, 5], SOFT);
@@ -112,7 +87,7 @@ fn squeezed(solver: impl LinearSolver<f64> + 'static) -> Simulation<'static, f64
 
 #[test]
 fn several_zones_and_solvers_that_cannot_condense() {
-    let (mut condensed, mut plain) = (squeezed(Automatic), squeezed(Plain));
+    let (mut condensed, mut plain) = (squeezed(Automatic), squeezed(Uncondensed::new(Automatic)));
     let mut most = [0; 3];
     while condensed.time() < 1.0 {
         condensed.step().unwrap();
@@ -139,7 +114,7 @@ fn bodies_that_leave_the_reach_fly_on() {
     // Bounced off by a spring and out of reach: no force may be left behind, whatever the linear solver.
     let block = Solid::block([1.0; 3], [2; 3], SOFT).lifted(0.01);
     let bottom: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][2] < 0.02).collect();
-    let solvers: [Box<dyn LinearSolver<f64>>; 2] = [Box::new(Automatic), Box::new(Plain)];
+    let solvers: [Box<dyn LinearSolver<f64>>; 2] = [Box::new(Automatic), Box::new(Uncondensed::new(Automatic))];
     for solver in solvers {
         let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
         let contact = NodesOnObstacle::new(floor, &block.nodes, &block.node_dofs(), &bottom)

@@ -1,7 +1,6 @@
 //! When a run starts changes nothing: spacings enter results, times do not.
 #![allow(clippy::float_cmp)] // the same bits are meant
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     Bdf2, Composite, EnergyMomentum, Error, Houbolt, LinearRows, LinearSystem, Newmark, Park, PersistencyCorrection,
     Simulation, SimulationBuilder, State, StepControl, TimeIntegrator, analysis,
@@ -9,12 +8,13 @@ use contact_dynamics::{
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 /// A million seconds; the age of a clock that counts from 1970; powers of two; before zero.
 const STARTS: [f64; 5] = [1e6, 1.7e9, 1_048_576.0, 1_073_741_824.0, -1e9];
 
 fn spring(k: f64) -> LinearSystem<'static, f64> {
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, k)]).unwrap();
+    let k = matrix(1, [(0, 0, k)]);
     LinearSystem::lumped(vec![1.0], k).unwrap()
 }
 
@@ -120,10 +120,7 @@ fn driven_ends_move_alike_whenever_a_run_starts() {
         [|| Box::new(EnergyMomentum), || Box::new(Newmark::trapezoidal()), || Box::new(Park)];
     for make in schemes {
         let run = |t0: f64| {
-            let entries = [(0, 0, 40.0), (0, 1, -40.0), (1, 0, -40.0), (1, 1, 40.0)];
-            let triplets = entries.map(|(i, j, k)| Triplet::new(i, j, k));
-            let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &triplets).unwrap();
-            let c = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &triplets).unwrap();
+            let [k, c] = [40.0; 2].map(|k| matrix(2, springs(2, k)));
             let drive = move |t: f64| {
                 let (sin, cos) = (3.0 * (t - t0)).sin_cos();
                 [sin, 3.0 * cos, -9.0 * sin]

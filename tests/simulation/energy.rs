@@ -1,8 +1,8 @@
 //! Energy of states and the energy balance of runs.
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{Composite, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 fn corrected<'a>(bars: &Bars, scheme: impl TimeIntegrator + 'a, h: f64) -> Simulation<'a, f64> {
@@ -63,15 +63,13 @@ fn composite_dissipates_and_the_books_say_so() {
 fn works_of_load_damping_and_support_balance_on_smooth_motion() {
     // A damped spring between a driven base and a loaded mass: the remainder vanishes with h².
     let remainder = |h: f64| {
-        let k = [(0, 0, 50.0), (0, 1, -50.0), (1, 0, -50.0), (1, 1, 50.0)].map(|(i, j, x)| Triplet::new(i, j, x));
-        let system =
-            LinearSystem::lumped(vec![1.0, 2.0], SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &k).unwrap())
-                .unwrap()
-                .rayleigh(0.1, 0.01)
-                .unwrap()
-                .load(|t, f| f[1] = 3.0 * (2.0 * t).cos())
-                .drive(0, |t| [0.1 * t * t * t, 0.3 * t * t, 0.6 * t])
-                .unwrap();
+        let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, springs(2, 50.0)))
+            .unwrap()
+            .rayleigh(0.1, 0.01)
+            .unwrap()
+            .load(|t, f| f[1] = 3.0 * (2.0 * t).cos())
+            .drive(0, |t| [0.1 * t * t * t, 0.3 * t * t, 0.6 * t])
+            .unwrap();
         let mut run = Simulation::builder(system, Newmark::trapezoidal(), h).energy_balance().build().unwrap();
         run.run_until(2.0, &mut ()).unwrap();
         let works = run.energy().works.unwrap();
@@ -89,7 +87,7 @@ fn correction_against_a_moving_stop_books_the_change_of_kinetic_energy() {
     use contact_dynamics::corrector::Parts;
     // A mass of 2 with velocity 1 meets a stop that comes toward it with 0.5.
     let run = |parts| {
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)]).unwrap();
+        let k = matrix(1, [(0, 0, 0.0)]);
         let stop = GapOffset::moving(|t| [0.1234 - 0.5 * t, -0.5, 0.0]);
         let mut run = Simulation::builder(LinearSystem::lumped(vec![2.0], k).unwrap(), Composite, 0.01)
             .velocity(vec![1.0])

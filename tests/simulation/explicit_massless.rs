@@ -2,13 +2,13 @@
 //! nodes and without its energy.
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
-use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::mass::{self, Redistribution};
 use contact_dynamics::{
-    CdLagrange, CentralDifference, ChungLee, ContactLaw, Error, HulbertChung, LinearRows, LinearSystem, Linearity,
-    Mass, NodesOnObstacle, NohBathe, Result, Simulation, System, TangentWeights, TimeIntegrator,
+    CdLagrange, CentralDifference, ChungLee, ContactLaw, Error, HulbertChung, LinearRows, LinearSystem,
+    NodesOnObstacle, NohBathe, Result, Simulation, System, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::hosts::Bare;
 use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::measure::{Figures, figures, record_run};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -174,30 +174,6 @@ fn rows_follow_the_dofs_over_a_curved_obstacle() {
     assert!(pressed >= 4, "{pressed}");
 }
 
-/// A system whose force is that of another one, without any tangent.
-struct ForceAlone(LinearSystem<'static, f64>, SymbolicSparseColMat<usize>);
-
-impl System<f64> for ForceAlone {
-    fn dofs(&self) -> usize {
-        self.0.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        Linearity::Linear
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        self.0.mass()
-    }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.0.force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.1.as_ref()
-    }
-    fn tangent(&mut self, _: f64, _: &[f64], _: &[f64], _: TangentWeights<f64>, _: &mut [f64]) -> Result<()> {
-        unreachable!("there is none")
-    }
-}
-
 #[test]
 fn hosts_without_stiffness_give_it_by_their_force() {
     let solid = Solid::rectangle([1.0, 0.6], [8, 5], RUBBER);
@@ -206,8 +182,8 @@ fn hosts_without_stiffness_give_it_by_their_force() {
     let h = 0.4 * 0.12 / RUBBER.wave_speed();
     let go = |alone: bool| {
         let system = LinearSystem::lumped(mass.clone(), solid.stiffness()).unwrap().load(move |_, f| f[n - 1] = -0.3);
-        let empty = SymbolicSparseColMat::new_checked(n, n, vec![0; n + 1], None, Vec::new());
-        let system: Box<dyn System<f64>> = if alone { Box::new(ForceAlone(system, empty)) } else { Box::new(system) };
+        let system: Box<dyn System<f64>> =
+            if alone { Box::new(Bare::force_alone(system, n)) } else { Box::new(system) };
         let floor = Plane::new([0.0, -0.0123], [0.0, 1.0]).unwrap();
         let mut run = Simulation::builder(system, CdLagrange, h)
             .velocity(solid.uniform([0.1, -0.5]))

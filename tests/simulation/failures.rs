@@ -8,14 +8,11 @@ use contact_dynamics::{
     CentralDifference, Cholesky, ChungLee, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem,
     Newmark, PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
 };
+use contact_dynamics_scenes::schemes::Tabulated;
+use contact_dynamics_scenes::sparse::matrix;
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Matrix = SparseColMat<usize, f64>;
-
-fn matrix(n: usize, entries: &[(usize, usize, f64)]) -> Matrix {
-    let triplets: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
-    SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
-}
 
 /// Two masses and a spring.
 fn spring() -> Matrix {
@@ -247,29 +244,18 @@ fn initial_values_must_agree_with_supports() {
     assert_eq!(build(0.5, 1.0).unwrap().state().velocity()[0], 1.0);
 }
 
-#[derive(Debug)]
-struct Broken(Tableau);
-
-impl TimeIntegrator for Broken {
-    fn name(&self) -> String {
-        "broken".into()
-    }
-    fn tableau(&self) -> Tableau {
-        self.0.clone()
-    }
-}
-
 #[test]
 fn malformed_and_unsuitable_schemes_are_refused() {
     let rows = Rows { u: Z, v: Z - U[0], a: Z - U[0] - V[0] };
-    let refuse = |stages: Vec<Stage>| Simulation::builder(system(), Broken(Tableau::staged(stages)), 0.01).build();
+    let refuse =
+        |stages: Vec<Stage>| Simulation::builder(system(), Tabulated("broken", Tableau::staged(stages)), 0.01).build();
     refused!(refuse(vec![]), Error::Tableau { .. }, "broken", "no stage");
     refused!(refuse(vec![Stage::new(Rows { v: f64::NAN * Z, ..rows })]), Error::Tableau { .. }, "not finite");
     refused!(refuse(vec![Stage::new(Rows { a: V[0], ..rows })]), Error::Tableau { .. }, "unknown");
     refused!(refuse(vec![Stage::new(rows).ending_at(0.5)]), Error::Tableau { .. }, "end of the step");
     // Displacement without the unknown: a multiplier cannot close a gap.
     let explicit = Stage::new(Rows { u: U[0] + V[0], v: V[0] + Z, a: Z });
-    let position = Simulation::builder(system(), Broken(Tableau::single(explicit)), 0.01)
+    let position = Simulation::builder(system(), Tabulated("broken", Tableau::single(explicit)), 0.01)
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.0));
     refused!(position.build(), Error::Incompatible { .. }, "broken", "gap");
     let diagonal = builder().linear_solver(Diagonal).build();

@@ -11,6 +11,7 @@ use contact_dynamics::{
     Simulation, SimulationBuilder, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::random::xorshift;
+use contact_dynamics_scenes::schemes::Tabulated;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -381,18 +382,6 @@ fn random_tableau(draw: &mut impl FnMut() -> f64) -> Tableau {
     Tableau::staged(stages)
 }
 
-#[derive(Debug)]
-struct Random(Tableau);
-
-impl TimeIntegrator for Random {
-    fn name(&self) -> String {
-        "random".into()
-    }
-    fn tableau(&self) -> Tableau {
-        self.0.clone()
-    }
-}
-
 /// Runs until something fails; says how many steps were good.
 fn survive<T: Real>(builder: SimulationBuilder<'_, T>, case: &str) -> Option<usize> {
     let mut run = builder.build().ok()?;
@@ -430,7 +419,7 @@ fn random_scene<T: Real>(tableau: &Tableau, seed: u64) -> SimulationBuilder<'sta
         .row(ContactLaw::Penalty { stiffness: 100.0 }, &[(3, -one)], number(1e-3, 1.0));
     let velocity = vec![-number(1e-2, 1e2), number(1e-2, 1e2), -number(1e-2, 1e2), number(1e-2, 1e2)];
     let h = number(1e-4, 10.0).value();
-    let builder = Simulation::builder(system, Random(tableau.clone()), h)
+    let builder = Simulation::builder(system, Tabulated("random", tableau.clone()), h)
         .velocity(velocity)
         .constraint(rows)
         .unchecked_stability();

@@ -3,7 +3,7 @@
 
 use contact_dynamics::analysis;
 use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, Cylinder, Obstacle, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::traits::ComplexField;
 use contact_dynamics::integrator::Newmark;
 use contact_dynamics::partitioned::Frame;
@@ -13,16 +13,12 @@ use contact_dynamics::{
     LinearSolver, LinearSystem, Lu, Mass, Newton, Park, PersistencyCorrection, Real, Result, Simulation, StartUp,
     TimeIntegrator, Tridiagonal,
 };
+use contact_dynamics_scenes::sparse::matrix;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 type Matrix<T> = SparseColMat<usize, T>;
-
-fn matrix<T: Real + ComplexField>(n: usize, entries: &[(usize, usize, f64)]) -> Matrix<T> {
-    let triplets: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, T::from(x).unwrap())).collect();
-    SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
-}
 
 /// A chain of springs of 3 with 1 added on the diagonal.
 fn chain(n: usize) -> Matrix<f64> {

@@ -3,7 +3,6 @@
 use contact_dynamics::analysis::massless_factor;
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::corrector::ContactStabilized;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::tableau::A;
 use contact_dynamics::{
@@ -15,6 +14,7 @@ use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::measure::{figures, record_run};
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 const STIFFNESS: f64 = 400.0;
 const SPEED: f64 = 2.0;
@@ -22,9 +22,7 @@ const GAP: f64 = 0.0123;
 
 /// A mass of 1 (dof 1) on a spring whose foot (dof 0) has none.
 fn spring_and_mass() -> LinearSystem<'static, f64> {
-    let k = [(0, 0, STIFFNESS), (1, 1, STIFFNESS), (0, 1, -STIFFNESS), (1, 0, -STIFFNESS)];
-    let k = k.map(|(i, j, k)| Triplet::new(i, j, k));
-    LinearSystem::lumped(vec![0.0, 1.0], SparseColMat::try_new_from_triplets(2, 2, &k).unwrap()).unwrap()
+    LinearSystem::lumped(vec![0.0, 1.0], matrix(2, springs(2, STIFFNESS))).unwrap()
 }
 
 fn falling(integrator: impl TimeIntegrator + 'static, h: f64) -> SimulationBuilder<'static, f64> {
@@ -171,8 +169,7 @@ fn a_body_that_stands_on_dofs_without_mass_starts_with_its_weight() {
 #[test]
 fn contacts_with_and_without_mass_start_side_by_side() {
     // The foot of the spring and a mass of 2 beside it stand on the floor, the mass pulled up a little.
-    let k = [(0, 0, STIFFNESS), (1, 1, STIFFNESS), (0, 1, -STIFFNESS), (1, 0, -STIFFNESS), (2, 2, 0.0)];
-    let k = SparseColMat::try_new_from_triplets(3, 3, &k.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+    let k = matrix(3, springs(2, STIFFNESS).chain([(2, 2, 0.0)]));
     let system = LinearSystem::lumped(vec![0.0, 1.0, 2.0], k).unwrap().load(|_, f| (f[1], f[2]) = (-9.81, 4.0 - 19.62));
     let run = Simulation::builder(system, Newmark::trapezoidal(), 1e-2)
         .displacement(vec![0.0, -9.81 / STIFFNESS, 0.0])
@@ -188,8 +185,7 @@ fn contacts_with_and_without_mass_start_side_by_side() {
 fn a_mass_that_meets_dofs_without_mass_is_not_stopped_by_corrections() {
     // The foot of the falling spring lands on a mass that flies: no jump to correct, also between the two.
     let path = |corrected: bool| {
-        let k = [(0, 0, STIFFNESS), (1, 1, STIFFNESS), (0, 1, -STIFFNESS), (1, 0, -STIFFNESS), (2, 2, 0.0)];
-        let k = SparseColMat::try_new_from_triplets(3, 3, &k.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+        let k = matrix(3, springs(2, STIFFNESS).chain([(2, 2, 0.0)]));
         let correction = corrected.then(|| Box::new(PersistencyCorrection::new()) as Box<dyn Corrector<f64>>);
         let mut run =
             Simulation::builder(LinearSystem::lumped(vec![0.0, 1.0, 3.0], k).unwrap(), Newmark::trapezoidal(), 1e-3)
@@ -217,14 +213,13 @@ fn a_prediction_is_not_projected_onto_them() {
 
 #[test]
 fn zeros_that_are_stored_are_no_mass() {
-    let k = [(0, 0, STIFFNESS), (1, 1, STIFFNESS), (0, 1, -STIFFNESS), (1, 0, -STIFFNESS)];
-    let k = SparseColMat::try_new_from_triplets(2, 2, &k.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+    let k = matrix(2, springs(2, STIFFNESS));
     // Three dofs, two of them with a coupled mass, so that the matrix is not diagonal.
-    let k3 = [(0, 0, 1.0), (1, 1, 2.0), (2, 2, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 2, -1.0), (2, 1, -1.0)];
-    let k3 = SparseColMat::try_new_from_triplets(3, 3, &k3.map(|(i, j, k)| Triplet::new(i, j, k))).unwrap();
+    let k3 = matrix(3, springs(3, 1.0));
     let m = [(0, 0, 0.0), (0, 1, 0.0), (1, 0, 0.0), (1, 1, 2.0), (2, 2, 2.0), (1, 2, 1.0), (2, 1, 1.0)];
-    let m = SparseColMat::try_new_from_triplets(3, 3, &m.map(|(i, j, m)| Triplet::new(i, j, m))).unwrap();
-    assert!(Simulation::builder(LinearSystem::new(m, k3).unwrap(), Newmark::trapezoidal(), 0.1).build().is_ok());
+    assert!(
+        Simulation::builder(LinearSystem::new(matrix(3, m), k3).unwrap(), Newmark::trapezoidal(), 0.1).build().is_ok()
+    );
     // A history belongs to the dofs without mass that it was made with.
     let run = falling(Newmark::trapezoidal(), 1e-3).build().unwrap();
     let massive = LinearSystem::lumped(vec![1.0, 1.0], k).unwrap();
@@ -282,21 +277,20 @@ fn redistributed(bars: &Bars, consistent: bool) -> LinearSystem<'static, f64> {
     }
     // The consistent mass without the contact nodes, what they and their couplings had spread over the others.
     let full = bars.consistent_mass::<f64>();
-    let mut triplets = Vec::new();
+    let mut entries = Vec::new();
     let mut rows = vec![0.0; mass.len()];
     for (j, column) in (0..mass.len()).map(|j| (j, full.as_ref())) {
         for (&i, &value) in column.row_idx_of_col_raw(j).iter().zip(column.val_of_col(j)) {
             if !contact.contains(&i) && !contact.contains(&j) {
-                triplets.push(Triplet::new(i, j, value));
+                entries.push((i, j, value));
                 rows[i] += value;
             }
         }
     }
     for i in (0..mass.len()).filter(|i| !contact.contains(i)) {
-        triplets.push(Triplet::new(i, i, scale * mass[i] - rows[i]));
+        entries.push((i, i, scale * mass[i] - rows[i]));
     }
-    let matrix = SparseColMat::try_new_from_triplets(mass.len(), mass.len(), &triplets).unwrap();
-    LinearSystem::new(matrix, bars.stiffness()).unwrap()
+    LinearSystem::new(matrix(mass.len(), entries), bars.stiffness()).unwrap()
 }
 
 /// RMS and largest force, velocity error, and energy of the paper's bars, and the worst closure and drift.

@@ -8,6 +8,7 @@ use contact_dynamics::{
     Composite, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Result, Simulation, StepControl,
     System, TangentWeights, TimeIntegrator,
 };
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 #[derive(Debug)]
 struct Torn(f64);
@@ -118,17 +119,11 @@ fn inverted_facets_are_named() {
 #[test]
 fn impulses_close_and_forces_do_not() {
     let n = 6;
-    let mut entries = Vec::new();
-    for i in 0..n - 1 {
-        for (row, column, k) in [(i, i, 50.0), (i + 1, i + 1, 50.0), (i, i + 1, -50.0), (i + 1, i, -50.0)] {
-            entries.push(Triplet::new(row, column, k));
-        }
-    }
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] = [|| Box::new(Newmark::trapezoidal()), || Box::new(Composite)];
     for scheme in schemes {
         let mut missed = 0.0_f64;
         for phase in [0.07, 0.3, 0.5, 0.8, 0.99] {
-            let k = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).unwrap();
+            let k = matrix(n, springs(n, 50.0));
             let h = 0.1;
             let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0; n], k).unwrap(), scheme(), h)
                 .velocity(vec![-1.0; n])

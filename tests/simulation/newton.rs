@@ -2,15 +2,17 @@
 //! and fails without leaving a trace.
 
 use contact_dynamics::contact::{ContactLaw, GapFunction, Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
     Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem, Linearity,
     Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp, StepControl,
     System, TangentWeights, TimeIntegrator,
 };
+use contact_dynamics_scenes::hosts::Bare;
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::matrix;
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
@@ -493,25 +495,7 @@ fn failures_say_what_happened_and_leave_no_trace() {
 
 #[test]
 fn a_system_without_energy_is_refused_by_the_conserving_scheme() {
-    struct Plain(Pendulum);
-    impl System<f64> for Plain {
-        fn dofs(&self) -> usize {
-            2
-        }
-        fn mass(&self) -> Mass<'_, f64> {
-            self.0.mass()
-        }
-        fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-            self.0.force(t, u, v, out)
-        }
-        fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-            self.0.pattern()
-        }
-        fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-            self.0.tangent(t, u, v, w, out)
-        }
-    }
-    let plain = Plain(Pendulum::new(1e3));
+    let plain = Bare::new(Pendulum::new(1e3));
     assert_eq!(System::<f64>::linearity(&plain), Linearity::Nonlinear);
     match Simulation::builder(plain, EnergyMomentum, 0.01).build() {
         Err(Error::Incompatible { part, .. }) => assert_eq!(part, "energy–momentum"),
@@ -878,7 +862,7 @@ fn gaps_that_never_stand_still_fail_the_step() {
         gradient.copy_from_slice(&[-20.0 * phase.cos(), 1.0]);
         [0.5 + x[1] - 0.1 * phase.sin(), 0.0, 0.0]
     };
-    let zero = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let zero = matrix(2, [(0, 0, 0.0)]);
     for newton in [None, Some(Newton::full())] {
         let mut refused = 0;
         for slide in 0..20 {

@@ -3,12 +3,13 @@
 
 use contact_dynamics::contact::{ContactJacobian, ContactLaw};
 use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, CentralDifference, Composite, GeneralizedAlpha, Gssss, Houbolt, JumpProjection,
     LinearRows, LinearSystem, Mass, MoreauJean, Newmark, NohBathe, Oalts, Park, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
+use contact_dynamics_scenes::sparse::{element, entries};
 use proptest::prelude::*;
 
 fn scheme(index: usize) -> Box<dyn TimeIntegrator> {
@@ -76,31 +77,21 @@ fn scenes() -> impl Strategy<Value = Scene> {
 impl Scene {
     fn matrix(&self, pair: impl Fn(f64) -> [f64; 2], ground: impl Fn(f64) -> f64) -> SparseColMat<usize, f64> {
         let n = self.masses.len();
-        let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, 0.0)).collect();
+        let mut entries: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
         for &(i, j, k) in &self.springs {
-            if i == j {
-                triplets.push(Triplet::new(i, i, ground(k)));
-            } else {
-                let [diagonal, off] = pair(k);
-                for (r, c, x) in [(i, i, diagonal), (j, j, diagonal), (i, j, off), (j, i, off)] {
-                    triplets.push(Triplet::new(r, c, x));
-                }
+            match i == j {
+                true => entries.push((i, i, ground(k))),
+                false => entries.extend(element(i, j, pair(k))),
             }
         }
-        SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
+        matrix(n, entries)
     }
 
     fn mass(&self) -> Option<SparseColMat<usize, f64>> {
         let share = self.coupling?;
         let n = self.masses.len();
         let springs = self.matrix(|_| [2.0 * share, share], |_| 0.0);
-        let mut triplets: Vec<_> = (0..n).map(|i| Triplet::new(i, i, self.masses[i])).collect();
-        for j in 0..n {
-            for (&i, &x) in springs.as_ref().row_idx_of_col_raw(j).iter().zip(springs.as_ref().val_of_col(j)) {
-                triplets.push(Triplet::new(i, j, x));
-            }
-        }
-        Some(SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap())
+        Some(matrix(n, (0..n).map(|i| (i, i, self.masses[i])).chain(entries(&springs))))
     }
 
     fn system(&self) -> LinearSystem<'static, f64> {

@@ -2,18 +2,14 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{Candidates, ContactJacobian, GapOffset, GapRates};
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection,
     Result, Simulation, StepControl, System, TangentWeights, verify,
 };
+use contact_dynamics_scenes::sparse::matrix;
 use std::cell::Cell;
 use std::f64::consts::TAU;
-
-fn matrix(n: usize, entries: &[(usize, usize, f64)]) -> SparseColMat<usize, f64> {
-    let triplets: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
-    SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
-}
 
 /// Free masses.
 fn free(n: usize) -> LinearSystem<'static, f64> {

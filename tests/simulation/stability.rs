@@ -1,47 +1,33 @@
 //! Schemes and steps that cannot work are refused when a simulation is built, with the step that works.
 
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
-use contact_dynamics::tableau::{A, Rows, Stage, Tableau, U, V, Z};
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::tableau::{A, Rows, U, V, Z};
 use contact_dynamics::{
     CdLagrange, CentralDifference, ChungLee, Error, LinearSystem, Linearity, Mass, Newmark, NohBathe, Result,
     Simulation, System, TangentWeights, TimeIntegrator, analysis,
 };
+use contact_dynamics_scenes::schemes::Tabulated;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::matrix;
 use contact_dynamics_scenes::{Bars, schemes};
 
-#[derive(Debug)]
-struct Own(Tableau);
-
-impl TimeIntegrator for Own {
-    fn name(&self) -> String {
-        "own".into()
-    }
-    fn tableau(&self) -> Tableau {
-        self.0.clone()
-    }
-}
-
-fn own(rows: &Rows) -> Own {
-    Own(Tableau::single(Stage::new(*rows)))
-}
-
 fn spring(stiffness: f64) -> LinearSystem<'static, f64> {
-    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, stiffness)]).unwrap();
+    let k = matrix(1, [(0, 0, stiffness)]);
     LinearSystem::lumped(vec![1.0], k).unwrap()
 }
 
 #[test]
 fn schemes_that_do_not_converge_are_refused() {
     // Half the velocity: order 0 in u.
-    let slow = || own(&Rows { u: U[0] + 0.5 * V[0] + 0.25 * Z, v: V[0] + 0.5 * (A[0] + Z), a: Z });
-    let build = |scheme: Own| Simulation::builder(spring(1.0), scheme, 0.01).build().map(drop);
+    let slow = || Tabulated::single("slow", Rows { u: U[0] + 0.5 * V[0] + 0.25 * Z, v: V[0] + 0.5 * (A[0] + Z), a: Z });
+    let build = |scheme: Tabulated| Simulation::builder(spring(1.0), scheme, 0.01).build().map(drop);
     assert!(matches!(build(slow()), Err(Error::InconsistentScheme { .. })));
     assert!(Simulation::builder(spring(1.0), slow(), 0.01).unchecked_stability().build().is_ok());
     // The explicit two-step formula of order 3 (Dahlquist's example): the root −5 at frequency zero.
     let most = |x: [contact_dynamics::tableau::Row; 4], rate: [contact_dynamics::tableau::Row; 4]| {
         -4.0 * x[0] + 5.0 * x[1] + 4.0 * rate[0] + 2.0 * rate[1]
     };
-    let unstable = own(&Rows { u: most(U, V), v: most(V, A), a: Z });
+    let unstable = Tabulated::single("unstable", Rows { u: most(U, V), v: most(V, A), a: Z });
     assert_eq!(analysis::zero_stability(&unstable.tableau()), analysis::ZeroStability::Unstable);
     match build(unstable) {
         Err(Error::UnstableScheme { order, radius, .. }) => {
@@ -242,7 +228,7 @@ fn damping_that_lags_lowers_the_limit() {
             let critical =
                 analysis::critical_omega(&tableau, xi).unwrap().min(analysis::critical_omega(&tableau, 0.0).unwrap());
             let build = |share: f64| {
-                let scheme = Own(tableau.clone());
+                let scheme = Tabulated("own", tableau.clone());
                 let system = bars.system::<f64>().rayleigh(mass, stiffness).unwrap();
                 Simulation::builder(system, scheme, share * critical / omega).velocity(bars.velocities()).build()
             };

@@ -1,7 +1,6 @@
 //! Starts: dofs without mass that are not in static balance, and bodies that overlap.
 
 use contact_dynamics::contact::Plane;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
@@ -9,12 +8,11 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 /// A bar of n elements (EA/l = 1 a element, mass 1 a element), its first node without mass, the last one fixed.
 fn bar(n: usize) -> LinearSystem<'static, f64> {
-    let entries = (0..n).flat_map(|e| [(e, e, 1.0), (e + 1, e + 1, 1.0), (e, e + 1, -1.0), (e + 1, e, -1.0)]);
-    let entries: Vec<_> = entries.map(|(i, j, k)| Triplet::new(i, j, k)).collect();
-    let k = SparseColMat::try_new_from_triplets(n + 1, n + 1, &entries).unwrap();
+    let k = matrix(n + 1, springs(n + 1, 1.0));
     let mass = (0..=n).map(|i| [0.0, 1.5, 1.0][i.min(2)]).collect();
     LinearSystem::lumped(mass, k).unwrap().fix(n).unwrap()
 }
@@ -59,11 +57,7 @@ fn a_stretched_string_is_let_go_without_a_jump() {
 #[test]
 fn nothing_is_left_of_a_jump_of_a_spring_without_mass() {
     // Mass 1 at rest, a spring whose other end is displaced: its energy never was in the motion.
-    let entries = [(0, 0, 2.25), (1, 1, 2.25), (0, 1, -2.25), (1, 0, -2.25)].map(|(i, j, k)| Triplet::new(i, j, k));
-    let system = || {
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &entries).unwrap();
-        LinearSystem::lumped(vec![0.0, 1.0], k).unwrap()
-    };
+    let system = || LinearSystem::lumped(vec![0.0, 1.0], matrix(2, springs(2, 2.25))).unwrap();
     for scheme in schemes() {
         let mut run = Simulation::builder(system(), scheme, 0.01).displacement(vec![1.0, 0.0]).build().unwrap();
         assert!((run.start_adjustment().unwrap().energy.unwrap() + 1.125).abs() < 1e-12);
@@ -182,8 +176,7 @@ fn newtons_method_balances_large_strains() {
 }
 
 fn pendulum() -> LinearSystem<'static, f64> {
-    LinearSystem::lumped(vec![1.0], SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)]).unwrap())
-        .unwrap()
+    LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Step-size control: refused steps, judgement, growth, and landing on a time.
 
 use contact_dynamics::contact::{Side, Sphere};
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, Control, Error, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, Linearity, Mass,
     Newmark, NodesOnObstacle, PersistencyCorrection, Result, Simulation, StepControl, StepView, System, TangentWeights,
@@ -10,6 +10,7 @@ use contact_dynamics::{
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::matrix;
 use std::sync::{Arc, Mutex};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
@@ -24,7 +25,7 @@ const SCHEMES: [Make; 5] = [
 
 /// A mass on a spring.
 fn oscillator(omega: f64) -> LinearSystem<'static, f64> {
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, omega * omega)]).unwrap();
+    let k = matrix(1, [(0, 0, omega * omega)]);
     LinearSystem::lumped(vec![1.0], k).unwrap()
 }
 
@@ -72,39 +73,12 @@ impl System<f64> for Reluctant {
     fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
         self.inner.tangent(t, u, v, weights, out)
     }
+    fn prescribed(&self) -> &[usize] {
+        self.inner.prescribed()
+    }
     fn commit(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<()> {
         self.last = t;
         Ok(())
-    }
-}
-
-/// The same with the supports of the system inside.
-struct Held(Reluctant);
-
-impl System<f64> for Held {
-    fn dofs(&self) -> usize {
-        self.0.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        Linearity::Linear
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        self.0.mass()
-    }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.0.force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.0.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-        self.0.tangent(t, u, v, weights, out)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.0.inner.prescribed()
-    }
-    fn commit(&mut self, t: f64, u: &[f64], v: &[f64]) -> Result<()> {
-        self.0.commit(t, u, v)
     }
 }
 
@@ -294,10 +268,9 @@ fn a_refused_step_may_have_found_other_contacts() {
                 .fold(system, |system: LinearSystem<'static, f64>, axis| system.fix(2 * n + axis).unwrap())
         });
         let shared = Arc::new(Mutex::new(rule));
-        let builder =
-            Simulation::builder(Held(Reluctant { inner, last: 0.0, rule: Arc::clone(&shared) }), Composite, h)
-                .constraint(contact)
-                .corrector(PersistencyCorrection::with_history_projection());
+        let builder = Simulation::builder(Reluctant { inner, last: 0.0, rule: Arc::clone(&shared) }, Composite, h)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection());
         let builder = match control {
             Some(control) => builder.step_control(control),
             None => builder,
@@ -457,7 +430,7 @@ fn the_error_follows_the_tolerance() {
 #[test]
 fn contacts_that_close_together_are_parted_as_far_as_steps_may_be_halved() {
     // Three masses that hit at different times within one step, two of them together.
-    let zero = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &[Triplet::new(0, 0, 0.0)]).unwrap();
+    let zero = matrix(3, [(0, 0, 0.0)]);
     let walls = LinearRows::new().unilateral(&[(0, 1.0)], 0.102).unilateral(&[(1, 1.0)], 0.107);
     let walls = walls.unilateral(&[(2, 1.0)], 0.107);
     let control = StepControl::halving(1e-4).unwrap().contact_changes(1).unwrap();

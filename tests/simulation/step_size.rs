@@ -1,6 +1,5 @@
 //! Changes of the step size, restarts and start-up.
 
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::observer::ContactRecorder;
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::{
@@ -10,6 +9,7 @@ use contact_dynamics::{
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::record_run;
 use contact_dynamics_scenes::schemes::all;
+use contact_dynamics_scenes::sparse::matrix;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 const OMEGA: f64 = 2.0;
@@ -22,7 +22,7 @@ fn oscillator(scheme: Box<dyn TimeIntegrator>, h: f64) -> Simulation<'static, f6
 }
 
 fn oscillator_builder(scheme: Box<dyn TimeIntegrator>, h: f64) -> SimulationBuilder<'static, f64> {
-    let scalar = |x| SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, x)]).unwrap();
+    let scalar = |x| matrix(1, [(0, 0, x)]);
     let system = LinearSystem::lumped(vec![MASS], scalar(MASS * OMEGA * OMEGA))
         .unwrap()
         .damping(scalar(MASS * 2.0 * XI * OMEGA))
@@ -95,7 +95,7 @@ fn every_scheme_keeps_its_order_when_the_step_changes_every_time() {
 
 /// Largest displacement late in a run of a mode with Ω = `omega` at h = 1, released from 1.
 fn late_amplitude(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: Pattern) -> f64 {
-    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, omega * omega)]).unwrap();
+    let k = matrix(1, [(0, 0, omega * omega)]);
     let system = LinearSystem::lumped(vec![1.0], k).unwrap();
     let mut run = Simulation::builder(system, make(), 1.0).displacement(vec![1.0]).build().unwrap();
     let mut late = 0.0_f64;
@@ -138,7 +138,7 @@ fn stiff_modes_do_not_grow_when_the_step_changes_every_time() {
 
 /// Growth a change of an undamped mode, when the step alternates between 1 and `ratio` every `period` steps.
 fn growth(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: f64, period: u32) -> f64 {
-    let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, omega * omega)]).unwrap();
+    let k = matrix(1, [(0, 0, omega * omega)]);
     let system = LinearSystem::lumped(vec![1.0], k).unwrap();
     let mut run = Simulation::builder(system, make(), 1.0).displacement(vec![1.0]).build().unwrap();
     let (mut early, mut late) = (0.0_f64, 0.0_f64);
@@ -351,9 +351,7 @@ fn a_step_whose_matrix_cannot_be_factorized_leaves_the_factors_of_the_old_one() 
     let build = || {
         // Positive definite but for the last dof: the factorization fails when most of it is done.
         let entries = [(0, 0, 4.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 4.0), (1, 2, -1.0), (2, 1, -1.0), (2, 2, -4.0)];
-        let triplets = entries.map(|(i, j, k)| Triplet::new(i, j, k));
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(3, 3, &triplets).unwrap();
-        let system = LinearSystem::lumped(vec![1.0; 3], k).unwrap();
+        let system = LinearSystem::lumped(vec![1.0; 3], matrix(3, entries)).unwrap();
         Simulation::builder(system, Park, 0.01).displacement(vec![1.0, 0.0, 0.0]).build().unwrap()
     };
     for steps in [1, 5] {
@@ -414,7 +412,7 @@ fn restart_in_contact_disturbs_nothing() {
 fn restart_after_a_jump_of_the_load_keeps_the_order() {
     let (omega, force) = (2.0_f64, 5.0_f64);
     let error = |scheme: Box<dyn TimeIntegrator>, steps: u32| {
-        let k = SparseColMat::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, omega * omega)]).unwrap();
+        let k = matrix(1, [(0, 0, omega * omega)]);
         // The step that ends at the jump must not see it, the restart must.
         let is_trapezoidal = scheme.name() == Newmark::trapezoidal().name();
         let jumped = AtomicBool::new(false);

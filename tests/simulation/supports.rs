@@ -2,11 +2,11 @@
 
 use approx::assert_relative_eq;
 use contact_dynamics::contact::GapOffset;
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::observer::{Control, StepView};
 use contact_dynamics::{
     Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator,
 };
+use contact_dynamics_scenes::sparse::{element, matrix};
 
 type Scheme = fn() -> Box<dyn TimeIntegrator>;
 const SCHEMES: [Scheme; 2] = [|| Box::new(Composite), || Box::new(Newmark::trapezoidal())];
@@ -19,15 +19,7 @@ enum Kind {
 
 /// A bar of `n` elements with stiffness k and mass m each.
 fn bar(n: usize, k: f64, m: f64, kind: Kind) -> LinearSystem<'static, f64> {
-    let assemble = |diagonal: f64, off: f64| {
-        let mut triplets = Vec::new();
-        for e in 0..n {
-            for (i, j, x) in [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)] {
-                triplets.push(Triplet::new(i, j, x));
-            }
-        }
-        SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &triplets).unwrap()
-    };
+    let assemble = |diagonal: f64, off: f64| matrix(n + 1, (0..n).flat_map(|e| element(e, e + 1, [diagonal, off])));
     let mass = match kind {
         Kind::Lumped => assemble(m / 2.0, 0.0),
         Kind::Consistent => assemble(m / 3.0, m / 6.0),
@@ -176,7 +168,7 @@ fn moving_stop_carries_the_mass_with_its_own_velocity_and_acceleration() {
         [0.1 + 0.02 * (1.0 - cos), 0.1 * sin, 0.5 * cos]
     };
     for scheme in SCHEMES {
-        let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, stiffness)]).unwrap();
+        let k = matrix(1, [(0, 0, stiffness)]);
         let offset = GapOffset::moving(move |t| path(t).map(|x| -x));
         let mut run = Simulation::builder(LinearSystem::lumped(vec![mass], k).unwrap(), scheme(), 0.01)
             .displacement(vec![0.1])
@@ -232,17 +224,8 @@ fn a_driven_dof_is_a_moving_obstacle() {
         for kind in [Kind::Lumped, Kind::Consistent] {
             // The slide is one element away from nothing: dofs n + 1 and n + 2 belong to it, n + 1 is driven.
             let with_slide = |diagonal: f64, off: f64, slide: [f64; 2]| {
-                let mut triplets = Vec::new();
-                for e in 0..n {
-                    for (i, j, x) in [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)] {
-                        triplets.push(Triplet::new(i, j, x));
-                    }
-                }
-                let (p, q) = (n + 1, n + 2);
-                for (i, j, x) in [(p, p, slide[0]), (q, q, slide[0]), (p, q, slide[1]), (q, p, slide[1])] {
-                    triplets.push(Triplet::new(i, j, x));
-                }
-                SparseColMat::<usize, f64>::try_new_from_triplets(n + 3, n + 3, &triplets).unwrap()
+                let bar = (0..n).flat_map(|e| element(e, e + 1, [diagonal, off]));
+                matrix(n + 3, bar.chain(element(n + 1, n + 2, slide)))
             };
             let mass = match kind {
                 Kind::Lumped => with_slide(m / 2.0, 0.0, [5.0, 0.0]),

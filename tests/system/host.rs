@@ -3,16 +3,15 @@
 use contact_dynamics::contact::{Candidates, ContactConstraint, ContactJacobian, ContactLaw};
 use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
 use contact_dynamics::corrector::Correction;
-use contact_dynamics::faer::sparse::{
-    SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet,
-};
+use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::observer::{ContactRecorder, DofRecorder};
 use contact_dynamics::{
     ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, Damping, Error, Factorization,
-    LinearSolver, LinearSystem, Linearity, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result,
-    Simulation, StepView, System, TangentWeights, TimeIntegrator,
+    LinearSolver, Linearity, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation,
+    StepView, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::sparse::free;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -414,10 +413,7 @@ impl ContactConstraint<f64> for Moody {
 fn multipliers_and_flags_follow_their_contact_through_the_list() {
     // Mass 1 lands at t = 0.32, mass 0 at 0.45 under g = 10: its candidate comes in before that of mass 1.
     let broken = Arc::new(AtomicUsize::new(0));
-    let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
-    let system =
-        LinearSystem::lumped(vec![1.0, 2.0], k).unwrap().load(|_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -20.0]));
+    let system = free(&[1.0, 2.0]).load(|_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -20.0]));
     let mut run = Simulation::builder(system, Composite, 1e-3)
         .constraint(Floors { depths: [1.0, 0.5], near: [false; 2] })
         .constraint(Moody(broken.clone()))
@@ -519,10 +515,8 @@ impl ContactConstraint<f64> for Relay {
 fn what_was_computed_for_one_row_is_not_used_for_the_next() {
     // Masses of 1 and 5 fall under g = 10 on floors 0.1 and 0.5 below them; the first is pressed until it loses its
     // floor.
-    let zero = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
-    let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &zero).unwrap();
     let weight = |_, f: &mut [f64]| f.copy_from_slice(&[-10.0, -50.0]);
-    let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0, 5.0], k).unwrap().load(weight), Composite, 0.007)
+    let mut run = Simulation::builder(free(&[1.0, 5.0]).load(weight), Composite, 0.007)
         .velocity(vec![-1.0, -1.0])
         .constraint(Relay { mass: 0 })
         .corrector(PersistencyCorrection::with_history_projection())
