@@ -5,7 +5,6 @@ use contact_dynamics::contact_solver::{
     ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
 use contact_dynamics_scenes::random::Congruential;
-use contact_dynamics_scenes::sparse::product;
 
 #[derive(Clone, Debug)]
 struct Problem<T = f64> {

@@ -2,12 +2,12 @@
 #![allow(clippy::float_cmp)] // forces that are exactly zero
 
 use contact_dynamics::corrector::{ContactImplicit, ContactStabilized, LaursenLove, Release};
-use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{
     Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
     Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::sparse::{matrix, spring, springs};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Correctors = Vec<Box<dyn Corrector<f64>>>;
@@ -39,22 +39,17 @@ const LINKS: usize = 6;
 const SPRING: f64 = 100.0;
 const GRAVITY: f64 = 0.5;
 
-fn matrix(n: usize, links: impl Iterator<Item = (usize, f64)>) -> SparseColMat<usize, f64> {
-    let entries = links.flat_map(|(i, k)| [(i, i, k), (i + 1, i + 1, k), (i, i + 1, -k), (i + 1, i, -k)]);
-    matrix(n, entries)
-}
-
 fn masses() -> Vec<f64> {
     (0..=LINKS).map(|i| if i == 0 || i == LINKS { 0.5 } else { 1.0 }).collect()
 }
 
 fn chain(damped: Damped, x: f64, h: f64) -> LinearSystem<'static, f64> {
-    let springs = matrix(LINKS + 1, (0..LINKS).map(|i| (i, SPRING)));
+    let springs = matrix(LINKS + 1, springs(LINKS + 1, SPRING));
     let system = LinearSystem::lumped(masses(), springs).unwrap();
     let system = match damped {
         Damped::Stiffness => system.rayleigh(0.0, x / (h * 4.0 * SPRING)).unwrap(),
         Damped::Rayleigh => system.rayleigh(0.05, x / (h * 4.0 * SPRING)).unwrap(),
-        Damped::Dashpot => system.damping(matrix(LINKS + 1, [(0, x / (3.0 * h))].into_iter())).unwrap(),
+        Damped::Dashpot => system.damping(matrix(LINKS + 1, spring(0, 1, x / (3.0 * h)))).unwrap(),
     };
     let weights = masses();
     system.load(move |_, f| f.iter_mut().zip(&weights).for_each(|(f, m)| *f = -GRAVITY * m))
@@ -125,8 +120,8 @@ fn pair(
     damping: f64,
     correctors: Correctors,
 ) -> Simulation<'static, f64> {
-    let system = LinearSystem::lumped(vec![0.5, 2.0], matrix(2, [(0, 40.0)].into_iter())).unwrap();
-    let system = system.damping(matrix(2, [(0, damping)].into_iter())).unwrap();
+    let system = LinearSystem::<f64>::lumped(vec![0.5, 2.0], matrix(2, springs(2, 40.0))).unwrap();
+    let system = system.damping(matrix(2, springs(2, damping))).unwrap();
     Simulation::builder(system, scheme, h)
         .velocity(vec![-1.0; 2])
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 3.3 * h))
@@ -185,8 +180,8 @@ fn small_steps_converge_with_damping_as_without() {
     let until = 0.152;
     for make in schemes {
         let at_end = |h: f64| {
-            let system = LinearSystem::lumped(vec![0.5, 2.0], matrix(2, [(0, 40.0)].into_iter())).unwrap();
-            let system = system.damping(matrix(2, [(0, 3.0)].into_iter())).unwrap();
+            let system = LinearSystem::<f64>::lumped(vec![0.5, 2.0], matrix(2, springs(2, 40.0))).unwrap();
+            let system = system.damping(matrix(2, springs(2, 3.0))).unwrap();
             // The first mass stops at the end of a step, whatever its size.
             let mut run = Simulation::builder(system, make(), h)
                 .velocity(vec![-1.0; 2])
@@ -259,7 +254,7 @@ fn internal_damping_keeps_the_momentum() {
 #[test]
 fn corrections_that_damping_would_turn_against_are_refused() {
     let build = |scheme: Box<dyn TimeIntegrator>, corrector: Box<dyn Corrector<f64>>, damped: bool| {
-        let system = LinearSystem::lumped(vec![0.5, 2.0], matrix(2, [(0, 40.0)].into_iter())).unwrap();
+        let system = LinearSystem::<f64>::lumped(vec![0.5, 2.0], matrix(2, springs(2, 40.0))).unwrap();
         let system = if damped { system.rayleigh(0.0, 1e-3).unwrap() } else { system };
         let rows = LinearRows::new().unilateral(&[(0, 1.0)], 1.0);
         Simulation::builder(system, scheme, 0.05).constraint(rows).corrector(corrector).build().map(drop)

@@ -297,7 +297,7 @@ fn mass_views_multiply_as_matrices() {
         assert_relative_eq!(*y, 2.0 * m, max_relative = 1e-14);
     }
     // A diagonal matrix is recognized as lumped.
-    let diagonal = matrix(bars.dofs(), (0..bars.dofs()).map(|i| (i, i, 1.0 + i as f64)));
+    let diagonal = matrix::<f64>(bars.dofs(), (0..bars.dofs()).map(|i| (i, i, 1.0 + i as f64)));
     let system = LinearSystem::new(diagonal, bars.stiffness()).unwrap();
     assert!(matches!(system.mass(), Mass::Lumped(mass) if mass.len() == bars.dofs() && mass[2] == 3.0));
     let system = LinearSystem::new(consistent, bars.stiffness()).unwrap();

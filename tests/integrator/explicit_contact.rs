@@ -5,13 +5,13 @@ use contact_dynamics::contact::GapOffset;
 use contact_dynamics::reference::Side;
 use contact_dynamics::tableau::{ContactLevel, Stage, Tableau};
 use contact_dynamics::{
-    CdLagrange, CentralDifference, ChungLee, Corrector, Error, HulbertChung, LinearRows, LinearSystem, MoreauJean,
-    NohBathe, PersistencyCorrection, Simulation, TchamwaWielgosz, TimeIntegrator,
+    CdLagrange, CentralDifference, ChungLee, Corrector, Error, HulbertChung, LinearRows, MoreauJean, NohBathe,
+    PersistencyCorrection, Simulation, TchamwaWielgosz, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::{Figures, figures, record};
 use contact_dynamics_scenes::schemes::Tabulated;
-use contact_dynamics_scenes::sparse::{free, matrix};
+use contact_dynamics_scenes::sparse::free;
 
 const F0: f64 = 0.0125;
 
@@ -176,8 +176,7 @@ fn an_approach_at_the_start_is_met_by_the_first_forces() {
 
 /// A mass 2 under the force −20, `gap` above a stop.
 fn mass_above_stop(scheme: Box<dyn TimeIntegrator>, gap: f64, velocity: f64) -> Simulation<'static, f64> {
-    let free = matrix(1, [(0, 0, 0.0)]);
-    let system = LinearSystem::lumped(vec![2.0], free).unwrap().load(|_, force| force[0] = -20.0);
+    let system = free(&[2.0]).load(|_, force| force[0] = -20.0);
     Simulation::builder(system, scheme, 1e-2)
         .velocity(vec![velocity])
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], gap))
@@ -197,13 +196,12 @@ fn a_moving_wall_takes_a_mass_along() {
         [0.5 * t - 0.1 + late * late, 0.5 + 2.0 * late, if t < 0.5 { 0.0 } else { 2.0 }]
     };
     for make in schemes {
-        let free = |n: usize| matrix(n, [(0, 0, 0.0)]);
-        let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().drive(1, wall).unwrap();
+        let driven = free(&[3.0, 3.0]).drive(1, wall).unwrap();
         let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
         let by_support = Simulation::builder(driven, make(), 1e-3).constraint(rows).build().unwrap();
         let offset = GapOffset::moving(move |t| wall(t).map(|x: f64| -x));
         let rows = LinearRows::new().unilateral(&[(0, 1.0)], offset);
-        let alone = LinearSystem::lumped(vec![3.0], free(1)).unwrap();
+        let alone = free(&[3.0]);
         let by_offset = Simulation::builder(alone, make(), 1e-3).constraint(rows).build().unwrap();
         for mut run in [by_support, by_offset] {
             run.run_until(0.4, &mut ()).unwrap();
@@ -246,13 +244,12 @@ fn forward_increments_follow_a_shaking_table_exactly() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
         [|| Box::new(CentralDifference), || Box::new(NohBathe::new(0.54).unwrap())];
     for make in schemes {
-        let free = |n: usize| matrix(n, [(0, 0, 0.0)]);
         let load = |_: f64, force: &mut [f64]| force[0] = -100.0;
-        let driven = LinearSystem::lumped(vec![3.0, 3.0], free(2)).unwrap().load(load).drive(1, table).unwrap();
+        let driven = free(&[3.0, 3.0]).load(load).drive(1, table).unwrap();
         let rows = LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0);
         let by_support = Simulation::builder(driven, make(), 1e-3).constraint(rows).velocity(vec![0.4, 0.4]);
         let offset = GapOffset::moving(move |t| table(t).map(|x: f64| -x));
-        let alone = LinearSystem::lumped(vec![3.0], free(1)).unwrap().load(load);
+        let alone = free(&[3.0]).load(load);
         let rows = LinearRows::new().unilateral(&[(0, 1.0)], offset);
         let by_offset = Simulation::builder(alone, make(), 1e-3).constraint(rows).velocity(vec![0.4]);
         for builder in [by_support, by_offset] {
@@ -278,12 +275,7 @@ fn velocity_conditions_follow_a_shaking_table_exactly() {
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
         [|| Box::new(MoreauJean::new(0.5).unwrap()), || Box::new(CdLagrange)];
     for (make, lead) in schemes.into_iter().zip([0.0, 0.5]) {
-        let free = matrix(2, [(0, 0, 0.0)]);
-        let system = LinearSystem::lumped(vec![3.0, 3.0], free)
-            .unwrap()
-            .load(|_, force| force[0] = -100.0)
-            .drive(1, table)
-            .unwrap();
+        let system = free(&[3.0, 3.0]).load(|_, force| force[0] = -100.0).drive(1, table).unwrap();
         let mut run = Simulation::builder(system, make(), h)
             .velocity(vec![0.4, 0.4])
             .constraint(LinearRows::new().unilateral(&[(0, 1.0), (1, -1.0)], 0.0))
@@ -308,8 +300,7 @@ fn velocity_conditions_follow_a_shaking_table_exactly() {
 /// The first multiplier of central differences pushes a second contact in, which was not violated by itself.
 #[test]
 fn contacts_that_others_push_in_take_part_in_the_start() {
-    let free = matrix(2, [(0, 0, 0.0)]);
-    let system = LinearSystem::lumped(vec![1.0, 1.0], free).unwrap().load(|_, force| force[0] = -20.0);
+    let system = free(&[1.0, 1.0]).load(|_, force| force[0] = -20.0);
     let run = Simulation::builder(system, CentralDifference, 1e-3)
         .constraint(LinearRows::new().unilateral(&[(0, 1.0), (1, 1.0)], 0.0).unilateral(&[(1, -1.0)], 0.0))
         .build()

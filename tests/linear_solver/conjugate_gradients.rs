@@ -9,7 +9,7 @@ use contact_dynamics::{
     NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, SimulationBuilder, StepControl,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::sparse::{Entry, entries, factorized, matrix, spring, springs};
+use contact_dynamics_scenes::sparse::{Entry, entries, factorized, matrix, springs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -325,7 +325,7 @@ fn every_body_may_have_its_own_solver() {
     }
     // A solver for all: point masses are divided through.
     analyzed.lock().unwrap().clear();
-    ByBody::new(plain.clone()).analyze(a.symbolic(), &[]).unwrap();
+    ByBody::<f64>::new(plain.clone()).analyze(a.symbolic(), &[]).unwrap();
     assert_eq!(*analyzed.lock().unwrap(), [5, 6]);
     let refused = |solver: ByBody<'_, f64>| solver.analyze(a.symbolic(), &[]).map(|_| ()).unwrap_err();
     assert!(matches!(refused(ByBody::new(Diagonal)), Error::Incompatible { .. }));
@@ -418,7 +418,7 @@ fn what_is_no_string_is_refused_by_the_tridiagonal_solver() {
     refused(12, &chain(12), &[3, 10, 11]);
 
     // One-sided patterns are no strings; a matrix with unequal halves is refused when it is factorized.
-    let one_sided = matrix(2, [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0)]);
+    let one_sided = matrix::<f64>(2, [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0)]);
     let analyzed: Result<Box<dyn Factorization<f64>>> = Tridiagonal.analyze(one_sided.symbolic(), &[]);
     assert!(matches!(analyzed, Err(Error::Incompatible { .. })));
     let unequal = matrix(2, [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -0.9), (1, 1, 2.0)]);

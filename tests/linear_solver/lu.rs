@@ -6,7 +6,7 @@
 use contact_dynamics::contact_solver::{
     ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Bathe, Cholesky, Composite, EnergyMomentum, Error, Factorization, LinearRows, LinearSolver, LinearSystem, Lu, Mass,
     Newmark, Newton, Path, PathForce, PersistencyCorrection, Real, Result, Simulation, System, TangentWeights,
@@ -17,7 +17,7 @@ use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::Solid;
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{matrix, rectangular};
 use contact_dynamics_scenes::truss::{PendulumReference, Truss};
 
 /// Dense row-major matrices, for references.
@@ -111,7 +111,7 @@ fn check<T: Real>(
     tolerance: f64,
     factor: &mut Option<Box<dyn Factorization<T>>>,
 ) {
-    let a = matrix::<T>(n, entries);
+    let a = matrix::<T>(n, entries.iter().copied());
     let factor = factor.get_or_insert_with(|| Lu.analyze(a.symbolic(), &[]).unwrap());
     factor.factorize(a.as_ref()).unwrap();
     assert!(factor.stored_values() >= n);
@@ -171,7 +171,7 @@ fn zero_diagonals_are_pivoted_around() {
     check::<f64>("ties", n + 10, &entries, 1e-12, &mut None);
     check::<f32>("ties", n + 10, &entries, 1e-3, &mut None);
     // Cholesky cannot.
-    let a = matrix::<f64>(n + 10, &entries);
+    let a = matrix::<f64>(n + 10, entries.iter().copied());
     let mut cholesky = Cholesky::default().analyze(a.symbolic(), &[]).unwrap();
     assert!(matches!(cholesky.factorize(a.as_ref()), Err(Error::Singular { .. })));
 }
@@ -190,7 +190,7 @@ fn units_do_not_matter() {
             let scaled: Entries = entries.iter().map(|&(i, j, x)| (i, j, rows[i] * x * columns[j])).collect();
             let x: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
             let mut b: Vec<f64> = times(&dense(n, &entries), &x).iter().zip(&rows).map(|(b, r)| b * r).collect();
-            let a = matrix::<f64>(n, &scaled);
+            let a = matrix::<f64>(n, scaled.iter().copied());
             let mut factor = Lu.analyze(a.symbolic(), &[]).unwrap();
             factor.factorize(a.as_ref()).unwrap();
             factor.solve(&mut b).unwrap();
@@ -210,7 +210,7 @@ fn chain(n: usize, stiffness: impl Fn(usize) -> f64) -> Entries {
 
 /// The dof at which the factorization of a matrix fails.
 fn singular_at<T: Real>(n: usize, entries: &Entries) -> usize {
-    let a = matrix::<T>(n, entries);
+    let a = matrix::<T>(n, entries.iter().copied());
     let mut factor = Lu.analyze(a.symbolic(), &[]).unwrap();
     let failure = factor.factorize(a.as_ref());
     let Err(Error::Singular { dof, .. }) = failure else { panic!("{n}: {failure:?}") };
@@ -256,7 +256,7 @@ fn singular_matrices_name_what_moves() {
         assert!(singular_at::<f32>(900, &plate) < 900);
         // One spring to the ground, soft but not lost in rounding, is enough.
         plate.push((450, 450, 1e-3));
-        let a = matrix::<f64>(900, &plate);
+        let a = matrix::<f64>(900, plate.iter().copied());
         Lu.analyze(a.symbolic(), &[]).unwrap().factorize(a.as_ref()).unwrap();
     }
     // Two columns that are the same, in integers: an exact zero is met, and one of the two is named.
@@ -278,24 +278,24 @@ fn singular_matrices_name_what_moves() {
 
 #[test]
 fn what_does_not_fit_is_refused_and_does_not_spoil_the_analysis() {
-    let good = matrix::<f64>(3, &[(0, 0, 2.0), (0, 1, 1.0), (1, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
+    let good = matrix::<f64>(3, [(0, 0, 2.0), (0, 1, 1.0), (1, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
     let mut factor = Lu.analyze(good.symbolic(), &[]).unwrap();
     let mut early = [1.0_f64; 3];
     assert!(matches!(factor.solve(&mut early), Err(Error::Incompatible { .. })));
     assert_eq!(early, [1.0; 3]);
     for bad in [f64::NAN, f64::INFINITY] {
-        let broken = matrix::<f64>(3, &[(0, 0, 2.0), (0, 1, bad), (1, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
+        let broken = matrix::<f64>(3, [(0, 0, 2.0), (0, 1, bad), (1, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
         let found = factor.factorize(broken.as_ref());
         assert!(matches!(found, Err(Error::MatrixNotFinite { row: 0, column: 1, .. })), "{found:?}");
     }
-    let small = matrix::<f64>(2, &[(0, 0, 2.0), (1, 1, 2.0)]);
+    let small = matrix::<f64>(2, [(0, 0, 2.0), (1, 1, 2.0)]);
     assert!(matches!(factor.factorize(small.as_ref()), Err(Error::Dimension { expected: 3, found: 2, .. })));
-    let other = matrix::<f64>(3, &[(0, 0, 2.0), (0, 1, 1.0), (2, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
+    let other = matrix::<f64>(3, [(0, 0, 2.0), (0, 1, 1.0), (2, 0, -1.0), (1, 1, 2.0), (2, 2, 1.0)]);
     assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Incompatible { .. })));
-    let wide = SparseColMat::<usize, f64>::try_new_from_triplets(2, 3, &[Triplet::new(0, 0, 1.0)]).unwrap();
+    let wide = rectangular::<f64>(2, 3, [(0, 0, 1.0)]);
     let analyzed: Result<Box<dyn Factorization<f64>>> = Lu.analyze(wide.symbolic(), &[]);
     assert!(matches!(analyzed, Err(Error::Dimension { .. })));
-    let empty = matrix::<f64>(0, &[]);
+    let empty = matrix::<f64>(0, []);
     let mut none = Lu.analyze(empty.symbolic(), &[]).unwrap();
     none.factorize(empty.as_ref()).unwrap();
     none.solve(&mut []).unwrap();
@@ -310,8 +310,8 @@ fn what_does_not_fit_is_refused_and_does_not_spoil_the_analysis() {
 
 /// The whirling disc of the example on `Lu`: circular orbits with ω² − g ω = k.
 fn rotor(g: f64, k: f64) -> LinearSystem<'static, f64> {
-    let stiffness = matrix(2, &[(0, 0, 2.0 * k), (1, 1, 2.0 * k)]);
-    let gyroscopic = matrix(2, &[(0, 1, 2.0 * g), (1, 0, -2.0 * g)]);
+    let stiffness = matrix(2, [(0, 0, 2.0 * k), (1, 1, 2.0 * k)]);
+    let gyroscopic = matrix(2, [(0, 1, 2.0 * g), (1, 0, -2.0 * g)]);
     LinearSystem::lumped(vec![2.0; 2], stiffness).unwrap().damping(gyroscopic).unwrap()
 }
 
@@ -368,7 +368,7 @@ fn circulatory_forces_feed_a_flutter() {
     assert!(re > 0.1);
     let end = 6.0;
     let errors = [300.0, 600.0].map(|steps| {
-        let stiffness = matrix(2, &[(0, 0, k), (0, 1, q), (1, 0, -q), (1, 1, k)]);
+        let stiffness = matrix(2, [(0, 0, k), (0, 1, q), (1, 0, -q), (1, 1, k)]);
         let system = LinearSystem::lumped(vec![1.0; 2], stiffness).unwrap();
         let mut run = Simulation::builder(system, Newmark::trapezoidal(), end / steps)
             .linear_solver(Lu)
@@ -392,8 +392,8 @@ fn circulatory_forces_feed_a_flutter() {
 
 #[test]
 fn verification_of_a_tangent_tells_asymmetry_from_error() {
-    let stiffness = matrix(2, &[(0, 0, 4.0), (0, 1, 0.6), (1, 0, -0.6), (1, 1, 4.0)]);
-    let damping = matrix(2, &[(0, 1, 2.0), (1, 0, -3.0)]);
+    let stiffness = matrix(2, [(0, 0, 4.0), (0, 1, 0.6), (1, 0, -0.6), (1, 1, 4.0)]);
+    let damping = matrix(2, [(0, 1, 2.0), (1, 0, -3.0)]);
     let mut system = LinearSystem::lumped(vec![1.0; 2], stiffness).unwrap().damping(damping).unwrap();
     let error = verify::tangent(&mut system, 0.0, &[0.3, 0.4], &[1.0, -2.0], 1e-3, 1e-3).unwrap();
     assert!(error.stiffness.relative < 1e-10 && error.damping.relative < 1e-10, "{error:?}");
@@ -403,16 +403,15 @@ fn verification_of_a_tangent_tells_asymmetry_from_error() {
 
 #[test]
 fn half_a_symmetric_matrix_is_still_found() {
-    let whole = || matrix(2, &[(0, 0, 1.0), (1, 1, 1.0)]);
-    for half in
-        [matrix(2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 1, 4.0)]), matrix(2, &[(0, 0, 4.0), (1, 0, 1.0), (1, 1, 4.0)])]
+    let whole = || matrix(2, [(0, 0, 1.0), (1, 1, 1.0)]);
+    for half in [matrix(2, [(0, 0, 4.0), (0, 1, 1.0), (1, 1, 4.0)]), matrix(2, [(0, 0, 4.0), (1, 0, 1.0), (1, 1, 4.0)])]
     {
         assert!(matches!(LinearSystem::<f64>::lumped(vec![1.0; 2], half.clone()), Err(Error::Asymmetric { .. })));
         let damped = LinearSystem::lumped(vec![1.0; 2], whole()).unwrap().damping(half);
         assert!(matches!(damped, Err(Error::Asymmetric { .. })));
     }
     // One-way coupling, meant: a stored zero says so.
-    let one_way = matrix(2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 0, 0.0), (1, 1, 4.0)]);
+    let one_way = matrix(2, [(0, 0, 4.0), (0, 1, 1.0), (1, 0, 0.0), (1, 1, 4.0)]);
     let mut system = LinearSystem::lumped(vec![1.0; 2], one_way).unwrap();
     let mut force = [0.0; 2];
     system.force(0.0, &[0.0, 1.0], &[0.0; 2], &mut force).unwrap();
@@ -422,7 +421,7 @@ fn half_a_symmetric_matrix_is_still_found() {
 #[test]
 fn rayleigh_damping_and_loads_go_with_a_general_stiffness() {
     let entries = [(0, 0, 4.0), (0, 1, 0.6), (1, 0, -0.8), (1, 1, 5.0)];
-    let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, &entries)).unwrap();
+    let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, entries.iter().copied())).unwrap();
     let mut system = system.rayleigh(0.5, 0.1).unwrap().load(|t, f| f[0] = t);
     let (u, v) = ([0.3, -0.2], [1.0, 0.5]);
     let k = dense(2, &entries);
@@ -564,9 +563,9 @@ impl Shaft {
 
     fn system(&self) -> LinearSystem<'static, f64> {
         let n = self.mass.len();
-        LinearSystem::lumped(self.mass.clone(), matrix(n, &self.stiffness))
+        LinearSystem::lumped(self.mass.clone(), matrix(n, self.stiffness.iter().copied()))
             .unwrap()
-            .damping(matrix(n, &self.damping))
+            .damping(matrix(n, self.damping.iter().copied()))
             .unwrap()
     }
 }

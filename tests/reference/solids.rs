@@ -4,8 +4,8 @@
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::{
-    Automatic, Composite, ContactLaw, Factorization, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection,
-    Simulation, TimeIntegrator,
+    Automatic, Composite, ContactLaw, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
+    TimeIntegrator,
 };
 use contact_dynamics_scenes::drops::{Drop, DropFigures, LANDINGS, Landing};
 use contact_dynamics_scenes::hosts::Uncondensed;

@@ -9,14 +9,14 @@ use contact_dynamics::{
     Newmark, PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
 };
 use contact_dynamics_scenes::schemes::Tabulated;
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{matrix, rectangular};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Matrix = SparseColMat<usize, f64>;
 
 /// Two masses and a spring.
 fn spring() -> Matrix {
-    matrix(2, &[(0, 0, 4.0), (0, 1, -4.0), (1, 0, -4.0), (1, 1, 4.0)])
+    matrix(2, [(0, 0, 4.0), (0, 1, -4.0), (1, 0, -4.0), (1, 1, 4.0)])
 }
 
 fn system() -> LinearSystem<'static, f64> {
@@ -48,16 +48,16 @@ macro_rules! refused {
 #[test]
 fn not_finite_input_is_located() {
     let nan = f64::NAN;
-    let k = matrix(2, &[(0, 0, 4.0), (0, 1, nan), (1, 0, nan), (1, 1, 4.0)]);
+    let k = matrix(2, [(0, 0, 4.0), (0, 1, nan), (1, 0, nan), (1, 1, 4.0)]);
     refused!(
         LinearSystem::lumped(vec![1.0, 2.0], k),
         Error::MatrixNotFinite { matrix: "stiffness", row: 1, column: 0, .. },
         "(1, 0)",
         "NaN"
     );
-    let m = matrix(2, &[(0, 0, 1.0), (1, 1, f64::INFINITY)]);
+    let m = matrix(2, [(0, 0, 1.0), (1, 1, f64::INFINITY)]);
     refused!(LinearSystem::new(m, spring()), Error::MatrixNotFinite { matrix: "mass", row: 1, column: 1, .. }, "inf");
-    refused!(system().damping(matrix(2, &[(0, 0, nan)])), Error::MatrixNotFinite { matrix: "damping", .. }, "damping");
+    refused!(system().damping(matrix(2, [(0, 0, nan)])), Error::MatrixNotFinite { matrix: "damping", .. }, "damping");
     refused!(
         builder().displacement(vec![0.0, nan]).build(),
         Error::NotFinite { what: "the initial displacement", index: 1, .. },
@@ -79,15 +79,14 @@ fn wrong_sizes_are_refused() {
         "3",
         "2"
     );
-    refused!(system().damping(matrix(3, &[(0, 0, 1.0)])), Error::Dimension { what: "damping matrix", .. }, "3");
+    refused!(system().damping(matrix(3, [(0, 0, 1.0)])), Error::Dimension { what: "damping matrix", .. }, "3");
     refused!(
         builder().displacement(vec![0.0; 5]).build(),
         Error::Dimension { what: "the initial displacement", expected: 2, found: 5 },
         "5"
     );
     refused!(builder().velocity(vec![0.0; 1]).build(), Error::Dimension { .. }, "velocity");
-    let triplets: [Triplet<usize, usize, f64>; 1] = [Triplet::new(0, 0, 1.0)];
-    let wide = SparseColMat::<usize, f64>::try_new_from_triplets(2, 3, &triplets).unwrap();
+    let wide = rectangular::<f64>(2, 3, [(0, 0, 1.0)]);
     refused!(LinearSystem::new(wide.clone(), spring()), Error::Dimension { .. }, "mass");
     refused!(mass::lump(wide.as_ref()), Error::Dimension { .. }, "mass");
     refused!(builder().build().unwrap().momentum(&[1.0]), Error::Dimension { expected: 2, found: 1, .. }, "direction");
@@ -102,16 +101,16 @@ fn wrong_sizes_are_refused() {
 
 #[test]
 fn asymmetric_matrices_are_refused_with_the_worst_entry() {
-    let k = matrix(2, &[(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
+    let k = matrix(2, [(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
     // Cholesky cannot factorize it, and names who can.
     let system = LinearSystem::lumped(vec![4.0; 2], k).unwrap();
     let built = Simulation::builder(system, Newmark::trapezoidal(), 2.0).build();
     refused!(built, Error::Asymmetric { matrix: "effective", .. }, "-4e0", "-3e0", "Lu");
-    let m = matrix(2, &[(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
-    let k = matrix(2, &[(0, 0, 1.0), (1, 1, 1.0)]);
+    let m = matrix::<f64>(2, [(0, 0, 4.0), (0, 1, -4.0), (1, 0, -3.0), (1, 1, 4.0)]);
+    let k = matrix(2, [(0, 0, 1.0), (1, 1, 1.0)]);
     refused!(LinearSystem::new(m, k), Error::Asymmetric { matrix: "mass", .. }, "-4e0", "-3e0");
     // One triangle alone is the usual way to get there.
-    let lower = matrix(2, &[(0, 0, 4.0), (1, 0, -4.0), (1, 1, 4.0)]);
+    let lower = matrix(2, [(0, 0, 4.0), (1, 0, -4.0), (1, 1, 4.0)]);
     refused!(LinearSystem::lumped(vec![1.0; 2], lower), Error::Asymmetric { row: 1, column: 0, .. }, "both triangles");
 }
 
@@ -132,23 +131,23 @@ fn masses_must_be_positive() {
     refused!(Simulation::builder(massless(), midpoint, 0.01).build(), Error::Incompatible { .. }, "alternates");
     assert!(Simulation::builder(massless().fix(0).unwrap(), CentralDifference, 0.01).build().is_ok());
     refused!(LinearSystem::lumped(vec![f64::NAN, 1.0], spring()), Error::Mass { dof: 0, .. }, "NaN");
-    let m = matrix(2, &[(0, 0, 1.0), (0, 1, 0.1), (1, 0, 0.1), (1, 1, -1.0)]);
+    let m = matrix(2, [(0, 0, 1.0), (0, 1, 0.1), (1, 0, 0.1), (1, 1, -1.0)]);
     refused!(LinearSystem::new(m, spring()), Error::Mass { dof: 1, .. }, "dof 1");
     // Positive diagonal, but indefinite: found when the initial acceleration is solved for.
-    let m = matrix(2, &[(0, 0, 1.0), (0, 1, 2.0), (1, 0, 2.0), (1, 1, 1.0)]);
+    let m = matrix(2, [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 2.0), (1, 1, 1.0)]);
     let indefinite = LinearSystem::new(m, spring()).unwrap();
     refused!(
         Simulation::builder(indefinite, Composite, 0.01).build(),
         Error::Singular { matrix: "mass matrix", .. },
         "mass matrix"
     );
-    refused!(mass::lump(matrix(2, &[(0, 0, 1.0), (0, 1, -2.0), (1, 0, -2.0)]).as_ref()), Error::Mass { .. }, "-");
+    refused!(mass::lump(matrix::<f64>(2, [(0, 0, 1.0), (0, 1, -2.0), (1, 0, -2.0)]).as_ref()), Error::Mass { .. }, "-");
 }
 
 #[test]
 fn singular_effective_matrix_names_the_dof() {
     // A spring so negative that no step size of this run makes up for it.
-    let k = matrix(3, &[(0, 0, 2.0), (1, 1, -1e9), (2, 2, 2.0)]);
+    let k = matrix(3, [(0, 0, 2.0), (1, 1, -1e9), (2, 2, 2.0)]);
     let negative = LinearSystem::lumped(vec![1.0; 3], k).unwrap();
     refused!(
         Simulation::builder(negative, Newmark::trapezoidal(), 0.01).build(),
@@ -168,7 +167,7 @@ fn singular_effective_matrix_names_the_dof() {
             }
             entries.push((i, i, if i == 7 { -5.0 } else { 9.0 }));
         }
-        let a = matrix(n, &entries);
+        let a = matrix::<f64>(n, entries.iter().copied());
         let mut factor = LinearSolver::<f64>::analyze(&Cholesky::default(), a.symbolic(), &[]).unwrap();
         let found = factor.factorize(a.as_ref());
         assert!(matches!(found, Err(Error::Singular { dof: 7, .. })), "{n}: {found:?}");
@@ -191,7 +190,7 @@ fn parameters_outside_their_range_are_refused() {
 
 #[test]
 fn empty_and_misplaced_parts_are_refused() {
-    refused!(LinearSystem::lumped(vec![], matrix(0, &[])), Error::Empty { what: "the system", .. }, "dof");
+    refused!(LinearSystem::<f64>::lumped(vec![], matrix(0, [])), Error::Empty { what: "the system", .. }, "dof");
     refused!(system().fix(2), Error::MissingDof { dof: 2, dofs: 2, .. }, "support");
     refused!(system().fix(1).unwrap().drive(1, |_| [0.0; 3]), Error::PrescribedTwice { dof: 1 }, "twice");
     let rows = LinearRows::new().unilateral(&[(0, 1.0)], 1.0).unilateral(&[(0, 1.0), (9, -1.0)], 1.0);
@@ -265,7 +264,7 @@ fn malformed_and_unsuitable_schemes_are_refused() {
 #[test]
 fn history_of_another_run_is_refused() {
     let donor = |dofs: usize, h: f64, newmark: bool| {
-        let k = matrix(dofs, &[(0, 0, 1.0)]);
+        let k = matrix(dofs, [(0, 0, 1.0)]);
         let system = LinearSystem::lumped(vec![1.0; dofs], k).unwrap();
         let scheme: Box<dyn TimeIntegrator> =
             if newmark { Box::new(Newmark::trapezoidal()) } else { Box::new(Composite) };
@@ -296,7 +295,7 @@ fn matrices_out_of_order_are_refused() {
 #[test]
 fn a_support_that_moves_to_nowhere_fails_the_step() {
     // The driven dof has no stiffness to pass its NaN on: nobody else would notice.
-    let k = matrix(2, &[(0, 0, 0.0), (1, 1, 4.0)]);
+    let k = matrix(2, [(0, 0, 0.0), (1, 1, 4.0)]);
     let system = LinearSystem::lumped(vec![1.0; 2], k)
         .unwrap()
         .drive(0, |t| if t > 0.05 { [f64::NAN, 0.0, 0.0] } else { [0.0; 3] })

@@ -24,11 +24,11 @@ type Matrix<T> = SparseColMat<usize, T>;
 fn chain(n: usize) -> Matrix<f64> {
     let mut entries: Vec<_> = (0..n).map(|i| (i, i, 7.0)).collect();
     entries.extend((1..n).flat_map(|i| [(i, i - 1, -3.0), (i - 1, i, -3.0)]));
-    matrix(n, &entries)
+    matrix(n, entries.iter().copied())
 }
 
 fn ball<T: Real + ComplexField>() -> LinearSystem<'static, T> {
-    LinearSystem::lumped(vec![T::one(), T::one()], matrix(2, &[(0, 0, 1.0)])).unwrap()
+    LinearSystem::lumped(vec![T::one(), T::one()], matrix(2, [(0, 0, 1.0)])).unwrap()
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn solvers() -> Vec<Box<dyn LinearSolver<f64>>> {
 
 #[test]
 fn linear_solvers_refuse_lists_of_contact_dofs_that_are_none() {
-    let (coupled, apart) = (chain(4), matrix::<f64>(4, &[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0)]));
+    let (coupled, apart) = (chain(4), matrix::<f64>(4, [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0)]));
     let diagonal = std::iter::once((Box::new(Diagonal) as Box<dyn LinearSolver<f64>>, &apart));
     for (solver, a) in solvers().into_iter().map(|solver| (solver, &coupled)).chain(diagonal) {
         let analyze = |last: &[usize]| solver.analyze(a.symbolic(), last);
@@ -146,11 +146,11 @@ fn linear_solvers_refuse_lists_of_contact_dofs_that_are_none() {
 #[test]
 fn factorizations_refuse_other_matrices_than_were_analyzed() {
     let a = chain(4);
-    let unlike = matrix::<f64>(4, &[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0), (0, 3, 0.1), (3, 0, 0.1)]);
+    let unlike = matrix::<f64>(4, [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0), (0, 3, 0.1), (3, 0, 0.1)]);
     // As many entries as the chain, elsewhere.
     let moved = [(0, 1, -3.0), (1, 0, -3.0), (1, 2, -3.0), (2, 1, -3.0), (0, 3, -3.0), (3, 0, -3.0)];
     let diagonal: Vec<_> = (0..4).map(|i| (i, i, 9.0)).chain(moved).collect();
-    let moved = matrix(4, &diagonal);
+    let moved = matrix(4, diagonal.iter().copied());
     for solver in solvers() {
         let mut factor = solver.analyze(a.symbolic(), &[]).unwrap();
         for other in [&chain(3), &chain(5), &unlike, &moved] {
@@ -166,8 +166,8 @@ fn factorizations_refuse_other_matrices_than_were_analyzed() {
         assert!((7.0 * x[0] - 3.0 * x[1] - 1.0).abs() < 1e-9, "{solver:?}");
     }
     let mut factor: Box<dyn contact_dynamics::Factorization<f64>> =
-        Diagonal.analyze(matrix::<f64>(2, &[(0, 0, 1.0), (1, 1, 1.0)]).symbolic(), &[]).unwrap();
-    for other in [matrix(3, &[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0)]), matrix(1, &[(0, 0, 1.0)]), chain(2)] {
+        Diagonal.analyze(matrix::<f64>(2, [(0, 0, 1.0), (1, 1, 1.0)]).symbolic(), &[]).unwrap();
+    for other in [matrix(3, [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0)]), matrix(1, [(0, 0, 1.0)]), chain(2)] {
         assert!(factor.factorize(other.as_ref()).is_err());
     }
 }
@@ -175,7 +175,7 @@ fn factorizations_refuse_other_matrices_than_were_analyzed() {
 #[test]
 fn jump_projections_and_products_with_mass_check_what_they_are_given() {
     let lumped = [2.0, 1.0];
-    let consistent = matrix::<f64>(2, &[(0, 0, 2.0), (1, 1, 1.0)]);
+    let consistent = matrix::<f64>(2, [(0, 0, 2.0), (1, 1, 1.0)]);
     for mass in [Mass::Lumped(&lumped), Mass::Consistent(consistent.as_ref())] {
         assert!(matches!(JumpProjection::new(mass, &[2], 1), Err(Error::MissingDof { dof: 2, dofs: 2, .. })));
         assert!(matches!(JumpProjection::new(mass, &[1, 1], 1), Err(Error::RepeatedDof { dof: 1, .. })));
@@ -257,7 +257,7 @@ fn round_obstacles_of_any_size() {
 #[test]
 fn after_a_panic_of_the_host_everything_is_refused_and_nothing_is_lost() {
     let build = |left: Arc<AtomicUsize>| {
-        let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, &[(0, 0, 1.0), (1, 1, 3.0)])).unwrap().load(
+        let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, [(0, 0, 1.0), (1, 1, 3.0)])).unwrap().load(
             move |t, force| {
                 if left.fetch_sub(1, Ordering::Relaxed) == 0 {
                     // A panic without its message on the screen.
@@ -303,7 +303,7 @@ fn after_a_panic_of_the_host_everything_is_refused_and_nothing_is_lost() {
             assert!(!Error::Poisoned.is_recoverable() && Error::Poisoned.to_string().contains("resume"));
             // The remedy.
             let (state, history) = (run.state().clone(), run.history().clone());
-            let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, &[(0, 0, 1.0), (1, 1, 3.0)]))
+            let system = LinearSystem::lumped(vec![1.0, 2.0], matrix(2, [(0, 0, 1.0), (1, 1, 3.0)]))
                 .unwrap()
                 .load(|t, force| force[0] += t);
             let mut again = Simulation::builder(system, Park, 0.1)

@@ -215,7 +215,7 @@ fn a_prediction_is_not_projected_onto_them() {
 fn zeros_that_are_stored_are_no_mass() {
     let k = matrix(2, springs(2, STIFFNESS));
     // Three dofs, two of them with a coupled mass, so that the matrix is not diagonal.
-    let k3 = matrix(3, springs(3, 1.0));
+    let k3 = matrix::<f64>(3, springs(3, 1.0));
     let m = [(0, 0, 0.0), (0, 1, 0.0), (1, 0, 0.0), (1, 1, 2.0), (2, 2, 2.0), (1, 2, 1.0), (2, 1, 1.0)];
     assert!(
         Simulation::builder(LinearSystem::new(matrix(3, m), k3).unwrap(), Newmark::trapezoidal(), 0.1).build().is_ok()

@@ -3,12 +3,12 @@
 #![cfg(feature = "search")]
 
 use contact_dynamics::contact::{Facet, NodeToFacet};
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Composite, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Result, Simulation, StepControl,
     System, TangentWeights, TimeIntegrator,
 };
-use contact_dynamics_scenes::sparse::{matrix, springs};
+use contact_dynamics_scenes::sparse::{matrix, rectangular, springs};
 
 #[derive(Debug)]
 struct Torn(f64);
@@ -70,10 +70,7 @@ fn what_a_host_does_not_admit_comes_with_its_words_and_the_step() {
 
 #[test]
 fn a_short_mass_is_called_that() {
-    let stiffness = |n: usize, m: usize| {
-        let diagonal: Vec<_> = (0..n.min(m)).map(|i| Triplet::new(i, i, 1.0)).collect();
-        SparseColMat::<usize, f64>::try_new_from_triplets(n, m, &diagonal).unwrap()
-    };
+    let stiffness = |n: usize, m: usize| rectangular::<f64>(n, m, (0..n.min(m)).map(|i| (i, i, 1.0)));
     for (masses, dofs) in [(2, 3), (4, 3)] {
         let lumped = LinearSystem::lumped(vec![1.0; masses], stiffness(dofs, dofs));
         let consistent = LinearSystem::new(stiffness(masses, masses), stiffness(dofs, dofs));

@@ -9,7 +9,7 @@ use contact_dynamics::{
     LinearRows, LinearSystem, Mass, MoreauJean, Newmark, NohBathe, Oalts, Park, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
-use contact_dynamics_scenes::sparse::{element, entries};
+use contact_dynamics_scenes::sparse::{element, entries, matrix};
 use proptest::prelude::*;
 
 fn scheme(index: usize) -> Box<dyn TimeIntegrator> {

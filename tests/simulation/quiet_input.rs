@@ -4,18 +4,12 @@
 use contact_dynamics::contact::{Candidates, ContactJacobian, GapOffset, GapRates};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
-    Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection,
-    Result, Simulation, StepControl, System, TangentWeights, verify,
+    Composite, ContactConstraint, ContactLaw, Error, LinearRows, Mass, Newmark, PersistencyCorrection, Result,
+    Simulation, StepControl, System, TangentWeights, verify,
 };
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{free, matrix};
 use std::cell::Cell;
 use std::f64::consts::TAU;
-
-/// Free masses.
-fn free(n: usize) -> LinearSystem<'static, f64> {
-    let none: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
-    LinearSystem::lumped(vec![1.0; n], matrix(n, &none)).unwrap()
-}
 
 #[test]
 fn normals_of_pairs_have_any_length() {
@@ -35,7 +29,7 @@ fn normals_of_pairs_have_any_length() {
     assert!(matches!(row([0.0, 0.0]), Err(Error::Parameter { value: 0.0, .. })));
     assert!(matches!(row([f64::NAN, 1.0]), Err(Error::NotFinite { index: 0, .. })));
     // The force of a weight on a floor whose normal is given twice as long.
-    let system = free(2).load(|_, f: &mut [f64]| f[1] = -10.0).fix(0).unwrap();
+    let system = free(&[1.0; 2]).load(|_, f: &mut [f64]| f[1] = -10.0).fix(0).unwrap();
     let floor = LinearRows::new().pair(ContactLaw::Rigid, [0], [1], [2.0], 0.0).unwrap();
     let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1)
         .constraint(floor)
@@ -53,7 +47,7 @@ fn over_wall(
     scale: f64,
     wall: impl FnMut(f64) -> [f64; 3] + Send + 'static,
 ) -> Result<Simulation<'static, f64>> {
-    Simulation::builder(free(1), Newmark::trapezoidal(), h)
+    Simulation::builder(free(&[1.0; 1]), Newmark::trapezoidal(), h)
         .start_time(t)
         .displacement(vec![scale])
         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], GapOffset::moving(wall)))
@@ -103,7 +97,7 @@ fn walls_that_begin_to_move_without_rates_are_found() {
     // From t = 0.5 on, while a mass flies at it; and under a mass that rests on it.
     for (v, start) in [(-1.0, 2.0), (0.0, 0.0)] {
         let wall = |t: f64| [(0.5 - t).max(-0.9) * f64::from(u8::from(t > 0.5)), 0.0, 0.0];
-        let mut run = Simulation::builder(free(1), Newmark::trapezoidal(), 1e-2)
+        let mut run = Simulation::builder(free(&[1.0; 1]), Newmark::trapezoidal(), 1e-2)
             .displacement(vec![start])
             .velocity(vec![v])
             .constraint(LinearRows::new().unilateral(&[(0, 1.0)], GapOffset::moving(wall)))
@@ -159,7 +153,7 @@ impl ContactConstraint<f64> for Sleeping {
 #[test]
 fn rows_are_read_after_the_first_search() {
     let build = || {
-        let system = free(2).drive(1, |_| [0.125, 0.0, 0.0]).unwrap();
+        let system = free(&[1.0; 2]).drive(1, |_| [0.125, 0.0, 0.0]).unwrap();
         Simulation::builder(system, Newmark::trapezoidal(), 0.1)
             .velocity(vec![-3.0, 0.0])
             .constraint(Sleeping { awake: Cell::new(false) })
@@ -178,7 +172,7 @@ fn rows_are_read_after_the_first_search() {
 
 #[test]
 fn a_state_and_a_history_of_two_instants_are_refused() {
-    let build = || Simulation::builder(free(1), Composite, 0.1).velocity(vec![1.0]);
+    let build = || Simulation::builder(free(&[1.0; 1]), Composite, 0.1).velocity(vec![1.0]);
     let mut run = build().build().unwrap();
     run.run_until(1.0, &mut ()).unwrap();
     let early = (run.state().clone(), run.history().clone());
@@ -194,7 +188,7 @@ fn a_state_and_a_history_of_two_instants_are_refused() {
     let controlled = || {
         let control = StepControl::halving(1e-3).unwrap().contact_changes(1).unwrap();
         let stops = LinearRows::new().unilateral(&[(0, -1.0)], 0.52).unilateral(&[(1, -1.0)], 0.53);
-        Simulation::builder(free(2), Composite, 0.1)
+        Simulation::builder(free(&[1.0; 2]), Composite, 0.1)
             .start_time(1e7)
             .velocity(vec![1.0, 1.0])
             .constraint(stops)
@@ -229,8 +223,8 @@ impl Changing {
     fn new(change: Option<Change>) -> Self {
         let diagonal = SymbolicSparseColMat::new_checked(2, 2, vec![0, 1, 2], None, vec![0, 1]);
         let full = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 4], None, vec![0, 1, 0, 1]);
-        let coupled = matrix(2, &[(0, 0, 1.0), (0, 1, 0.1), (1, 0, 0.1), (1, 1, 1.0)]);
-        let consistent = [coupled, matrix(2, &[(0, 0, 1.0), (1, 1, 1.0)])];
+        let coupled = matrix(2, [(0, 0, 1.0), (0, 1, 0.1), (1, 0, 0.1), (1, 1, 1.0)]);
+        let consistent = [coupled, matrix(2, [(0, 0, 1.0), (1, 1, 1.0)])];
         Self { change, after: 0.25, now: 0.0, patterns: [diagonal, full], consistent }
     }
 

@@ -57,7 +57,7 @@ fn a_stretched_string_is_let_go_without_a_jump() {
 #[test]
 fn nothing_is_left_of_a_jump_of_a_spring_without_mass() {
     // Mass 1 at rest, a spring whose other end is displaced: its energy never was in the motion.
-    let system = || LinearSystem::lumped(vec![0.0, 1.0], matrix(2, springs(2, 2.25))).unwrap();
+    let system = || LinearSystem::<f64>::lumped(vec![0.0, 1.0], matrix(2, springs(2, 2.25))).unwrap();
     for scheme in schemes() {
         let mut run = Simulation::builder(system(), scheme, 0.01).displacement(vec![1.0, 0.0]).build().unwrap();
         assert!((run.start_adjustment().unwrap().energy.unwrap() + 1.125).abs() < 1e-12);

@@ -96,7 +96,7 @@ fn every_scheme_keeps_its_order_when_the_step_changes_every_time() {
 /// Largest displacement late in a run of a mode with Ω = `omega` at h = 1, released from 1.
 fn late_amplitude(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: Pattern) -> f64 {
     let k = matrix(1, [(0, 0, omega * omega)]);
-    let system = LinearSystem::lumped(vec![1.0], k).unwrap();
+    let system = LinearSystem::<f64>::lumped(vec![1.0], k).unwrap();
     let mut run = Simulation::builder(system, make(), 1.0).displacement(vec![1.0]).build().unwrap();
     let mut late = 0.0_f64;
     for i in 0..200 {
@@ -139,7 +139,7 @@ fn stiff_modes_do_not_grow_when_the_step_changes_every_time() {
 /// Growth a change of an undamped mode, when the step alternates between 1 and `ratio` every `period` steps.
 fn growth(make: fn() -> Box<dyn TimeIntegrator>, omega: f64, ratio: f64, period: u32) -> f64 {
     let k = matrix(1, [(0, 0, omega * omega)]);
-    let system = LinearSystem::lumped(vec![1.0], k).unwrap();
+    let system = LinearSystem::<f64>::lumped(vec![1.0], k).unwrap();
     let mut run = Simulation::builder(system, make(), 1.0).displacement(vec![1.0]).build().unwrap();
     let (mut early, mut late) = (0.0_f64, 0.0_f64);
     for i in 0..300 * period {
@@ -418,7 +418,7 @@ fn restart_after_a_jump_of_the_load_keeps_the_order() {
         let jumped = AtomicBool::new(false);
         let on = &jumped;
         let h = 1.0 / f64::from(steps);
-        let system = LinearSystem::lumped(vec![1.0], k)
+        let system = LinearSystem::<f64>::lumped(vec![1.0], k)
             .unwrap()
             .load(move |_, f| f[0] = if on.load(Ordering::Relaxed) { force } else { 0.0 });
         let mut run = Simulation::builder(system, scheme, h).velocity(vec![1.0]).energy_balance().build().unwrap();
