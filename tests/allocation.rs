@@ -4,7 +4,6 @@ use contact_dynamics::contact::{ContactLaw, Plane, Side, Sphere};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
-use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::partitioned::{self, Frame};
 use contact_dynamics::{
@@ -17,6 +16,7 @@ use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{matrix, spring};
 use contact_dynamics_scenes::{Bars, MassKind};
 
 #[test]
@@ -47,12 +47,9 @@ fn assert_steps_allocate_nothing(run: &mut Simulation<'_, f64>, steps: usize, at
 /// A chain of gyroscopic pairs that hits a stop: solves by LU in contact and away, and factorizations of it.
 fn rotors() {
     let n = 40;
-    let matrix = |entries: Vec<(usize, usize, f64)>| {
-        let entries: Vec<_> = entries.into_iter().map(|(i, j, x)| Triplet::new(i, j, x)).collect();
-        SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).unwrap()
-    };
+    let matrix = |entries: Vec<(usize, usize, f64)>| matrix(n, entries);
     let held = (0..n).map(|i| (i, i, 3.0));
-    let springs = (2..n).flat_map(|i| [(i, i, 9.0), (i - 2, i - 2, 9.0), (i, i - 2, -9.0), (i - 2, i, -9.0)]);
+    let springs = (2..n).flat_map(|i| spring(i, i - 2, 9.0));
     let stiffness = matrix(held.chain(springs).collect());
     let gyroscopic = matrix((0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, -2.0)]).collect());
     let mut factor = Lu.analyze(stiffness.symbolic(), &[]).unwrap();

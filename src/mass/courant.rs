@@ -19,7 +19,7 @@ use faer::sparse::SparseColMatRef;
 ///
 /// In solids it exceeds the number of dilatational waves along the edges of an element: on blocks of equal square
 /// quadrilaterals (plane strain) with ν = 0.3 by 9 to 20 %, of cubic hexahedra by 17 to 37 %, while the highest mode is
-/// 2 % and 4 % above that number (tests/mass.rs). For [`optimal_weight`](super::optimal_weight) c h/h_e itself is
+/// 2 % and 4 % above that number (tests/mass/blend.rs). For [`optimal_weight`](super::optimal_weight) c h/h_e itself is
 /// better, where it is known.
 ///
 /// # Errors

@@ -29,8 +29,8 @@ use faer::sparse::SparseColMat;
 /// order. The critical step of a free bar is 1/√r of the lumped one; elements with r < 1 allow larger steps, at the
 /// price of frequencies too low.
 ///
-/// Supports: leave out rows and columns of fixed dofs, as if they had no momentum; a bar fixed at one end keeps these
-/// orders (`tests/partitioned.rs`).
+/// Supports: leave rows and columns of fixed dofs out, as if they had no momentum; a bar fixed at one end keeps these
+/// orders (`tests/mass/reciprocal.rs`).
 ///
 /// Known failure: elements with row sums that are not positive (quadratic ones) are refused.
 ///

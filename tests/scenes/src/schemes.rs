@@ -1,6 +1,6 @@
 //! Every scheme of the library with what the literature says of it: the one list that tests and examples go through.
 
-use contact_dynamics::tableau::ContactLevel;
+use contact_dynamics::tableau::{ContactLevel, Rows, Stage, Tableau};
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, CentralDifference, ChungLee, Composite, EnergyMomentum, GeneralizedAlpha, Gssss, Houbolt,
     HulbertChung, MoreauJean, Newmark, NohBathe, Oalts, Park, TchamwaWielgosz, TimeIntegrator,
@@ -35,6 +35,26 @@ impl Listed {
     /// Whether a multiplier can impose contact.
     pub fn takes_multipliers(&self) -> bool {
         (self.make)().tableau().stages.iter().all(|stage| stage.contact_row().z != 0.0)
+    }
+}
+
+/// A scheme of one's own, given by its rows.
+#[derive(Clone, Debug)]
+pub struct Tabulated(pub &'static str, pub Tableau);
+
+impl Tabulated {
+    /// One stage.
+    pub fn single(name: &'static str, rows: Rows) -> Self {
+        Self(name, Tableau::single(Stage::new(rows)))
+    }
+}
+
+impl TimeIntegrator for Tabulated {
+    fn name(&self) -> String {
+        self.0.into()
+    }
+    fn tableau(&self) -> Tableau {
+        self.1.clone()
     }
 }
 

@@ -1,0 +1,11 @@
+//! Contact constraints and laws: gaps and their derivatives, what passes and what does not, what laws do in a run.
+
+mod bipenalty;
+mod curved;
+mod gap_function;
+mod laws;
+mod node_to_facet;
+mod obstacles;
+mod passing_through;
+mod rate_laws;
+mod two_bodies;

@@ -1,0 +1,6 @@
+//! Correctors: their equations, what they conserve and give back, and damped bodies.
+
+mod damping;
+mod papers;
+mod persistency;
+mod release;

@@ -1,0 +1,136 @@
+//! What `Release` gives back: whatever the scheme, the phase of the impact, and the motion of the observer.
+
+use contact_dynamics::contact::{GapOffset, NodesOnObstacle, Plane};
+use contact_dynamics::corrector::Release;
+use contact_dynamics::{
+    Bathe, Bdf2, Composite, GeneralizedAlpha, Gssss, Houbolt, LinearRows, LinearSystem, Newmark, Park,
+    PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
+};
+use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::sparse::{matrix, spring};
+
+type Make = fn() -> Box<dyn TimeIntegrator>;
+
+/// One step, several stages, several steps.
+const SCHEMES: [Make; 9] = [
+    || Box::new(Newmark::trapezoidal()),
+    || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
+    || Box::new(Gssss::new(1.0, 1.0, 1.0).unwrap()),
+    || Box::new(Bathe::default()),
+    || Box::new(Bathe::with_radius(1.0).unwrap()),
+    || Box::new(Composite),
+    || Box::new(Park),
+    || Box::new(Bdf2),
+    || Box::new(Houbolt),
+];
+
+#[derive(Clone, Copy, PartialEq)]
+enum With {
+    Nothing,
+    Release,
+}
+
+fn corrected(builder: SimulationBuilder<'_, f64>, with: With) -> SimulationBuilder<'_, f64> {
+    let builder = builder.uncorrected().corrector(PersistencyCorrection::with_history_projection());
+    match with {
+        With::Nothing => builder,
+        With::Release => builder.corrector(Release),
+    }
+}
+
+/// Energy at the end over that at the start, and the most that corrections had taken.
+fn bounce(make: Make, n: u32, phase: f64, with: With) -> [f64; 2] {
+    let h = 0.05 / f64::from(n);
+    let bars = Bars::paper(n as usize).delayed(phase, h);
+    let builder = Simulation::builder(bars.system::<f64>(), make(), h).velocity(bars.velocities());
+    let mut run = corrected(builder.constraint(bars.contact()), with).build().unwrap();
+    let (start, mut taken) = (run.energy().total(), 0.0_f64);
+    while run.time() < 0.45 {
+        run.step().unwrap();
+        taken = taken.max(run.state().contacts().dissipated()[0]);
+    }
+    assert_eq!(run.statistics().contact_changes, 2);
+    [run.energy().total() / start, taken / start]
+}
+
+#[test]
+fn runs_end_with_the_energy_that_release_gives_back() {
+    for make in SCHEMES {
+        for n in [20, 50, 100] {
+            for phase in (0..10).map(|i| 0.05 + 0.1 * f64::from(i)) {
+                let [without, taken] = bounce(make, n, phase, With::Nothing);
+                let [found, _] = bounce(make, n, phase, With::Release);
+                let case = format!("{}, n = {n}, phase {phase}: {found} after {without}, taken {taken}", make().name());
+                // No energy is made, and what numerical damping leaves of it is gain. (What is given back adds to waves
+                // that the scheme may damp the more.)
+                assert!(found <= 1.0 + 1e-9, "{case}");
+                assert!(found >= without - 1e-3 * taken, "{case}");
+                // Without numerical damping all of it is there at the end.
+                if ["Newmark", "GSSSS", "ρ∞-Bathe(1)"].iter().any(|name| make().name().starts_with(name)) {
+                    assert!((found - without - taken).abs() < 0.06 * taken + 1e-9, "{case}");
+                }
+            }
+        }
+    }
+}
+
+/// A wall beside a chain of masses, in four forms: as a gap that changes, as an obstacle that moves, as a support that
+/// is driven, or as another chain.
+#[derive(Clone, Copy, Debug)]
+enum Wall {
+    Offset,
+    Obstacle,
+    Support,
+    Chain,
+}
+
+/// Velocities at the end, seen by an observer that moves as all does, and what corrections had taken.
+fn observed(make: Make, wall: Wall, speed: f64) -> Vec<f64> {
+    const N: usize = 12;
+    let second = if matches!(wall, Wall::Chain) { N } else { 1 };
+    let springs = (0..N - 1).chain(N..N + second - 1).flat_map(|i| spring(i, i + 1, 900.0));
+    let k = matrix(N + second, (0..N + second).map(|i| (i, i, 0.0)).chain(springs));
+    let mut system = LinearSystem::lumped(vec![0.1; N + second], k).unwrap();
+    let mut velocity = vec![speed - 1.0; N];
+    velocity.resize(N + second, speed);
+    if matches!(wall, Wall::Support) {
+        system = system.drive(N, move |t| [speed * t, speed, 0.0]).unwrap();
+    }
+    let builder = Simulation::builder(system, make(), 2e-3).velocity(velocity);
+    let builder = match wall {
+        Wall::Offset => {
+            let offset = GapOffset::moving(move |t| [0.1013 - speed * t, -speed, 0.0]);
+            builder.constraint(LinearRows::new().unilateral(&[(0, 1.0)], offset))
+        }
+        Wall::Obstacle => {
+            let plane = Plane::new([0.0], [1.0]).unwrap();
+            let nodes = NodesOnObstacle::new(plane, &[[0.1013]], &[[0]], &[0]).unwrap();
+            builder.constraint(nodes.moving(move |t| [[speed * t], [speed], [0.0]]))
+        }
+        Wall::Support | Wall::Chain => builder.constraint(LinearRows::new().unilateral(&[(0, 1.0), (N, -1.0)], 0.1013)),
+    };
+    let mut run = corrected(builder, With::Release).build().unwrap();
+    let mut taken = 0.0_f64;
+    while run.time() < 1.0 {
+        run.step().unwrap();
+        taken = taken.max(run.state().contacts().dissipated()[0]);
+    }
+    assert!(taken > 0.0 && !run.state().contacts().closed()[0], "{wall:?}: {taken}");
+    run.state().velocity()[..N].iter().map(|v| v - speed).chain([taken]).collect()
+}
+
+#[test]
+fn release_does_not_depend_on_a_velocity_common_to_all() {
+    for make in SCHEMES {
+        for wall in [Wall::Offset, Wall::Obstacle, Wall::Support, Wall::Chain] {
+            let still = observed(make, wall, 0.0);
+            for speed in [1.0, -30.0, 1e4] {
+                let moving = observed(make, wall, speed);
+                for (x, y) in moving.iter().zip(&still) {
+                    let bound = 1e-11 * speed.abs();
+                    assert!((x - y).abs() < bound, "{}, {wall:?}, {speed}: {:e}", make().name(), x - y);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Bodies factorized on their own, and bodies in codes of their own that meet at a frame, against the monolithic form.
+
+mod by_body;
+mod frames;
+mod scene;

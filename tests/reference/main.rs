@@ -1,0 +1,8 @@
+//! Whole scenes against what is known of them: exact impacts, published figures, laws of conservation.
+
+mod hard_cases;
+mod large_motion;
+mod presets;
+mod solids;
+mod stabilization;
+mod two_bars;

@@ -1,0 +1,18 @@
+//! Simulations: start, steps and their size, supports, Newton's method, energy, and all that is refused or fails.
+
+mod absolute_time;
+mod energy;
+mod explicit_massless;
+mod failures;
+mod finite;
+mod limits;
+mod massless;
+mod messages;
+mod newton;
+mod properties;
+mod quiet_input;
+mod stability;
+mod start;
+mod step_control;
+mod step_size;
+mod supports;

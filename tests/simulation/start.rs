@@ -1,0 +1,288 @@
+//! Starts: dofs without mass that are not in static balance, and bodies that overlap.
+
+use contact_dynamics::contact::Plane;
+use contact_dynamics::mass::{Redistribution, redistribute};
+use contact_dynamics::{
+    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
+    PersistencyCorrection, Simulation, TimeIntegrator,
+};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{matrix, springs};
+
+/// A bar of n elements (EA/l = 1 a element, mass 1 a element), its first node without mass, the last one fixed.
+fn bar(n: usize) -> LinearSystem<'static, f64> {
+    let k = matrix(n + 1, springs(n + 1, 1.0));
+    let mass = (0..=n).map(|i| [0.0, 1.5, 1.0][i.min(2)]).collect();
+    LinearSystem::lumped(mass, k).unwrap().fix(n).unwrap()
+}
+
+fn schemes() -> Vec<Box<dyn TimeIntegrator>> {
+    vec![
+        Box::new(Newmark::trapezoidal()),
+        Box::new(Bathe::with_radius(1.0).unwrap()),
+        Box::new(Composite),
+        Box::new(CdLagrange),
+    ]
+}
+
+#[test]
+fn a_stretched_string_is_let_go_without_a_jump() {
+    // Stretched evenly, its end free: the end goes at once to where nothing pulls, with the energy of the first
+    // element.
+    let n = 50;
+    let strain = 1e-3;
+    let u: Vec<f64> = (0..=n).map(|i| strain * (n - i) as f64).collect();
+    for scheme in schemes() {
+        let name = scheme.name();
+        let conserves = !name.contains("omposite");
+        let mut run = Simulation::builder(bar(n), scheme, 0.2).displacement(u.clone()).build().unwrap();
+        let adjustment = run.start_adjustment().expect("the end was pulled");
+        let element = 0.5 * strain * strain;
+        assert!((adjustment.energy.unwrap() / -element - 1.0).abs() < 1e-9, "{name}: {adjustment:?}");
+        assert!(adjustment.dof == 0 && (adjustment.largest - strain).abs() < 1e-12, "{name}: {adjustment:?}");
+        let before = run.energy().total();
+        assert!((before / ((n - 1) as f64 * element) - 1.0).abs() < 1e-9, "{name}");
+        let steps = 4 * n;
+        let mut least = f64::INFINITY;
+        for _ in 0..steps {
+            run.step().unwrap();
+            least = least.min(run.energy().total() / before);
+        }
+        // (It was 1 - 1/n after the first step.)
+        assert!(!conserves || least > 1.0 - 2e-3, "{name}: {least}");
+    }
+}
+
+#[test]
+fn nothing_is_left_of_a_jump_of_a_spring_without_mass() {
+    // Mass 1 at rest, a spring whose other end is displaced: its energy never was in the motion.
+    let system = || LinearSystem::<f64>::lumped(vec![0.0, 1.0], matrix(2, springs(2, 2.25))).unwrap();
+    for scheme in schemes() {
+        let mut run = Simulation::builder(system(), scheme, 0.01).displacement(vec![1.0, 0.0]).build().unwrap();
+        assert!((run.start_adjustment().unwrap().energy.unwrap() + 1.125).abs() < 1e-12);
+        run.run_until(1.0, &mut ()).unwrap();
+        assert!(run.energy().total().abs() < 1e-20 && run.state().displacement()[0].abs() < 1e-10);
+    }
+}
+
+#[test]
+fn contact_takes_part_in_the_balance() {
+    // Pressed on a wall at 0 by its own stretch, or held back from a wall that it does not reach.
+    for (second, force) in [(-0.3, 0.3), (0.2, 0.0)] {
+        let n = 6;
+        let mut u: Vec<f64> = (0..=n).map(|i| second * (n - i) as f64 / (n - 1) as f64).collect();
+        u[0] = 0.7;
+        for scheme in schemes() {
+            let name = scheme.name();
+            let mut run = Simulation::builder(bar(n), scheme, 0.1)
+                .displacement(u.clone())
+                .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.0))
+                .uncorrected()
+                .build()
+                .unwrap();
+            let state = run.state();
+            let end = state.displacement()[0];
+            assert!((end - second.max(0.0)).abs() < 1e-12, "{name}: {end}");
+            assert!((state.contacts().forces()[0] - force).abs() < 1e-12, "{name}");
+            run.step().unwrap();
+            // No jump of the force in the first step.
+            assert!((run.state().contacts().forces()[0] - force).abs() < 0.05, "{name}");
+        }
+    }
+}
+
+#[test]
+fn many_contacts_are_balanced_far_from_the_origin() {
+    // A plate in its own weight on a floor whose height is large beside what it moves.
+    for height in [0.0, 1.0, 1e3] {
+        let solid = Solid::rectangle([1.0, 1.0], [20, 20], RUBBER).lifted(height);
+        let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < height + 1e-9).collect();
+        let massless: Vec<usize> = bottom.iter().map(|n| 2 * n + 1).collect();
+        let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 2).collect();
+        let stiffness = solid.stiffness::<f64>();
+        let by = Redistribution::Neighbors(stiffness.symbolic());
+        let mass = redistribute(&solid.lumped_mass(), &massless, &groups, by).unwrap();
+        let weight: Vec<f64> = solid
+            .lumped_mass::<f64>()
+            .iter()
+            .enumerate()
+            .map(|(dof, m)| if dof % 2 == 1 { -1e-2 * m } else { 0.0 })
+            .collect();
+        let carried: f64 = bottom.iter().map(|n| -weight[2 * n + 1]).sum();
+        let floor = Plane::new([0.0, height], [0.0, 1.0]).unwrap();
+        let rows = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let system =
+            LinearSystem::lumped(mass, solid.stiffness()).unwrap().load(move |_, f| f.copy_from_slice(&weight));
+        let run = Simulation::builder(system, CdLagrange, 1e-3).constraint(rows).uncorrected().build().unwrap();
+        let forces: f64 = run.state().contacts().forces().iter().sum();
+        assert!((forces / carried - 1.0).abs() < 1e-6, "{height}: {forces} {carried}");
+    }
+}
+
+#[test]
+fn what_is_in_balance_or_damped_is_left_alone() {
+    let n = 8;
+    let mut u: Vec<f64> = (0..=n).map(|i| 1e-3 * ((n - i) as f64).sin()).collect();
+    u[0] = u[1];
+    let run = Simulation::builder(bar(n), Newmark::trapezoidal(), 0.1).displacement(u.clone()).build().unwrap();
+    assert!(run.start_adjustment().is_none());
+    assert!(run.state().displacement().iter().zip(&u).all(|(x, y)| x.to_bits() == y.to_bits()));
+    // With a damper at the end its displacement is an initial value: it creeps.
+    u[0] = 0.1;
+    let damped = bar(n).rayleigh(0.0, 0.5).unwrap();
+    let run = Simulation::builder(damped, Newmark::trapezoidal(), 0.1).displacement(u.clone()).build().unwrap();
+    assert!(run.start_adjustment().is_none() && run.state().displacement()[0].to_bits() == 0.1_f64.to_bits());
+}
+
+const RUBBER: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
+
+#[test]
+fn newtons_method_balances_large_strains() {
+    let solid = Solid::rectangle([1.0, 0.6], [6, 4], RUBBER);
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < 1e-9).collect();
+    let massless: Vec<usize> = bottom.iter().flat_map(|n| [2 * n, 2 * n + 1]).collect();
+    let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 2).collect();
+    let stiffness = solid.stiffness::<f64>();
+    let by = Redistribution::Neighbors(stiffness.symbolic());
+    let light = redistribute(&solid.lumped_mass(), &massless, &groups, by).unwrap();
+    let body = || Hyperelastic::new(&solid, Law::NeoHookean).masses(light.clone());
+    // Bent, and the bottom scattered; a floor keeps it from going down.
+    let mut u: Vec<f64> = (0..solid.dofs())
+        .map(|dof| if dof % 2 == 1 { 0.15 * (3.0 * solid.nodes[dof / 2][0]).sin().abs() } else { 0.0 })
+        .collect();
+    for (k, &dof) in massless.iter().enumerate() {
+        u[dof] += 0.02 * (7.3 * k as f64).sin().abs();
+    }
+    let build = |u: Vec<f64>| {
+        let floor = Plane::new([0.0, 0.0], [0.0, 1.0]).unwrap();
+        let rows = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        Simulation::builder(body(), Newmark::trapezoidal(), 0.01)
+            .displacement(u)
+            .constraint(rows)
+            .uncorrected()
+            .build()
+            .unwrap()
+    };
+    let mut run = build(u);
+    let adjustment = run.start_adjustment().unwrap();
+    assert!(adjustment.energy.unwrap() < 0.0 && adjustment.largest > 1e-3, "{adjustment:?}");
+    // The balance is one: nothing moves when it is taken as the start.
+    let again = build(run.state().displacement().to_vec());
+    assert!(again.start_adjustment().is_none_or(|again| again.largest < 1e-9 * adjustment.largest));
+    let before = run.energy().total();
+    run.step().unwrap();
+    assert!((run.energy().total() / before - 1.0).abs() < 0.05, "{}", run.energy().total() / before);
+}
+
+fn pendulum() -> LinearSystem<'static, f64> {
+    LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap()
+}
+
+#[test]
+fn slivers_within_the_rounding_of_coordinates_are_no_overclosure() {
+    // Twelve digits of a coordinate of size 1.
+    let build = |rows: LinearRows<'static, f64>| {
+        Simulation::builder(pendulum(), Newmark::trapezoidal(), 0.01)
+            .constraint(rows)
+            .corrector(PersistencyCorrection::new())
+            .build()
+    };
+    let row = |gap: f64| LinearRows::new().unilateral(&[(0, 1.0)], gap);
+    assert!(matches!(build(row(-5e-13)), Err(Error::InitialViolation { .. })));
+    assert!(build(row(-5e-13).coordinates(1.0)).is_ok());
+    assert!(matches!(build(row(-5e-12).coordinates(1.0)), Err(Error::InitialViolation { .. })));
+    // In another unit of length.
+    assert!(build(row(-5e-10).coordinates(1e3)).is_ok() && build(row(-5e-9).coordinates(1e3)).is_err());
+    // Obstacles know the coordinates.
+    let solid = Solid::rectangle([1.0, 0.6], [4, 3], RUBBER).lifted(1.0);
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < 1.0 + 1e-9).collect();
+    let drop = |depth: f64| {
+        let floor = Plane::new([0.0, 1.0 + depth], [0.0, 1.0]).unwrap();
+        let rows = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let system = LinearSystem::lumped(solid.lumped_mass(), solid.stiffness()).unwrap();
+        let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1e-3)
+            .constraint(rows)
+            .corrector(PersistencyCorrection::new())
+            .build()?;
+        run.run_until(0.1, &mut ())?;
+        Ok::<f64, Error>(run.energy().total())
+    };
+    assert!(drop(5e-13).unwrap() < 1e-18);
+    assert!(drop(1e-10).is_err());
+}
+
+#[test]
+fn gaps_are_measured_from_where_they_start() {
+    let solid = Solid::rectangle([1.0, 0.6], [4, 3], RUBBER);
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][1] < 1e-9).collect();
+    // A floor that is not level: every node has a depth of its own, and the last ones none.
+    let floor = || Plane::new([0.7, 0.0], [0.01, 1.0]).unwrap();
+    let load = |_: f64, f: &mut [f64]| f.iter_mut().skip(1).step_by(2).for_each(|f| *f = -0.02);
+    let builder = |overclosure: InitialOverclosure, load_on: bool| {
+        let rows = NodesOnObstacle::new(floor(), &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let system = LinearSystem::lumped(solid.lumped_mass(), solid.stiffness()).unwrap();
+        let system = if load_on { system.load(load) } else { system };
+        Simulation::builder(system, Newmark::trapezoidal(), 1e-3)
+            .constraint(rows)
+            .corrector(PersistencyCorrection::new())
+            .initial_overclosure(overclosure)
+    };
+    assert!(matches!(builder(InitialOverclosure::Refused, false).build(), Err(Error::InitialViolation { .. })));
+    let mut run = builder(InitialOverclosure::AdjustedGaps, false).build().unwrap();
+    assert!(run.gaps().iter().all(|gap| *gap >= 0.0) && run.gaps().iter().any(|gap| *gap > 1e-3));
+    run.run_until(0.2, &mut ()).unwrap();
+    assert!(run.energy().total().abs() < 1e-300 && run.state().displacement().iter().all(|u| *u == 0.0));
+    // Under load no node goes deeper than it was, and a continued run remembers how deep that is.
+    let mut run = builder(InitialOverclosure::AdjustedGaps, true).build().unwrap();
+    run.run_until(0.2, &mut ()).unwrap();
+    let resumed = builder(InitialOverclosure::Refused, true).resume(run.state().clone(), run.history().clone());
+    let mut resumed = resumed.build().unwrap();
+    run.run_until(0.4, &mut ()).unwrap();
+    resumed.run_until(0.4, &mut ()).unwrap();
+    assert_eq!(run.state().displacement(), resumed.state().displacement());
+    assert!(run.gaps().iter().all(|gap| *gap > -1e-12) && run.state().contacts().closed().iter().any(|closed| *closed));
+    for &node in &bottom {
+        let depth = (-floor_gap(solid.nodes[node])).max(0.0);
+        let gap = floor_gap([0, 1].map(|axis| solid.nodes[node][axis] + run.state().displacement()[2 * node + axis]));
+        assert!(gap > -depth - 1e-12, "{gap} {depth}");
+    }
+    // A time that is none.
+    for time in [0.0, -1.0, f64::NAN] {
+        assert!(matches!(builder(InitialOverclosure::RemovedOver(time), false).build(), Err(Error::Parameter { .. })));
+    }
+}
+
+fn floor_gap([x, y]: [f64; 2]) -> f64 {
+    (0.01 * (x - 0.7) + y) / 1.0_f64.hypot(0.01)
+}
+
+#[test]
+fn overlap_that_is_removed_strains_what_it_moves() {
+    // A mass on a spring of stiffness 4, 0.01 deep in a wall: it is pushed out along 1 − 3 τ² + 2 τ³.
+    let (depth, time) = (0.01, 2.0);
+    for scheme in [Box::new(Newmark::trapezoidal()) as Box<dyn TimeIntegrator>, Box::new(Bathe::default())] {
+        let name = scheme.name();
+        let mut run = Simulation::builder(pendulum(), scheme, 0.01)
+            .constraint(LinearRows::new().equality(&[(0, 1.0)], -depth))
+            .corrector(PersistencyCorrection::new())
+            .initial_overclosure(InitialOverclosure::RemovedOver(time))
+            .energy_balance()
+            .build()
+            .unwrap();
+        let mut worst = [0.0_f64; 2];
+        while run.time() < 3.0 {
+            run.step().unwrap();
+            let x = (run.time() / time).min(1.0);
+            let u = depth * x * x * (3.0 - 2.0 * x);
+            let acceleration = if x < 1.0 { depth * (6.0 - 12.0 * x) / (time * time) } else { 0.0 };
+            worst[0] = worst[0].max((run.state().displacement()[0] - u).abs());
+            // (Where it begins and ends the acceleration jumps.)
+            if (run.time() - time).abs() > 0.02 && run.time() > 0.02 {
+                worst[1] = worst[1].max((run.state().contacts().forces()[0] - 4.0 * u - acceleration).abs());
+            }
+        }
+        assert!(worst[0] < 1e-13 && worst[1] < 2e-2 * 4.0 * depth, "{name}: {worst:?}");
+        assert!((run.energy().total() / (2.0 * depth * depth) - 1.0).abs() < 1e-3, "{name}: {}", run.energy().total());
+    }
+}
