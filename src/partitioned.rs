@@ -78,8 +78,8 @@ impl<T: Real> Interface<T> {
 /// ```
 ///
 /// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes.
-/// A body needs to know neither the other one nor its code: a step goes on with the forces found. Results are those of
-/// the monolithic form up to rounding (`tests/partitioned/frames.rs`).
+/// A body needs to know neither the other one nor its code: its step goes on with the forces of the frame. Results are
+/// those of the monolithic form up to rounding (`tests/partitioned/frames.rs`).
 ///
 /// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one
 /// belongs to the first side. Three bodies that touch each other do not fit.

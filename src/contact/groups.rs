@@ -22,6 +22,19 @@ pub(crate) struct Groups {
 const FREE: usize = usize::MAX;
 
 impl Groups {
+    /// Memory for so many rows that act on dofs below `dofs`.
+    pub(crate) fn with_capacity(rows: usize, dofs: usize) -> Self {
+        let reserved = |n| Vec::with_capacity(n);
+        Self {
+            positions: reserved(rows),
+            starts: reserved(rows + 1),
+            leader: reserved(rows),
+            owner: vec![FREE; dofs],
+            place: reserved(rows),
+            next: reserved(rows + 1),
+        }
+    }
+
     /// Sorts rows by the dofs (below `dofs`) that each of them acts on.
     pub(crate) fn sort<D: Iterator<Item = usize>>(
         &mut self,

@@ -28,17 +28,23 @@ impl<T: Real> ContactProblem<'_, T> {
 
     /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
     pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
+        /// Rows and columns that are looked at together: what lies across the diagonal is then near in memory too.
+        const TILE: usize = 32;
+        let size = self.size();
         let mut worst = (share, None);
-        for i in 0..self.size() {
-            let own = self.delassus(i, i);
-            for (j, &w) in self.row(i)[..i].iter().enumerate() {
-                let mirrored = self.delassus(j, i);
-                let difference = (w - mirrored).abs();
-                // (Most pairs are equal bit for bit: no root for these.)
-                if difference > T::zero() {
-                    let scale = (own * self.delassus(j, j)).abs().sqrt().max(w.abs() + mirrored.abs());
-                    if difference > worst.0 * scale {
-                        worst = (difference / scale, Some((i, j)));
+        let tiles = (0..size).step_by(TILE);
+        for (first, columns) in tiles.flat_map(|first| (0..=first).step_by(TILE).map(move |columns| (first, columns))) {
+            for i in first..(first + TILE).min(size) {
+                for j in columns..(columns + TILE).min(i) {
+                    let (w, mirrored) = (self.delassus(i, j), self.delassus(j, i));
+                    let difference = (w - mirrored).abs();
+                    // (Most pairs are equal bit for bit: no root for these.)
+                    if difference > T::zero() {
+                        let own = self.delassus(i, i);
+                        let scale = (own * self.delassus(j, j)).abs().sqrt().max(w.abs() + mirrored.abs());
+                        if difference > worst.0 * scale {
+                            worst = (difference / scale, Some((i, j)));
+                        }
                     }
                 }
             }

@@ -1,10 +1,12 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
 use crate::contact::{ContactId, ContactJacobian, Groups};
+use crate::contact_solver::FORESEEN;
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::mass::{InverseMass, Mass};
+use crate::memory;
 use crate::real::Real;
 use crate::sparse;
 
@@ -96,21 +98,24 @@ impl<T: Real> JumpProjection<T> {
     }
 
     pub(crate) fn with(inverse: InverseMass<T>, dofs: usize, rows: usize) -> Result<Self> {
-        let stored = match inverse {
-            InverseMass::Lumped(_) => 0,
-            InverseMass::Consistent { .. } => rows,
+        memory::reserve::<usize>(rows, 8, "a jump projection")?;
+        let (stored, keys) = match inverse {
+            InverseMass::Lumped(_) => (0, if rows > 0 { dofs } else { 0 }),
+            InverseMass::Consistent { .. } => (rows, 0),
         };
+        // (Columns of small scenes take little memory, and have it at once.)
+        let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
         Ok(Self {
             inverse,
             dofs,
             slots: vec![NONE; stored],
-            columns: Vec::new(),
+            columns: (0..foreseen).map(|_| vec![T::zero(); dofs]).collect(),
             computed: 0,
             closed: Vec::with_capacity(rows),
-            groups: Groups::default(),
-            roots: Vec::new(),
-            factors: Vec::new(),
-            gathered: Vec::new(),
+            groups: Groups::with_capacity(rows, keys),
+            roots: Vec::with_capacity(rows),
+            factors: vec![DenseCholesky::with_capacity(rows.min(FORESEEN))],
+            gathered: Vec::with_capacity(rows),
             factored: false,
         })
     }

@@ -3,6 +3,7 @@
 use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::contact::{ContactJacobian, Groups};
+use crate::contact_solver::FORESEEN;
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::mass::Mass;
@@ -58,7 +59,7 @@ enum ContactPath {
 const DEAR: f64 = 1.25;
 
 /// The Delassus operator of some rows, kept until they or their responses change. It grows with them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Delassus<T> {
     rows: Vec<usize>,
     /// Row by row, with the compliances of the laws on the diagonal.
@@ -66,6 +67,15 @@ struct Delassus<T> {
     /// The diagonal without them.
     diagonal: Vec<T>,
     version: u64,
+}
+
+impl<T: Real> Delassus<T> {
+    /// Memory for as many rows as are foreseen on an interface of so many dofs.
+    fn foreseen(interface: usize) -> Self {
+        let rows = interface.min(FORESEEN);
+        let values = Vec::with_capacity(rows * rows);
+        Self { rows: Vec::with_capacity(rows), values, diagonal: Vec::with_capacity(rows), version: 0 }
+    }
 }
 
 impl<T: Real> Operator<T> {
@@ -100,10 +110,10 @@ impl<T: Real> Operator<T> {
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            reciprocals: Vec::new(),
+            reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
             rows: 0,
-            delassus: Delassus::default(),
-            groups: Groups::default(),
+            delassus: Delassus::foreseen(interface.len()),
+            groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact,
             full,
         };
@@ -135,8 +145,8 @@ impl<T: Real> Operator<T> {
             responses: Responses::new(Unit::Dof, interface.len()),
             reciprocals: Vec::new(),
             rows: 0,
-            delassus: Delassus::default(),
-            groups: Groups::default(),
+            delassus: Delassus::foreseen(interface.len()),
+            groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact: ContactPath::Condensed,
             full: Vec::new(),
         })
@@ -329,10 +339,9 @@ impl<T: Real> Operator<T> {
         let Self { contact, factor, interface, full, responses, reciprocals, .. } = self;
         if *contact == ContactPath::Apart {
             if reciprocals.is_empty() {
-                let mut units = memory::zeros(1, interface.len(), "the responses of contact")?;
-                units.fill(T::one());
-                respond((*contact, &mut **factor), interface, full, &mut units)?;
-                *reciprocals = units;
+                reciprocals.resize(interface.len(), T::one());
+                let found = respond((*contact, &mut **factor), interface, full, reciprocals);
+                return found.inspect_err(|_| reciprocals.clear());
             }
             return Ok(());
         }

@@ -33,14 +33,19 @@ pub(super) struct Responses<T> {
     missing: Vec<usize>,
 }
 
+/// Dofs of an interface whose responses take little memory, all together.
+const SMALL: usize = 256;
+
 /// A dof or row without a column, and one that is about to get one.
 const NONE: usize = usize::MAX;
 const MISSING: usize = usize::MAX - 1;
 
 impl<T: Real> Responses<T> {
-    /// For an interface of so many dofs.
+    /// For an interface of so many dofs. Of a small one all columns have memory at once.
     pub(super) fn new(unit: Unit, size: usize) -> Self {
-        Self { unit, size, slots: Vec::new(), blocks: Vec::new(), columns: 0, missing: Vec::new() }
+        let small = if size <= SMALL { size } else { 0 };
+        let blocks = (0..small.div_ceil(COLUMNS)).map(|_| vec![T::zero(); COLUMNS * size]).collect();
+        Self { unit, size, slots: Vec::with_capacity(small), blocks, columns: 0, missing: Vec::with_capacity(small) }
     }
 
     /// Forgets all columns: they belong to another matrix. Their memory is used again.
