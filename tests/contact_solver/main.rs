@@ -1,4 +1,5 @@
 //! Contact solvers, on their own and in runs whose rows contradict each other.
 
+mod many_rows;
 mod solvers;
 mod squeezes;

@@ -6,6 +6,7 @@ mod explicit_massless;
 mod failures;
 mod finite;
 mod limits;
+mod many_contacts;
 mod massless;
 mod messages;
 mod newton;

@@ -1,0 +1,84 @@
+//! Hundreds of rows that press together: solved by iteration where they are independent, and as exactly as few.
+
+use contact_dynamics::Real;
+use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics_scenes::random::Congruential;
+
+/// The flexibility of nodes on a square grid, in units that differ by decades: falls off with their distance.
+fn flexibility(side: usize, range: f64) -> Vec<f64> {
+    let n = side * side;
+    let place = |i: usize| [(i % side) as f64, (i / side) as f64];
+    let unit = |i: usize| [1.0, 10.0, 0.1][i % 3];
+    let entry = |i: usize, j: usize| {
+        let distance = (place(i)[0] - place(j)[0]).hypot(place(i)[1] - place(j)[1]);
+        unit(i) * unit(j) * (if i == j { 1.05 } else { 1.0 }) * (-distance / range).exp()
+    };
+    (0..n * n).map(|e| entry(e / n, e % n)).collect()
+}
+
+/// q for which these multipliers and gaps are the solution.
+fn offset<T: Real>(w: &[T], multipliers: &[T], gaps: &[T]) -> Vec<T> {
+    let n = multipliers.len();
+    let product = |i: usize| w[i * n..(i + 1) * n].iter().zip(multipliers).map(|(&w, &l)| w * l).sum::<T>();
+    (0..n).map(|i| gaps[i] - product(i)).collect()
+}
+
+/// A problem with a known solution, of which most rows press; some are free.
+fn check<T: Real>(side: usize, exact: f64) {
+    let n = side * side;
+    let w: Vec<T> = flexibility(side, 3.0).into_iter().map(T::of).collect();
+    let mut random = Congruential(7);
+    let bounds: Vec<Bound> = (0..n).map(|i| if i % 11 == 0 { Bound::Free } else { Bound::NonNegative }).collect();
+    let (mut multipliers, mut gaps) = (vec![T::zero(); n], vec![T::zero(); n]);
+    for i in 0..n {
+        let unit = w[i * n + i].sqrt();
+        match (bounds[i], random.within(0.0, 1.0) < 0.8) {
+            (Bound::Free, _) => multipliers[i] = T::of(random.within(-1.0, 1.0)) / unit,
+            (_, true) => multipliers[i] = T::of(random.within(0.2, 1.0)) / unit,
+            (_, false) => gaps[i] = T::of(random.within(0.2, 1.0)) * unit,
+        }
+    }
+    let offset = offset(&w, &multipliers, &gaps);
+    let tolerance = vec![T::zero(); n];
+    let problem = |version| ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version };
+    let mut solver = ActiveSet::default();
+    let mut cold = vec![T::zero(); n];
+    solver.solve(&problem(3), &mut cold).unwrap();
+    for i in 0..n {
+        let unit = w[i * n + i].sqrt();
+        let miss: f64 = ((cold[i] - multipliers[i]) * unit).abs().value();
+        assert!(miss < exact, "{n} rows, row {i}: {miss:e}");
+    }
+    // What is kept from the last problem, or guessed, changes nothing.
+    let mut kept = cold.clone();
+    solver.solve(&problem(3), &mut kept).unwrap();
+    let mut fresh = cold.clone();
+    ActiveSet::default().solve(&problem(0), &mut fresh).unwrap();
+    assert_eq!(kept, fresh);
+}
+
+#[test]
+fn many_rows_are_solved_as_exactly_as_few() {
+    for side in [9, 17, 22, 30] {
+        check::<f64>(side, 1e-11);
+        check::<f32>(side, 1e-3);
+    }
+}
+
+#[test]
+fn four_hundred_supports_of_a_rigid_table() {
+    // Heave, pitch and roll alone: rank three. A load in the middle is shared evenly.
+    let side = 20;
+    let n = side * side;
+    let place = |i: usize| [1.0, (i % side) as f64 - 9.5, (i / side) as f64 - 9.5];
+    let w: Vec<f64> =
+        (0..n * n).map(|e| place(e / n).iter().zip(place(e % n)).map(|(a, b)| a * b).sum()).collect();
+    let (offset, bounds, tolerance) = (vec![-1.0; n], vec![Bound::NonNegative; n], vec![1e-14; n]);
+    let problem =
+        ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
+    let mut lambda = vec![0.0; n];
+    ActiveSet::default().solve(&problem, &mut lambda).unwrap();
+    for lambda in lambda {
+        assert!((lambda * n as f64 - 1.0).abs() < 1e-9, "{lambda}");
+    }
+}

@@ -1,0 +1,72 @@
+//! Many candidates and many pressed contacts: what they cost is what presses, and what is kept of them changes nothing.
+
+use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
+use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Newmark, Simulation};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::matrix;
+
+/// A thin block on a large ball that slides under it: all nodes at the bottom press, and their normals turn.
+fn sliding(cells: [usize; 3]) -> contact_dynamics::SimulationBuilder<'static, f64> {
+    let radius = 1e3;
+    let material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+    let plate = Solid::block([4.0, 4.0, 0.5], cells, material);
+    let height = |x: [f64; 3]| (radius * radius - (x[0] - 2.0).powi(2) - (x[1] - 2.0).powi(2)).sqrt() - radius;
+    let places: Vec<[f64; 3]> = plate.nodes.iter().map(|&x| [x[0], x[1], x[2] + height(x)]).collect();
+    let bottom: Vec<usize> = (0..places.len()).filter(|&node| plate.nodes[node][2] == 0.0).collect();
+    let ball = Sphere::new([2.0, 2.0, -radius], radius, Side::Outside).unwrap();
+    let contact = NodesOnObstacle::new(ball, &places, &plate.node_dofs(), &bottom)
+        .unwrap()
+        .moving(|t| [[0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0; 3]]);
+    let mass = plate.lumped_mass::<f64>();
+    let system = plate.system::<f64>().load(move |_, f| {
+        f.iter_mut().zip(&mass).skip(2).step_by(3).for_each(|(f, m)| *f = -1e-2 * m);
+    });
+    Simulation::builder(system, Newmark::trapezoidal(), 0.2).constraint(contact)
+}
+
+fn closed(run: &Simulation<'_, f64>) -> usize {
+    run.state().contacts().closed().iter().filter(|&&closed| closed).count()
+}
+
+#[test]
+fn hundreds_of_turning_contacts_go_on_bit_for_bit() {
+    let cells = [17, 17, 1];
+    let mut run = sliding(cells).build().unwrap();
+    for _ in 0..5 {
+        run.step().unwrap();
+    }
+    assert!(closed(&run) > 300, "{}", closed(&run));
+    let mut resumed = sliding(cells).resume(run.state().clone(), run.history().clone()).build().unwrap();
+    for step in 0..5 {
+        run.step().unwrap();
+        resumed.step().unwrap();
+        assert_eq!(run.state(), resumed.state(), "step {step}");
+    }
+}
+
+/// Masses without springs that fall to the ground, one after the other: candidates of which few press.
+fn rain(count: usize, candidates: impl Iterator<Item = usize>) -> Simulation<'static, f64> {
+    let free = matrix(count, vec![(0, 0, 0.0)]);
+    let system = LinearSystem::lumped(vec![1.0; count], free).unwrap().load(|_, f| f.fill(-1.0));
+    let rows =
+        candidates.fold(LinearRows::new(), |rows, dof| rows.unilateral(&[(dof, 1.0)], 1e-4 * (dof % 1000) as f64));
+    Simulation::builder(system, CentralDifference, 1e-2).constraint(rows).build().unwrap()
+}
+
+#[test]
+fn candidates_that_stay_open_take_no_part() {
+    let count = 200_000;
+    let mut all = rain(count, 0..count);
+    let near = |dof: &usize| dof % 1000 < 60;
+    let mut few = rain(count, (0..count).filter(near));
+    for _ in 0..8 {
+        all.step().unwrap();
+        few.step().unwrap();
+    }
+    let pressed = closed(&all);
+    assert!(pressed > 1000 && pressed == closed(&few), "{pressed} {}", closed(&few));
+    for dof in (0..count).filter(near) {
+        assert_eq!(all.state().displacement()[dof], few.state().displacement()[dof]);
+        assert_eq!(all.state().velocity()[dof], few.state().velocity()[dof]);
+    }
+}
