@@ -19,7 +19,7 @@ const CELLS: [usize; 3] = [60, 60, 4];
 const SIZE: [f64; 3] = [15.0, 15.0, 1.0];
 
 /// Radius of the ball.
-const RADIUS: f64 = 1e5;
+const RADIUS: f64 = 1e3;
 
 /// Steps before the measurement: the first contact is behind then.
 const SETTLING: usize = 4;
@@ -88,7 +88,8 @@ fn ball(plate: &Solid<3>, nodes: &[usize], height: f64) -> NodesOnObstacle<'stat
     let center = [0.5 * SIZE[0], 0.5 * SIZE[1], -RADIUS];
     let on_ball = |x: [f64; 3]| {
         let square = (0..2).map(|axis| (x[axis] - center[axis]).powi(2)).sum::<f64>();
-        [x[0], x[1], x[2] + height + center[2] + (RADIUS * RADIUS - square).sqrt()]
+        // (A hair above it, for the rounding of the root.)
+        [x[0], x[1], x[2] + height + 1e-9 + center[2] + (RADIUS * RADIUS - square).sqrt()]
     };
     let places: Vec<[f64; 3]> = plate.nodes.iter().map(|&x| on_ball(x)).collect();
     let ball = Sphere::new(center, RADIUS, Side::Outside).expect("a ball");

@@ -67,7 +67,7 @@ fn many_rows_are_solved_as_exactly_as_few() {
 
 #[test]
 fn four_hundred_supports_of_a_rigid_table() {
-    // Heave, pitch and roll alone: rank three. A load in the middle is shared evenly.
+    // Heave, pitch and roll alone: rank three. A load in the middle is shared.
     let side = 20;
     let n = side * side;
     let place = |i: usize| [1.0, (i % side) as f64 - 9.5, (i / side) as f64 - 9.5];
@@ -78,7 +78,11 @@ fn four_hundred_supports_of_a_rigid_table() {
         ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
     let mut lambda = vec![0.0; n];
     ActiveSet::default().solve(&problem, &mut lambda).unwrap();
-    for lambda in lambda {
-        assert!((lambda * n as f64 - 1.0).abs() < 1e-9, "{lambda}");
+    for axis in 0..3 {
+        let carried: f64 = (0..n).map(|i| place(i)[axis] * lambda[i]).sum();
+        let load = if axis == 0 { 1.0 } else { 0.0 };
+        assert!((carried - load).abs() < 1e-11, "{axis}: {carried}");
     }
+    // Of the many ways to carry it one without peaks.
+    assert!(lambda.iter().all(|lambda| (lambda * n as f64 - 1.0).abs() < 0.1), "{lambda:?}");
 }

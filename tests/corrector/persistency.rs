@@ -7,6 +7,7 @@ use contact_dynamics::{
     Bathe, Composite, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, Mass, Newmark, Park, PersistencyCorrection,
     Simulation, System, TimeIntegrator,
 };
+use contact_dynamics_scenes::schemes::correctable;
 use contact_dynamics_scenes::sparse::{free, matrix, springs};
 use contact_dynamics_scenes::{Bars, MassKind};
 
@@ -165,10 +166,8 @@ fn rows_that_share_a_body_are_projected_together() {
     let h = 0.01;
     // The gaps are such that both contacts close within the fifth step.
     let gaps = [0.7 * 4.3 * h, 1.2 * 4.6 * h];
-    let schemes: [Box<dyn TimeIntegrator>; 3] =
-        [Box::new(Composite), Box::new(Newmark::trapezoidal()), Box::new(Bathe::default())];
-    for scheme in schemes {
-        let name = scheme.name();
+    for listed in correctable() {
+        let (scheme, name) = ((listed.make)(), listed.name());
         let mut run = Simulation::builder(free(&masses), scheme, h)
             .velocity(velocity.to_vec())
             .constraint(

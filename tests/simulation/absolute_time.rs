@@ -2,12 +2,12 @@
 #![allow(clippy::float_cmp)] // the same bits are meant
 
 use contact_dynamics::{
-    Bdf2, Composite, EnergyMomentum, Error, Houbolt, LinearRows, LinearSystem, Newmark, Park, PersistencyCorrection,
-    Simulation, SimulationBuilder, State, StepControl, TimeIntegrator, analysis,
+    EnergyMomentum, Error, LinearRows, LinearSystem, Newmark, Park, PersistencyCorrection, Simulation,
+    SimulationBuilder, State, StepControl, TimeIntegrator, analysis,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::random::xorshift;
-use contact_dynamics_scenes::schemes::{Listed, all};
+use contact_dynamics_scenes::schemes::{Listed, all, correctable};
 use contact_dynamics_scenes::sparse::{matrix, springs};
 
 /// A million seconds; the age of a clock that counts from 1970; powers of two; before zero.
@@ -65,9 +65,8 @@ fn runs_with_changing_steps_are_the_same_whenever_they_start() {
 /// Steps near the resolution of the time.
 #[test]
 fn steps_as_small_as_times_can_tell_are_resampled_right() {
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] =
-        [|| Box::new(Composite), || Box::new(Houbolt), || Box::new(Park), || Box::new(Bdf2)];
-    for make in schemes {
+    for listed in all() {
+        let make = listed.make;
         for (t0, h) in [(1e9, 1e-6), (1.7e9, 3e-7)] {
             let run = |t0: f64| {
                 let omega = 0.1 / h;
@@ -87,9 +86,7 @@ fn steps_as_small_as_times_can_tell_are_resampled_right() {
 
 #[test]
 fn steps_are_controlled_alike_whenever_a_run_starts() {
-    let estimated = |scheme: &Listed| analysis::local_error(&(scheme.make)().tableau()).is_some();
-    let apt = |scheme: &Listed| scheme.takes_corrections() && scheme.takes_multipliers() && estimated(scheme);
-    for scheme in all().into_iter().filter(apt) {
+    for scheme in correctable().filter(|scheme| analysis::local_error(&(scheme.make)().tableau()).is_some()) {
         let scene = Bars::paper(8).delayed(0.35, 1e-3);
         let run = |t0: f64| {
             let control = StepControl::halving(1e-6).unwrap().local_error(2e-6).unwrap();

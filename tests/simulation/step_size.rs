@@ -8,7 +8,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::record_run;
-use contact_dynamics_scenes::schemes::all;
+use contact_dynamics_scenes::schemes::{all, correctable};
 use contact_dynamics_scenes::sparse::matrix;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -193,15 +193,8 @@ fn stiff_modes_grow_with_the_two_schemes_that_are_named() {
 #[test]
 fn step_changes_during_contact_leave_the_force_smooth() {
     let correction = || Some(Box::new(PersistencyCorrection::with_history_projection()) as Box<dyn Corrector<f64>>);
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 6] = [
-        || Box::new(Composite),
-        || Box::new(Houbolt),
-        || Box::new(Park),
-        || Box::new(Bdf2),
-        || Box::new(Newmark::trapezoidal()),
-        || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
-    ];
-    for make in schemes {
+    for listed in correctable() {
+        let make = listed.make;
         for phase in [0.05, 0.35, 0.65, 0.95] {
             let h = 1e-3;
             let bars = Bars::paper(20).delayed(phase, h);
@@ -251,8 +244,8 @@ fn a_past_from_before_the_impact_is_not_interpolated() {
     let history = PersistencyCorrection::with_history_projection();
     // (Without history projection the contact may be lost a step later.)
     let cases = [(None, 0), (Some(PersistencyCorrection::new()), 0), (Some(history), 0), (Some(history), 1)];
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] = [|| Box::new(Composite), || Box::new(Park), || Box::new(Bdf2)];
-    for make in schemes {
+    for listed in correctable() {
+        let make = listed.make;
         for (correction, later) in cases {
             let bars = Bars::paper(20).delayed(0.6, 1e-3);
             let mut run = Simulation::builder(bars.system::<f64>(), make(), 1e-3)
@@ -302,9 +295,8 @@ fn changes_of_the_step_conserve_momentum() {
 
 #[test]
 fn a_run_with_step_changes_is_resumed_bit_for_bit() {
-    let make: [fn() -> Box<dyn TimeIntegrator>; 3] =
-        [|| Box::new(Composite), || Box::new(Park), || Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap())];
-    for make in make {
+    for listed in all() {
+        let make = listed.make;
         let steps = |run: &mut Simulation<'_, f64>, from: u32, to: u32| {
             for i in from..to {
                 run.set_step_size(0.01 * random(i / 3)).unwrap();
@@ -372,13 +364,8 @@ fn a_step_whose_matrix_cannot_be_factorized_leaves_the_factors_of_the_old_one() 
 /// Restarted in the middle of the contact, where nothing has jumped, the bars go on as before.
 #[test]
 fn restart_in_contact_disturbs_nothing() {
-    let schemes: [fn() -> Box<dyn TimeIntegrator>; 4] = [
-        || Box::new(Composite),
-        || Box::new(Park),
-        || Box::new(Newmark::trapezoidal()),
-        || Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()),
-    ];
-    for make in schemes {
+    for listed in correctable() {
+        let make = listed.make;
         for start_up in [StartUp::Trapezoidal, StartUp::Taylor] {
             let bars = Bars::paper(50).delayed(0.35, 1e-3);
             let forces = |restart: Option<f64>| {

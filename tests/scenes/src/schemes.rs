@@ -114,3 +114,8 @@ pub fn all() -> Vec<Listed> {
         explicit(|| Box::new(NohBathe::with_radius(0.0).unwrap()), 2, 3.571, [-0.11, 0.091]),
     ]
 }
+
+/// Those that impose rigid contact on the displacements of the state: corrections apply.
+pub fn correctable() -> impl Iterator<Item = Listed> {
+    all().into_iter().filter(|listed| listed.takes_corrections() && listed.takes_multipliers())
+}
