@@ -194,25 +194,27 @@ impl<T: Real> Condensation<T> for Embedded<T> {
     }
 
     /// Entries of other dofs are left as they are.
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         let Self { inner, dofs, places, vector, on_interface, .. } = self;
         gather(interface, places, on_interface);
         if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-            condensed.expand(on_interface, vector);
+            condensed.expand(on_interface, vector)?;
         }
         scatter(vector, dofs, solution);
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         let Self { inner, places, on_interface, interface, .. } = self;
         for column in forces.chunks_exact_mut((*interface).max(1)) {
             gather(column, places, on_interface);
             column.fill(T::zero());
             if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-                condensed.solve(on_interface);
+                condensed.solve(on_interface)?;
                 scatter(on_interface, places, column);
             }
         }
+        Ok(())
     }
 }
 

@@ -233,7 +233,7 @@ impl<T: Real> Operator<T> {
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
-            condensed.expand(on_interface, increment);
+            condensed.expand(on_interface, increment)?;
         } else if *contact == ContactPath::Apart {
             for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
                 increment[dof] = x;
@@ -391,8 +391,7 @@ fn respond<T: Real>(
 ) -> Result<()> {
     // A condensation answers on the interface without a full solve, whether steps condense or not.
     if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
-        condensed.solve(forces);
-        return Ok(());
+        return condensed.solve(forces);
     }
     let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
     for forces in forces.chunks_mut(COLUMNS * height) {
