@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
 use crate::state::{Backup, ContactState, Motion};
-use crate::system::{Damping, Linearity, System};
+use crate::system::{Linearity, System};
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
 ///
@@ -290,22 +290,20 @@ impl<T: Real> Correction<'_, T> {
                 projection.push(g, row, impulse, change);
             }
             // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
-            let present = match system.0.linearity() {
-                Linearity::Linear => system.0.damping_force(&new.u, change, damping),
+            let linearity = system.0.linearity();
+            let Some(force) = system.0.damping_force() else { return Ok(()) };
+            match linearity {
+                Linearity::Linear => force.evaluate(&new.u, change, damping)?,
                 Linearity::Nonlinear => {
-                    let present = system.0.damping_force(&new.u, &new.v, damping);
+                    force.evaluate(&new.u, &new.v, damping)?;
                     for (change, &v) in change.iter_mut().zip(&new.v) {
                         *change = v - *change;
                     }
-                    if system.0.damping_force(&new.u, change, before) == Damping::Present {
-                        T::axpy(-T::one(), before, damping);
-                    }
-                    present
+                    force.evaluate(&new.u, change, before)?;
+                    T::axpy(-T::one(), before, damping);
                 }
-            };
-            if present == Damping::Present {
-                self.accelerate_by_damping()?;
             }
+            self.accelerate_by_damping()?;
         }
         Ok(())
     }

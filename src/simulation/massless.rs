@@ -8,7 +8,7 @@ use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver}
 use crate::real::Real;
 use crate::sparse::{self, Combination};
 use crate::state::Motion;
-use crate::system::{Damping, Linearity, System, TangentWeights};
+use crate::system::{Linearity, System, TangentWeights};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat};
 
 /// The dofs b without mass of a linear system, and their part of K.
@@ -256,7 +256,7 @@ impl<T: Real> MasslessBlock<T> {
                  system is nonlinear; choose an implicit scheme, or give the dofs a mass",
             );
         }
-        if is_damped(system, dofs) {
+        if is_damped(system, dofs)? {
             return refuse(
                 "explicit stages balance dofs without mass by stiffness alone, and damping acts on them; choose \
                  damping proportional to mass or an implicit scheme, or give the dofs a mass",
@@ -278,12 +278,14 @@ impl<T: Real> MasslessBlock<T> {
 }
 
 /// Whether damping forces depend on the velocities of some dofs.
-pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> bool {
+pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> Result<bool> {
     let mut v = vec![T::zero(); system.dofs()];
     let (u, mut force) = (v.clone(), v.clone());
     for &dof in dofs {
         // (Scattered values, so that nothing cancels.)
         v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
     }
-    system.damping_force(&u, &v, &mut force) == Damping::Present && force.iter().any(|&force| force != T::zero())
+    let Some(damping) = system.damping_force() else { return Ok(false) };
+    damping.evaluate(&u, &v, &mut force)?;
+    Ok(force.iter().any(|&force| force != T::zero()))
 }

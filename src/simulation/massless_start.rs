@@ -37,7 +37,7 @@ pub(super) fn balance_start<T: Real>(
     dofs: &[usize],
     [h, ahead]: [f64; 2],
 ) -> Result<Option<StartAdjustment<T>>> {
-    if dofs.is_empty() || is_damped(system, dofs) {
+    if dofs.is_empty() || is_damped(system, dofs)? {
         return Ok(None);
     }
     let t = motion.t;
@@ -99,7 +99,7 @@ pub(super) fn balance_start<T: Real>(
             let &dof =
                 dofs.iter().max_by(|&&i, &&j| moves(i).abs().value().total_cmp(&moves(j).abs().value())).unwrap_or(&0);
             let energies = [system.potential_energy(&given), system.potential_energy(&motion.u)];
-            system.external_load(t, &mut residual);
+            system.external_load(t, &mut residual)?;
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
             return Ok(Some(StartAdjustment { energy, largest: moves(dof).abs(), dof }));

@@ -175,7 +175,10 @@ impl<T: Real> Operator<T> {
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
             match at.of {
                 TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
-                TangentOf::Path(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
+                TangentOf::Path(path) => match system.path_force() {
+                    Some(own) => own.tangent_along(at.t, path, at.v, weights, part)?,
+                    None => system.tangent(at.t, path.mean, at.v, weights, part)?,
+                },
                 TangentOf::Simpson { end } => {
                     // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which that of the middle
                     // term counts half: ⅔ K in the middle and ⅓ K at the end.
