@@ -30,6 +30,38 @@ pub struct StepView<'a, T> {
     pub statistics: &'a Statistics,
 }
 
+impl<'a, T> StepView<'a, T> {
+    /// A view of a step, without energy: for hosts with a loop of their own that show their steps to an observer.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::observer::{EnergyRecorder, Observer};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation, StepView};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// let mut recorder = EnergyRecorder::new();
+    /// for _ in 0..10 {
+    ///     run.step()?;
+    ///     let energy = run.energy();
+    ///     recorder.observe(&StepView::new(run.state(), run.step_size(), run.statistics()).with_energy(energy))?;
+    /// }
+    /// assert_eq!(recorder.energies().len(), 10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub const fn new(state: &'a State<T>, h: f64, statistics: &'a Statistics) -> Self {
+        Self { state, energy: None, h, statistics }
+    }
+
+    /// The same view with the energy at the end of the step.
+    #[must_use]
+    pub fn with_energy(self, energy: Energy<T>) -> Self {
+        Self { energy: Some(energy), ..self }
+    }
+}
+
 /// Sees every accepted step. Implemented for `()` (sees nothing), for pairs, for closures that return a [`Control`] or,
 /// if they may fail, a `Result<Control>`, for `&mut` of the recorders of this crate, and for observers behind
 /// `Box<dyn Observer<T>>` and `&mut dyn Observer<T>`. A host lends a recorder of its own by [`by_ref`](Self::by_ref).

@@ -14,6 +14,7 @@ use faer::sparse::SymbolicSparseColMatRef;
 
 /// How the force of a system depends on displacements and velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Linearity {
     /// f = F(t) − K u − C v with constant K and C: one factorization for a run, one solve a stage.
     Linear,

@@ -13,6 +13,7 @@ use crate::system::System;
 
 /// How dofs without mass were moved when a simulation was built, before its first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StartAdjustment<T> {
     /// Change of the potential energy, that of the load (minus its force times the displacement) included; not
     /// positive. The run would have lost this energy in a jump. None if the system has no potential.
