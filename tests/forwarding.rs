@@ -36,8 +36,8 @@ fn methods(file: &str, name: &str) -> BTreeSet<String> {
 }
 
 /// Refuses a pointer that answers otherwise than the bare part, or whose part has not been asked all that there is.
-fn compare<A: PartialEq + std::fmt::Debug>(log: &Log, all: &BTreeSet<String>, bare: &A, other: A, pointer: &str) {
-    assert_eq!(*bare, other, "{pointer}");
+fn compare<A: PartialEq + std::fmt::Debug>(log: &Log, all: &BTreeSet<String>, bare: &A, other: &A, pointer: &str) {
+    assert_eq!(bare, other, "{pointer}");
     let called = log.take().into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
     assert_eq!(called, *all, "{pointer}: methods called, methods of the trait");
 }
@@ -170,14 +170,14 @@ fn answers(mut system: impl System<f64>) -> String {
 fn pointers_to_systems() {
     let (log, all) = (Log::default(), methods("system.rs", "System"));
     let bare = answers(Model::new(&log));
-    compare(&log, &all, &bare, bare.clone(), "bare");
-    compare(&log, &all, &bare, answers(&mut Model::new(&log)), "&mut S");
-    compare(&log, &all, &bare, answers(Box::new(Model::new(&log))), "Box<S>");
+    compare(&log, &all, &bare, &bare, "bare");
+    compare(&log, &all, &bare, &answers(&mut Model::new(&log)), "&mut S");
+    compare(&log, &all, &bare, &answers(Box::new(Model::new(&log))), "Box<S>");
     let chosen: Box<dyn System<f64>> = Box::new(Model::new(&log));
-    compare(&log, &all, &bare, answers(chosen), "Box<dyn System>");
+    compare(&log, &all, &bare, &answers(chosen), "Box<dyn System>");
     let mut lent: Box<dyn System<f64>> = Box::new(Model::new(&log));
-    compare(&log, &all, &bare, answers(&mut *lent), "&mut dyn System");
-    compare(&log, &all, &bare, answers(Box::new(&mut lent)), "Box<&mut Box<dyn System>>");
+    compare(&log, &all, &bare, &answers(&mut *lent), "&mut dyn System");
+    compare(&log, &all, &bare, &answers(Box::new(&mut lent)), "Box<&mut Box<dyn System>>");
 }
 
 #[derive(Clone, Debug)]
@@ -196,15 +196,16 @@ impl TimeIntegrator for Scheme {
 
 #[test]
 fn pointers_to_integrators() {
+    #[expect(clippy::needless_pass_by_value, reason = "pointers are tried by value")]
     fn answers(scheme: impl TimeIntegrator) -> (String, Tableau) {
         (scheme.name(), scheme.tableau())
     }
     let (log, all) = (Log::default(), methods("integrator.rs", "TimeIntegrator"));
     let bare = answers(Scheme(log.clone()));
-    compare(&log, &all, &bare, bare.clone(), "bare");
-    compare(&log, &all, &bare, answers(Box::new(Scheme(log.clone()))), "Box<I>");
+    compare(&log, &all, &bare, &bare, "bare");
+    compare(&log, &all, &bare, &answers(Box::new(Scheme(log.clone()))), "Box<I>");
     let chosen: Box<dyn TimeIntegrator> = Box::new(Scheme(log.clone()));
-    compare(&log, &all, &bare, answers(chosen), "Box<dyn TimeIntegrator>");
+    compare(&log, &all, &bare, &answers(chosen), "Box<dyn TimeIntegrator>");
 }
 
 #[derive(Clone, Debug)]
@@ -260,10 +261,10 @@ fn pointers_to_correctors() {
     }
     let (log, all) = (Log::default(), methods("corrector.rs", "Corrector"));
     let bare = answers(Remedy(log.clone()));
-    compare(&log, &all, &bare, bare.clone(), "bare");
-    compare(&log, &all, &bare, answers(Box::new(Remedy(log.clone()))), "Box<C>");
+    compare(&log, &all, &bare, &bare, "bare");
+    compare(&log, &all, &bare, &answers(Box::new(Remedy(log.clone()))), "Box<C>");
     let chosen: Box<dyn Corrector<f64>> = Box::new(Remedy(log.clone()));
-    compare(&log, &all, &bare, answers(chosen), "Box<dyn Corrector>");
+    compare(&log, &all, &bare, &answers(chosen), "Box<dyn Corrector>");
 }
 
 #[derive(Clone, Debug)]
@@ -282,6 +283,7 @@ impl LinearSolver<f64> for Solver {
 
 #[test]
 fn pointers_to_linear_solvers() {
+    #[expect(clippy::needless_pass_by_value, reason = "pointers are tried by value")]
     fn answers(solver: impl LinearSolver<f64>) -> f64 {
         let a = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)]).unwrap();
         let mut factor = solver.analyze(a.symbolic(), &[0]).unwrap();
@@ -292,10 +294,10 @@ fn pointers_to_linear_solvers() {
     }
     let (log, all) = (Log::default(), methods("linear_solver.rs", "LinearSolver"));
     let bare = answers(Solver(log.clone()));
-    compare(&log, &all, &bare, bare, "bare");
-    compare(&log, &all, &bare, answers(Box::new(Solver(log.clone()))), "Box<L>");
+    compare(&log, &all, &bare, &bare, "bare");
+    compare(&log, &all, &bare, &answers(Box::new(Solver(log.clone()))), "Box<L>");
     let chosen: Box<dyn LinearSolver<f64>> = Box::new(Solver(log.clone()));
-    compare(&log, &all, &bare, answers(chosen), "Box<dyn LinearSolver>");
+    compare(&log, &all, &bare, &answers(chosen), "Box<dyn LinearSolver>");
 }
 
 #[derive(Clone, Debug)]
@@ -305,7 +307,7 @@ impl Observer<f64> for Recorder {
     fn observe(&mut self, step: &StepView<'_, f64>) -> Result<Control> {
         self.0.note("observe");
         assert!(step.energy.is_some(), "its wish was lost");
-        Ok(if step.statistics.steps % 3 == 0 { Control::Stop } else { Control::Continue })
+        Ok(if step.statistics.steps == 3 { Control::Stop } else { Control::Continue })
     }
     fn wants(&self) -> Wants {
         self.0.note("wants");
@@ -324,10 +326,10 @@ fn pointers_to_observers() {
     }
     let (log, all) = (Log::default(), methods("observer.rs", "Observer"));
     let bare = answers(Recorder(log.clone()));
-    compare(&log, &all, &bare, bare, "bare");
-    compare(&log, &all, &bare, answers(Recorder(log.clone()).by_ref()), "&mut dyn Observer");
+    compare(&log, &all, &bare, &bare, "bare");
+    compare(&log, &all, &bare, &answers(Recorder(log.clone()).by_ref()), "&mut dyn Observer");
     let chosen: Box<dyn Observer<f64>> = Box::new(Recorder(log.clone()));
-    compare(&log, &all, &bare, answers(chosen), "Box<dyn Observer>");
-    compare(&log, &all, &bare, answers((Recorder(log.clone()), ())), "(A, B)");
-    compare(&log, &all, &bare, answers(((), Recorder(log.clone()).by_ref())), "(A, &mut dyn Observer)");
+    compare(&log, &all, &bare, &answers(chosen), "Box<dyn Observer>");
+    compare(&log, &all, &bare, &answers((Recorder(log.clone()), ())), "(A, B)");
+    compare(&log, &all, &bare, &answers(((), Recorder(log.clone()).by_ref())), "(A, &mut dyn Observer)");
 }

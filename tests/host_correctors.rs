@@ -172,7 +172,7 @@ fn correctors_of_a_host_do_what_those_of_the_crate_do() {
                 for run in [&mut theirs, &mut own, &mut none] {
                     run.step().unwrap();
                 }
-                let [a, b, c] = [&theirs, &own, &none].map(|run| run.state());
+                let [a, b, c] = [&theirs, &own, &none].map(Simulation::state);
                 let apart = |x: &[f64], y: &[f64]| x.iter().zip(y).fold(0.0_f64, |d, (x, y)| d.max((x - y).abs()));
                 let size = |x: &[f64]| x.iter().fold(1e-3_f64, |d, x| d.max(x.abs()));
                 for (x, y) in [

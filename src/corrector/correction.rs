@@ -1,5 +1,5 @@
-//! What a corrector works with: the jumps of a stage, the projection that removes them, pushes along rows, and the books
-//! on impulse and energy. What serves one corrector only is in the file of that corrector.
+//! What a corrector works with: the jumps of a stage, the projection that removes them, pushes along rows, and the
+//! books on impulse and energy. What serves one corrector only is in the file of that corrector.
 
 mod energy;
 mod parts;
@@ -18,8 +18,8 @@ use crate::system::{Linearity, System};
 ///
 /// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw
 /// multiplier positive, or equality rows) and those that touch and approach; a row that touches and separates is left
-/// alone. Every push along a row is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of momentum
-/// to rounding.
+/// alone. Every push along a row is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of
+/// momentum to rounding.
 ///
 /// A corrector of a host has what those of this crate have: rows ([`closed`](Self::closed),
 /// [`engaged`](Self::engaged), [`opened`](Self::opened), [`released`](Self::released)), forces
