@@ -81,7 +81,7 @@ fn measure(n: usize) {
             clock(3, &mut || {
                 let condensed = factors[i].condensation().expect("Cholesky condenses");
                 condensed.condense(&x, &mut ends).expect("a factor");
-                condensed.expand(&ends, &mut x);
+                condensed.expand(&ends, &mut x).expect("a factor");
             });
             clock(4, &mut || runs[i].step().expect("a well-posed step"));
         }

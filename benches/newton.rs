@@ -77,7 +77,7 @@ fn parts(scene: &Scene<Hyperelastic<3>, 3>) -> Vec<Row> {
     let (u, v) = (run.state().displacement().to_vec(), run.state().velocity().to_vec());
     let mut body = scene.body.clone();
     let mut values = vec![0.0; body.pattern().row_idx().len()];
-    let weights = TangentWeights { stiffness: 1.0, damping: 0.0 };
+    let weights = TangentWeights::new(1.0, 0.0);
     body.tangent(0.0, &u, &v, weights, &mut values).expect("an admissible state");
     let mut a = SparseColMat::<usize, f64>::new(body.pattern().to_owned().expect("memory"), values.clone());
     let inertia = 2.5 / (scene.h * scene.h);

@@ -103,8 +103,9 @@ impl System<f64> for Truss {
         Some(self.bars.iter().map(|&ends| energy(self.bar(ends, u))).sum())
     }
 
-    fn external_load(&mut self, _t: f64, out: &mut [f64]) {
+    fn external_load(&mut self, _t: f64, out: &mut [f64]) -> Result<()> {
         out.copy_from_slice(&self.weight);
+        Ok(())
     }
 }
 

@@ -108,6 +108,7 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
 
 /// What a corrector changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Edits {
     /// Only the state of the stage.
     NewState,

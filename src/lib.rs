@@ -52,5 +52,5 @@ pub use simulation::{
     StepControl, Works,
 };
 pub use state::{ContactState, History, State};
-pub use system::{Damping, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
+pub use system::{DampingForce, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
 pub use tableau::StartUp;

@@ -130,10 +130,10 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 /// let mut interface = [0.0];
 /// condensed.condense(&x, &mut interface)?; // x_c without contact force
 /// let mut response = [1.0];
-/// condensed.solve(&mut response); // x_c for a unit force on the interface
+/// condensed.solve(&mut response)?; // x_c for a unit force on the interface
 /// let force = -interface[0] / response[0]; // the force that brings dof 2 to zero
 /// interface[0] += force * response[0];
-/// condensed.expand(&interface, &mut x);
+/// condensed.expand(&interface, &mut x)?;
 /// assert!(x[2] == 0.0 && (x[0] - 3.0 / 8.0).abs() < 1e-15 && (x[1] - 1.0 / 8.0).abs() < 1e-15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -143,16 +143,25 @@ pub trait Condensation<T: Real> {
     ///
     /// # Errors
     ///
-    /// Those of [`Factorization::solve`], where a solver iterates ([`ByBody`] solves for bodies without contact with
-    /// the solver that they were given).
+    /// Those of [`Factorization::solve`], where a solver iterates, runs elsewhere, or has parts that do ([`ByBody`]
+    /// solves for bodies without contact with the solver that they were given). The step is then undone. The direct
+    /// factorizations of this crate fail in none of the three methods.
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()>;
 
     /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
     /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.
-    fn expand(&mut self, interface: &[T], solution: &mut [T]);
+    ///
+    /// # Errors
+    ///
+    /// As [`condense`](Self::condense); `solution` then holds nothing of use.
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()>;
 
     /// `f ← S⁻¹ f` for one or more columns of forces on the interface. Does not allocate for up to 16 columns.
-    fn solve(&mut self, forces: &mut [T]);
+    ///
+    /// # Errors
+    ///
+    /// As [`condense`](Self::condense); `forces` then holds nothing of use.
+    fn solve(&mut self, forces: &mut [T]) -> Result<()>;
 }
 
 /// Checks what is to be analyzed, and returns the number of dofs.

@@ -27,6 +27,7 @@ use faer::sparse::SparseColMatRef;
 
 /// A view of a mass matrix.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum Mass<'a, T> {
     /// Diagonal: one mass a dof.
     Lumped(&'a [T]),

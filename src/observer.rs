@@ -1,11 +1,13 @@
 //! Observers see every accepted step; they may stop the run, never change it.
 
+use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::results::{Energy, Statistics};
 use crate::state::State;
 
 /// Whether a run goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Control {
     /// Go on.
     #[default]
@@ -16,6 +18,7 @@ pub enum Control {
 
 /// What an observer sees of an accepted step.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct StepView<'a, T> {
     /// The state at the end of the step.
     pub state: &'a State<T>,
@@ -27,34 +30,107 @@ pub struct StepView<'a, T> {
     pub statistics: &'a Statistics,
 }
 
-/// Sees every accepted step. Implemented for closures, for `()` (sees nothing) and for pairs.
+impl<'a, T> StepView<'a, T> {
+    /// A view of a step, without energy: for hosts with a loop of their own that show their steps to an observer.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::observer::{EnergyRecorder, Observer};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation, StepView};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// let mut recorder = EnergyRecorder::new();
+    /// for _ in 0..10 {
+    ///     run.step()?;
+    ///     let energy = run.energy();
+    ///     recorder.observe(&StepView::new(run.state(), run.step_size(), run.statistics()).with_energy(energy))?;
+    /// }
+    /// assert_eq!(recorder.energies().len(), 10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub const fn new(state: &'a State<T>, h: f64, statistics: &'a Statistics) -> Self {
+        Self { state, energy: None, h, statistics }
+    }
+
+    /// The same view with the energy at the end of the step.
+    #[must_use]
+    pub fn with_energy(self, energy: Energy<T>) -> Self {
+        Self { energy: Some(energy), ..self }
+    }
+}
+
+/// Sees every accepted step. Implemented for `()` (sees nothing), for pairs, for closures that return a [`Control`] or,
+/// if they may fail, a `Result<Control>`, for `&mut` of the recorders of this crate, and for observers behind
+/// `Box<dyn Observer<T>>` and `&mut dyn Observer<T>`. A host lends a recorder of its own by [`by_ref`](Self::by_ref).
+/// (That every `&mut O` is an observer cannot be said in Rust beside that every closure is one.)
+///
+/// Whatever holds observers asks for all that they [want](Self::wants).
 ///
 /// ```
-/// use contact_dynamics::observer::{Control, Observer, StepView};
+/// use contact_dynamics::observer::{Control, DofRecorder, Observer, StepView, Wants};
+/// use contact_dynamics::{Error, Result};
+///
+/// /// Writes the energy to a file.
+/// struct Journal(std::io::BufWriter<Vec<u8>>);
+///
+/// impl Observer<f64> for Journal {
+///     fn observe(&mut self, step: &StepView<'_, f64>) -> Result<Control> {
+///         use std::io::Write;
+///         let energy = step.energy.map_or(f64::NAN, |energy| energy.total());
+///         let written = writeln!(self.0, "{} {energy}", step.state.time());
+///         written.map_err(|error| Error::Host { callback: "observer", source: error.into() })?;
+///         Ok(Control::Continue)
+///     }
+///     fn wants(&self) -> Wants {
+///         Wants::Energy
+///     }
+/// }
+///
+/// let (mut journal, mut recorder) = (Journal(std::io::BufWriter::new(Vec::new())), DofRecorder::<f64>::new(0));
 /// let mut steps = 0;
 /// let count = |_: &StepView<'_, f64>| {
 ///     steps += 1;
 ///     Control::Continue
 /// };
-/// let stop_late = |step: &StepView<'_, f64>| match step.state.time() > 2.0 {
-///     true => Control::Stop,
-///     false => Control::Continue,
+/// let refuse_late = |step: &StepView<'_, f64>| -> Result<Control> {
+///     match step.state.time() > 2.0 {
+///         true => Err(Error::Host { callback: "observer", source: "too late".into() }),
+///         false => Ok(Control::Continue),
+///     }
 /// };
-/// let mut both: Box<dyn Observer<f64>> = Box::new((count, stop_late));
-/// # let _ = &mut both;
+/// let mut all: Box<dyn Observer<f64>> = Box::new(((count, refuse_late), (journal.by_ref(), &mut recorder)));
+/// assert_eq!(all.wants(), Wants::Energy);
+/// # let _ = &mut all;
 /// ```
 pub trait Observer<T: Real> {
     /// Called once after each accepted step.
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control;
+    ///
+    /// # Errors
+    ///
+    /// The host's own, usually [`Error::Host`](crate::Error::Host). It ends the run with this error; the step that was
+    /// observed has been taken.
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control>;
 
     /// What has to be computed for this observer besides the step itself.
     fn wants(&self) -> Wants {
         Wants::State
     }
+
+    /// Lends the observer, for instance to a pair of observers.
+    fn by_ref(&mut self) -> &mut dyn Observer<T>
+    where
+        Self: Sized,
+    {
+        self
+    }
 }
 
 /// What an observer needs to see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Wants {
     /// State, gaps and counts: nothing is computed for it.
     State,
@@ -62,24 +138,32 @@ pub enum Wants {
     Energy,
 }
 
-impl<T: Real, F: FnMut(&StepView<'_, T>) -> Control> Observer<T> for F {
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
-        self(step)
+/// So that a closure may return either.
+impl From<Control> for Result<Control> {
+    fn from(control: Control) -> Self {
+        Ok(control)
+    }
+}
+
+impl<T: Real, R: Into<Result<Control>>, F: FnMut(&StepView<'_, T>) -> R> Observer<T> for F {
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
+        self(step).into()
     }
 }
 
 impl<T: Real> Observer<T> for () {
-    fn observe(&mut self, _: &StepView<'_, T>) -> Control {
-        Control::Continue
+    fn observe(&mut self, _: &StepView<'_, T>) -> Result<Control> {
+        Ok(Control::Continue)
     }
 }
 
 impl<T: Real, A: Observer<T>, B: Observer<T>> Observer<T> for (A, B) {
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
-        // Both see every step, also the one that stops the run.
-        match (self.0.observe(step), self.1.observe(step)) {
-            (Control::Continue, Control::Continue) => Control::Continue,
-            _ => Control::Stop,
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
+        // Both see every step, also one that stops the run or fails for the first.
+        let (first, second) = (self.0.observe(step), self.1.observe(step));
+        match (first?, second?) {
+            (Control::Continue, Control::Continue) => Ok(Control::Continue),
+            _ => Ok(Control::Stop),
         }
     }
 
@@ -87,6 +171,28 @@ impl<T: Real, A: Observer<T>, B: Observer<T>> Observer<T> for (A, B) {
         self.0.wants().max(self.1.wants())
     }
 }
+
+/// Pointers to observers are observers.
+macro_rules! forward {
+    ($($pointer:ty),*) => {$(
+        impl<T: Real> Observer<T> for $pointer {
+            fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
+                (**self).observe(step)
+            }
+            fn wants(&self) -> Wants {
+                (**self).wants()
+            }
+        }
+    )*};
+}
+
+forward!(
+    &mut (dyn Observer<T> + '_),
+    Box<dyn Observer<T> + '_>,
+    &mut DofRecorder<T>,
+    &mut ContactRecorder<T>,
+    &mut EnergyRecorder<T>
+);
 
 /// Records displacement, velocity and acceleration of one dof over time.
 ///
@@ -120,14 +226,14 @@ impl<T: Real> DofRecorder<T> {
 }
 
 impl<T: Real> Observer<T> for DofRecorder<T> {
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
         let state = step.state;
         let fields = [state.displacement(), state.velocity(), state.acceleration()];
         if let Some(&u) = fields[0].get(self.dof) {
             self.times.push(state.time());
             self.motion.push([u, fields[1][self.dof], fields[2][self.dof]]);
         }
-        Control::Continue
+        Ok(Control::Continue)
     }
 }
 
@@ -168,13 +274,13 @@ impl<T: Real> ContactRecorder<T> {
 }
 
 impl<T: Real> Observer<T> for ContactRecorder<T> {
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
         let contacts = step.state.contacts();
         self.times.push(step.state.time());
         self.forces.push(contacts.forces().iter().copied().sum());
         self.raw_forces.push(contacts.raw_forces().iter().copied().sum());
         self.impulses.push(contacts.impulses().iter().copied().sum());
-        Control::Continue
+        Ok(Control::Continue)
     }
 }
 
@@ -219,12 +325,12 @@ impl<T: Real> EnergyRecorder<T> {
 }
 
 impl<T: Real> Observer<T> for EnergyRecorder<T> {
-    fn observe(&mut self, step: &StepView<'_, T>) -> Control {
+    fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
         if let Some(energy) = step.energy {
             self.times.push(step.state.time());
             self.energies.push(energy);
         }
-        Control::Continue
+        Ok(Control::Continue)
     }
 
     fn wants(&self) -> Wants {

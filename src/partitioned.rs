@@ -11,6 +11,7 @@ use crate::real::Real;
 /// Values are those along the normal of each frame node. The normal points from the first side to the second, for both.
 /// They may be displacements, velocities or accelerations, with the flexibility to match.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Side<'a, T> {
     /// Values along the normals without contact.
     pub free: &'a [T],
@@ -18,6 +19,13 @@ pub struct Side<'a, T> {
     /// positive semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix A of the
     /// body, for velocities and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid obstacle.
     pub flexibility: &'a [T],
+}
+
+impl<'a, T> Side<'a, T> {
+    /// A side with these values without contact and this flexibility.
+    pub const fn new(free: &'a [T], flexibility: &'a [T]) -> Self {
+        Self { free, flexibility }
+    }
 }
 
 /// The solution of a [`Frame`].
@@ -99,15 +107,15 @@ impl<T: Real> Interface<T> {
 ///
 /// // Masses 2 and 1 on springs, in units of a step: responses to unit forces ½ and 1. The gap is 0.1.
 /// let mut frame = Frame::<f64>::new(1)?;
-/// let first = Side { free: &[0.3], flexibility: &[0.5] };
-/// let second = Side { free: &[-0.1], flexibility: &[1.0] };
+/// let first = Side::new(&[0.3], &[0.5]);
+/// let second = Side::new(&[-0.1], &[1.0]);
 /// let interface = frame.solve([first, second], &[0.1])?;
 /// assert!((interface.forces()[0] - 0.2).abs() < 1e-15); // (0.3 + 0.1 − 0.1)/(½ + 1)
 /// assert!((interface.positions()[0] - 0.2).abs() < 1e-15); // 0.3 − ½ · 0.2 = −0.1 + 1 · 0.2 + 0.1
 ///
 /// // Velocities 1 and −2 become their common one, (2 · 1 − 1 · 2)/3, by an impulse of 2.
-/// let first = Side { free: &[1.0], flexibility: &[0.5] };
-/// let second = Side { free: &[-2.0], flexibility: &[1.0] };
+/// let first = Side::new(&[1.0], &[0.5]);
+/// let second = Side::new(&[-2.0], &[1.0]);
 /// let interface = frame.hold([first, second], &[0.0], &[true])?;
 /// assert!((interface.forces()[0] - 2.0).abs() < 1e-15 && interface.positions()[0].abs() < 1e-15);
 /// # Ok::<(), contact_dynamics::Error>(())

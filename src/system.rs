@@ -1,7 +1,9 @@
 //! The host's mechanics: mass, force, tangent and supports.
 
+mod forces;
 mod linear;
 
+pub use forces::{DampingForce, Path, PathForce, TangentWeights};
 pub use linear::LinearSystem;
 
 use crate::error::{Error, Result};
@@ -10,46 +12,9 @@ use crate::real::Real;
 use crate::sparse;
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// Weights of the tangent that a stage asks for: `stiffness · K + damping · C`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TangentWeights<T> {
-    /// Factor of K = −∂f/∂u.
-    pub stiffness: T,
-    /// Factor of C = −∂f/∂v.
-    pub damping: T,
-}
-
-/// Whether a system has velocity-dependent forces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Damping {
-    /// C = 0; the output was not written.
-    None,
-    /// The output holds C v.
-    Present,
-}
-
-/// The displacements at both ends of a step, and their mean.
-#[derive(Clone, Copy, Debug)]
-pub struct Path<'a, T> {
-    /// At the start.
-    pub from: &'a [T],
-    /// At the end.
-    pub to: &'a [T],
-    /// ½ (from + to).
-    pub mean: &'a [T],
-}
-
-/// Whether a system has a force of its own for a path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PathForce {
-    /// It has none; the output was not written.
-    None,
-    /// The output holds it.
-    Present,
-}
-
 /// How the force of a system depends on displacements and velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Linearity {
     /// f = F(t) − K u − C v with constant K and C: one factorization for a run, one solve a stage.
     Linear,
@@ -148,47 +113,18 @@ pub trait System<T: Real>: Send {
     /// As [`force`](Self::force).
     fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()>;
 
-    /// `out = f` of a step along a path whose internal work is the change of the potential,
-    /// f_int · (to − from) = V(to) − V(from), for [`EnergyMomentum`](crate::EnergyMomentum); t and v are those of the
-    /// middle. As in [`force`](Self::force) the whole force is asked for: the external load at t, minus that internal
-    /// force, minus the damping force at the mean v.
-    /// For St. Venant–Kirchhoff materials it is the force of the mean stress ½ (S(from) + S(to)) on the mean
-    /// configuration, which conserves angular momentum too. Default: none; the forces at start, middle and end are then
-    /// averaged by the potential.
-    ///
-    /// # Errors
-    ///
-    /// As [`force`](Self::force).
-    fn force_along(&mut self, t: f64, path: Path<'_, T>, v: &[T], out: &mut [T]) -> Result<PathForce> {
-        let _ = (t, path, v, out);
-        Ok(PathForce::None)
+    /// A force of its own along paths, if the system has one, for [`EnergyMomentum`](crate::EnergyMomentum). Default:
+    /// none; the forces at start, middle and end are then averaged by the potential. Whether there is one must not
+    /// change during a run.
+    fn path_force(&mut self) -> Option<&mut dyn PathForce<T>> {
+        None
     }
 
-    /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
-    /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The
-    /// exact one is not symmetric and takes [`Lu`](crate::Lu); without it K must be symmetric.
-    /// C is −∂f/∂v, as in [`tangent`](Self::tangent). Default: the tangent at the mean.
-    /// Without `force_along` it is not asked for: the tangent is then that of Simpson's rule.
-    ///
-    /// # Errors
-    ///
-    /// As [`force`](Self::force).
-    fn tangent_along(
-        &mut self,
-        t: f64,
-        path: Path<'_, T>,
-        v: &[T],
-        weights: TangentWeights<T>,
-        out: &mut [T],
-    ) -> Result<()> {
-        self.tangent(t, path.mean, v, weights, out)
-    }
-
-    /// `out =` the part of the internal force that vanishes with v (C v if it is linear), or [`Damping::None`] without
-    /// touching `out`. The default is no damping. The energy balance and corrections of velocity read it.
-    fn damping_force(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Damping {
-        let _ = (u, v, out);
-        Damping::None
+    /// The damping force, if the system has one. The default is no damping. The energy balance and corrections of
+    /// velocity read it; schemes, corrections and explicit steps are checked for damping by it. Whether there is one
+    /// must not change during a run.
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+        None
     }
 
     /// Elastic energy (½ uᵀ K u if it is linear), if the system has one; none by default. The potential of loads is not
@@ -200,13 +136,18 @@ pub trait System<T: Real>: Send {
     }
 
     /// `out =` the part of the force that depends on t alone, for the energy balance and for
-    /// [`EnergyMomentum`](crate::EnergyMomentum) without [`force_along`](Self::force_along); [`force`](Self::force)
+    /// [`EnergyMomentum`](crate::EnergyMomentum) without [`path_force`](Self::path_force); [`force`](Self::force)
     /// contains it. The default is no load. Loads that depend on u are not part of this; the energy balance counts
     /// their work in its remainder. `EnergyMomentum` would take them for internal forces; with such loads implement
-    /// [`force_along`](Self::force_along).
-    fn external_load(&mut self, t: f64, out: &mut [T]) {
+    /// [`path_force`](Self::path_force).
+    ///
+    /// # Errors
+    ///
+    /// As [`force`](Self::force).
+    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
         let _ = t;
         out.fill(T::zero());
+        Ok(())
     }
 
     /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or a bound above it, if the host knows one;
@@ -224,9 +165,14 @@ pub trait System<T: Real>: Send {
 
     /// Displacement, velocity and acceleration of the prescribed dofs at t, in the order of
     /// [`prescribed`](Self::prescribed).
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
+    ///
+    /// # Errors
+    ///
+    /// As [`force`](Self::force).
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
         let _ = t;
         out.fill([T::zero(); 3]);
+        Ok(())
     }
 
     /// Accepts the step that ends at t: history variables of the host move here and nowhere else.
@@ -297,27 +243,17 @@ macro_rules! forward {
             fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
                 (**self).tangent(t, u, v, weights, out)
             }
-            fn force_along(&mut self, t: f64, path: Path<'_, T>, v: &[T], out: &mut [T]) -> Result<PathForce> {
-                (**self).force_along(t, path, v, out)
+            fn path_force(&mut self) -> Option<&mut dyn PathForce<T>> {
+                (**self).path_force()
             }
-            fn tangent_along(
-                &mut self,
-                t: f64,
-                path: Path<'_, T>,
-                v: &[T],
-                weights: TangentWeights<T>,
-                out: &mut [T],
-            ) -> Result<()> {
-                (**self).tangent_along(t, path, v, weights, out)
-            }
-            fn damping_force(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Damping {
-                (**self).damping_force(u, v, out)
+            fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+                (**self).damping_force()
             }
             fn potential_energy(&mut self, u: &[T]) -> Option<T> {
                 (**self).potential_energy(u)
             }
-            fn external_load(&mut self, t: f64, out: &mut [T]) {
-                (**self).external_load(t, out);
+            fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
+                (**self).external_load(t, out)
             }
             fn highest_frequency(&mut self) -> Option<f64> {
                 (**self).highest_frequency()
@@ -325,8 +261,8 @@ macro_rules! forward {
             fn prescribed(&self) -> &[usize] {
                 (**self).prescribed()
             }
-            fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
-                (**self).prescribed_motion(t, out);
+            fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
+                (**self).prescribed_motion(t, out)
             }
             fn commit(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
                 (**self).commit(t, u, v)

@@ -39,6 +39,7 @@ pub enum StartUp {
 /// u of the last stage is the displacement at the end of the step. Stored v and a may live elsewhere, as the
 /// accelerations of generalized-α do: [`analysis::order`](crate::analysis::order) finds out where.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tableau {
     /// Stages in the order in which they are solved.
     pub stages: Vec<Stage>,

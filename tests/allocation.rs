@@ -276,8 +276,8 @@ fn frames() {
             for node in 0..n {
                 (free[node], held[node]) = (if node < closed { 1.0 } else { -2.0 }, node >= closed);
             }
-            let first = partitioned::Side { free: &free, flexibility: &flexibility };
-            let second = partitioned::Side { free: &gaps, flexibility: &flexibility };
+            let first = partitioned::Side::new(&free, &flexibility);
+            let second = partitioned::Side::new(&gaps, &flexibility);
             let found = frame.solve([first, second], &gaps).unwrap();
             assert_eq!(found.closed().iter().filter(|closed| **closed).count(), closed);
             frame.hold([first, second], &gaps, &held).unwrap();

@@ -54,9 +54,9 @@ fn everything(factor: &mut dyn Factorization<f64>, a: &SparseColMat<usize, f64>,
     condensed.condense(&rhs, &mut interface).unwrap();
     let mut response = vec![0.0; last.len()];
     response[0] = 1.0;
-    condensed.solve(&mut response);
+    condensed.solve(&mut response).unwrap();
     interface.iter_mut().zip(&response).for_each(|(x, response)| *x += 0.3 * response);
-    condensed.expand(&interface, &mut halves);
+    condensed.expand(&interface, &mut halves).unwrap();
     [x, halves, interface, response].concat()
 }
 

@@ -124,7 +124,7 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
     let unit = |row: usize| (0..candidates).map(move |k| f64::from(u8::from(k == row)));
     let all: Vec<f64> = (0..candidates).flat_map(unit).collect();
     let mut w = all.clone();
-    factor.condensation().expect("Cholesky condenses").solve(&mut w);
+    factor.condensation().expect("Cholesky condenses").solve(&mut w).expect("a factor");
     let factor = Rc::new(RefCell::new(factor));
     let mut table = Table::new(Unit::Milli, INTERFACE);
     let (mut x, ends) = (vec![1.0; dofs], Rc::new(RefCell::new(vec![0.0; candidates])));
@@ -148,7 +148,7 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
     let (own, mut solution) = (Rc::clone(&factor), vec![0.0; dofs]);
     table.row("expand", move || {
         let mut factor = own.borrow_mut();
-        factor.condensation().expect("Cholesky condenses").expand(&ends.borrow(), &mut solution);
+        factor.condensation().expect("Cholesky condenses").expand(&ends.borrow(), &mut solution).expect("a factor");
         black_box(&solution);
     });
     for columns in [1, 16, candidates] {
@@ -156,7 +156,7 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
         let mut work = forces.clone();
         table.row(format!("responses to {columns} contacts"), move || {
             work.copy_from_slice(&forces);
-            own.borrow_mut().condensation().expect("Cholesky condenses").solve(&mut work);
+            own.borrow_mut().condensation().expect("Cholesky condenses").solve(&mut work).expect("a factor");
             black_box(&work);
         });
     }

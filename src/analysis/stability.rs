@@ -82,6 +82,7 @@ pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
 
 /// Whether errors of single steps stay bounded as h → 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ZeroStability {
     /// Only the double root 1 of rigid-body motion has modulus 1.
     Strong,

@@ -51,7 +51,7 @@ impl<T: Real> Corrector<T> for ContactImplicit {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.act_implicitly()
+        act_implicitly(step)
     }
 }
 
@@ -118,7 +118,7 @@ impl<T: Real> Corrector<T> for ContactStabilized {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.act_implicitly()
+        act_implicitly(step)
     }
 }
 
@@ -129,4 +129,26 @@ pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static st
         true => Ok(()),
         false => Err("it needs a scheme of one stage that reads the last state alone"),
     }
+}
+
+/// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
+/// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the
+/// scheme's (u, h v, h² a) to a multiplier.
+fn act_implicitly<T: Real>(step: &mut Correction<'_, T>) -> Result<()> {
+    let rows = std::mem::take(&mut step.buffers.closed);
+    let mut impulses = std::mem::take(&mut step.buffers.impulses);
+    step.projection.prepare(step.g, &rows);
+    let [u, v, a] = step.response();
+    impulses.clear();
+    for &row in &rows {
+        let lambda = step.contacts.lambda_raw[row];
+        step.projection.push(step.g, row, -T::of(a) * lambda, &mut step.new.a);
+        step.book_impulse(row, -(T::of(step.momentum_weights()[2] * a) * lambda));
+        step.report_force(row, T::of(2.0 * u) * lambda);
+        impulses.push(T::of(step.h * (2.0 * u - v)) * lambda);
+    }
+    let result = step.apply_impulses(&rows, &impulses);
+    step.buffers.closed = rows;
+    step.buffers.impulses = impulses;
+    result
 }

@@ -1,7 +1,8 @@
-//! What a corrector works with: the jumps of a stage, the projection that removes them, and the books on impulse and
-//! energy.
+//! What a corrector works with: the jumps of a stage, the projection that removes them, pushes along rows, and the
+//! books on impulse and energy. What serves one corrector only is in the file of that corrector.
 
 mod energy;
+mod parts;
 mod past;
 
 use super::group_problem::Jumps;
@@ -12,14 +13,60 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
 use crate::state::{Backup, ContactState, Motion};
-use crate::system::{Damping, Linearity, System};
+use crate::system::{Linearity, System};
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
 ///
 /// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw
 /// multiplier positive, or equality rows) and those that touch and approach; a row that touches and separates is left
-/// alone. Every edit is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of momentum to
-/// rounding.
+/// alone. Every push along a row is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of
+/// momentum to rounding.
+///
+/// A corrector of a host has what those of this crate have: rows ([`closed`](Self::closed),
+/// [`engaged`](Self::engaged), [`opened`](Self::opened), [`released`](Self::released)), forces
+/// ([`ContactState::raw_forces`] by [`contacts`](Self::contacts), [`previous_force`](Self::previous_force)), gaps and
+/// rates ([`starting_gaps`](Self::starting_gaps), [`rate`](Self::rate)), the numbers of the scheme
+/// ([`response`](Self::response), [`force_share`](Self::force_share), [`momentum_weights`](Self::momentum_weights)) and
+/// of the bodies ([`compliance`](Self::compliance), [`compliances`](Self::compliances)), and pushes of v
+/// ([`apply_impulses`](Self::apply_impulses), [`exchange_energy`](Self::exchange_energy)), of a
+/// ([`apply_forces`](Self::apply_forces), [`report_force`](Self::report_force)) and of the past
+/// ([`move_past`](Self::move_past), [`project_past`](Self::project_past)).
+///
+/// ```
+/// use contact_dynamics::corrector::{Correction, Corrector};
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::{LinearRows, LinearSystem, Newmark, PersistencyCorrection, Result, Simulation};
+///
+/// /// Gives back a share of the energy that an impact took, as soon as the contact is open.
+/// #[derive(Debug)]
+/// struct Rebound(f64);
+///
+/// impl Corrector<f64> for Rebound {
+///     fn name(&self) -> String {
+///         format!("rebound({})", self.0)
+///     }
+///     fn correct(&self, step: &mut Correction<'_, f64>) -> Result<()> {
+///         for i in 0..step.released().len() {
+///             let row = step.released()[i];
+///             let energy = self.0 * step.contacts().dissipated()[row];
+///             step.exchange_energy(row, energy)?;
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// // A ball on a soft spring that pulls it off the wall after the impact, which took ½ · 2² of its energy.
+/// let spring = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], spring)?, Newmark::trapezoidal(), 1e-3)
+///     .velocity(vec![-2.0])
+///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1e-3))
+///     .corrector(PersistencyCorrection::new())
+///     .corrector(Rebound(0.25))
+///     .build()?;
+/// run.run_until(0.1, &mut ())?;
+/// assert!((run.energy().kinetic - 0.25 * 2.0).abs() < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Correction<'a, T: Real> {
     pub(crate) h: f64,
@@ -87,56 +134,6 @@ impl<T: Real> std::fmt::Debug for Erased<'_, T> {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Step size.
-    pub fn step_size(&self) -> f64 {
-        self.h
-    }
-
-    /// Time of the stage.
-    pub fn time(&self) -> f64 {
-        self.t
-    }
-
-    /// Closed rows, as indices into the contacts of the state.
-    pub fn closed(&self) -> &[usize] {
-        &self.buffers.closed
-    }
-
-    /// Engaged rows; valid after [`solve_velocity_jumps`](Self::solve_velocity_jumps).
-    pub fn engaged(&self) -> &[usize] {
-        &self.buffers.engaged
-    }
-
-    /// Rows that were closed before this stage and are open now.
-    pub fn opened(&self) -> &[usize] {
-        &self.buffers.opened
-    }
-
-    /// Reported force of a row before this stage, or when it was last closed in this step.
-    pub fn previous_force(&self, row: usize) -> T {
-        self.buffers.reported[row]
-    }
-
-    /// Displacements of the stage.
-    pub fn displacement(&self) -> &[T] {
-        &self.new.u
-    }
-
-    /// Velocities of the stage.
-    pub fn velocity(&self) -> &[T] {
-        &self.new.v
-    }
-
-    /// Accelerations of the stage.
-    pub fn acceleration(&self) -> &[T] {
-        &self.new.a
-    }
-
-    /// Contacts of the stage.
-    pub fn contacts(&self) -> &ContactState<T> {
-        self.contacts
-    }
-
     /// Whether a row is pressed: its jumps vanish both ways.
     fn is_pressed(&self, row: usize) -> bool {
         self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row).is_equality()
@@ -255,12 +252,12 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Reads what the rates of the gaps have of their own.
-    fn read_rates(&mut self) -> Result<()> {
+    pub(super) fn read_rates(&mut self) -> Result<()> {
         self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates)
     }
 
     /// [`apply_impulses`](Self::apply_impulses) with the rates of the gaps read already.
-    fn apply(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
+    pub(super) fn apply(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
         }
@@ -291,22 +288,20 @@ impl<T: Real> Correction<'_, T> {
                 projection.push(g, row, impulse, change);
             }
             // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
-            let present = match system.0.linearity() {
-                Linearity::Linear => system.0.damping_force(&new.u, change, damping),
+            let linearity = system.0.linearity();
+            let Some(force) = system.0.damping_force() else { return Ok(()) };
+            match linearity {
+                Linearity::Linear => force.evaluate(&new.u, change, damping)?,
                 Linearity::Nonlinear => {
-                    let present = system.0.damping_force(&new.u, &new.v, damping);
+                    force.evaluate(&new.u, &new.v, damping)?;
                     for (change, &v) in change.iter_mut().zip(&new.v) {
                         *change = v - *change;
                     }
-                    if system.0.damping_force(&new.u, change, before) == Damping::Present {
-                        T::axpy(-T::one(), before, damping);
-                    }
-                    present
+                    force.evaluate(&new.u, change, before)?;
+                    T::axpy(-T::one(), before, damping);
                 }
-            };
-            if present == Damping::Present {
-                self.accelerate_by_damping()?;
             }
+            self.accelerate_by_damping()?;
         }
         Ok(())
     }
@@ -361,6 +356,35 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
+    /// Applies forces to a along rows, a ← a + M⁻¹ Gᵀ forces, and books their impulses. Reported forces are left as
+    /// they are ([`report_force`](Self::report_force), [`force_share`](Self::force_share)).
+    pub fn apply_forces(&mut self, rows: &[usize], forces: &[T]) {
+        self.projection.prepare(self.g, rows);
+        let weight = T::of(self.momentum_weights()[2]);
+        for (&row, &force) in rows.iter().zip(forces) {
+            self.projection.push(self.g, row, force, &mut self.new.a);
+            self.contacts.impulse[row] += weight * force;
+        }
+    }
+
+    /// Writes S = G M⁻¹ Gᵀ of some rows, entry (i, j) at i + j n for n rows: the change of the gap rate of the i-th by
+    /// a unit impulse along the j-th.
+    pub fn compliances(&mut self, rows: &[usize], s: &mut Vec<T>) {
+        self.projection.assemble(self.g, rows, s);
+    }
+
+    /// Gaps of all rows where the stage starts; empty if nothing is known of the past.
+    ///
+    /// # Errors
+    ///
+    /// What a constraint says of the start of the stage.
+    pub fn starting_gaps(&mut self) -> Result<&[T]> {
+        let Self { buffers, constraints, past, new, .. } = self;
+        let Some(start) = past.first() else { return Ok(&[]) };
+        constraints.0.elsewhere(0, start.place(), (new.t, &new.u), &mut buffers.gaps)?;
+        Ok(&buffers.gaps)
+    }
+
     /// S of one row: the change of its gap rate by a unit impulse along it.
     pub fn compliance(&mut self, row: usize) -> T {
         let mut s = std::mem::take(&mut self.buffers.s);
@@ -378,64 +402,6 @@ impl<T: Real> Correction<'_, T> {
     pub fn rate(&mut self, row: usize) -> Result<T> {
         self.read_rates()?;
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
-    }
-
-    /// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in
-    /// this step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response
-    /// of the scheme's (u, h v, h² a) to a multiplier.
-    pub(super) fn act_implicitly(&mut self) -> Result<()> {
-        let rows = std::mem::take(&mut self.buffers.closed);
-        let mut impulses = std::mem::take(&mut self.buffers.impulses);
-        self.projection.prepare(self.g, &rows);
-        let [u, v, a] = self.scheme.response;
-        impulses.clear();
-        for &row in &rows {
-            let lambda = self.contacts.lambda_raw[row];
-            self.projection.push(self.g, row, -T::of(a) * lambda, &mut self.new.a);
-            self.contacts.impulse[row] -= T::of(self.scheme.covector[0][2] * self.h * a) * lambda;
-            self.contacts.lambda[row] = T::of(2.0 * u) * lambda;
-            impulses.push(T::of(self.h * (2.0 * u - v)) * lambda);
-        }
-        let result = self.apply_impulses(&rows, &impulses);
-        self.buffers.closed = rows;
-        self.buffers.impulses = impulses;
-        result
-    }
-
-    /// Zeroes the accelerations of all dofs that engaged rows act on, and takes their inertia out of the reported
-    /// forces; after [`solve_acceleration_jumps`](Self::solve_acceleration_jumps).
-    pub(super) fn stop_accelerations(&mut self) {
-        let Self { buffers, contacts, new, g, scheme, h, .. } = self;
-        let share = T::of(scheme.balance / scheme.acceleration);
-        for (&row, &force) in buffers.engaged.iter().zip(&buffers.forces) {
-            contacts.lambda[row] += share * force;
-            contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
-            for (dof, weight) in g.row(row) {
-                if weight != T::zero() {
-                    new.a[dof] = T::zero();
-                }
-            }
-        }
-    }
-
-    /// Calls a function with every row that has opened, up to its first error.
-    ///
-    /// # Errors
-    ///
-    /// That of the function.
-    pub fn each_opened(&mut self, mut each: impl FnMut(&mut Self, usize) -> Result<()>) -> Result<()> {
-        (0..self.buffers.opened.len()).try_for_each(|i| each(self, self.buffers.opened[i]))
-    }
-
-    /// In the last stage of a step calls a function with every row that was closed in this step, or at its start, and
-    /// is open at its end, up to its first error. Velocities between stages are not read again by every scheme: what is
-    /// to last is given to the state at the end.
-    ///
-    /// # Errors
-    ///
-    /// That of the function.
-    pub fn each_released(&mut self, mut each: impl FnMut(&mut Self, usize) -> Result<()>) -> Result<()> {
-        (0..self.buffers.released.len()).try_for_each(|i| each(self, self.buffers.released[i]))
     }
 
     /// Solves S x + jump for the multipliers x of `rows` under their bounds.

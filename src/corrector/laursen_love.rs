@@ -44,7 +44,47 @@ impl<T: Real> Corrector<T> for LaursenLove {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        let work = step.contact_work()?;
-        step.exchange_by_forces(-work)
+        let work = contact_work(step)?;
+        exchange_by_forces(step, -work)
     }
+}
+
+/// Work of the raw multipliers over the stage, each times the change of its gap.
+fn contact_work<T: Real>(step: &mut Correction<'_, T>) -> Result<T> {
+    if step.starting_gaps()?.is_empty() {
+        return Ok(T::zero());
+    }
+    let Correction { buffers, contacts, .. } = step;
+    let (closed, gaps) = (&buffers.closed, &buffers.gaps);
+    Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
+}
+
+/// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw
+/// multipliers of the closed rows, as far as there is any.
+fn exchange_by_forces<T: Real>(step: &mut Correction<'_, T>, energy: T) -> Result<()> {
+    step.read_rates()?;
+    let rows = std::mem::take(&mut step.buffers.closed);
+    let mut impulses = std::mem::take(&mut step.buffers.impulses);
+    impulses.clear();
+    impulses.extend(rows.iter().map(|&row| step.contacts.lambda_raw[row].max(T::zero())));
+    step.projection.assemble(step.g, &rows, &mut step.buffers.s);
+    let size = rows.len();
+    let (mut square, mut rate) = (T::zero(), T::zero());
+    for (i, (&row, &x)) in rows.iter().zip(&impulses).enumerate() {
+        rate += x * (step.g.product(row, &step.new.v) + step.buffers.rates[row].rate);
+        let column = &step.buffers.s[i * size..(i + 1) * size];
+        square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
+    }
+    let mut result = Ok(());
+    if square > T::zero() {
+        let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
+        let factor = (root - rate) / square;
+        for x in &mut impulses {
+            *x *= factor;
+        }
+        result = step.apply(&rows, &impulses);
+    }
+    step.buffers.closed = rows;
+    step.buffers.impulses = impulses;
+    result
 }

@@ -6,6 +6,7 @@ use crate::real::Real;
 
 /// Which jumps are removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Parts {
     /// Velocity, then acceleration.
     #[default]
@@ -18,6 +19,7 @@ pub enum Parts {
 
 /// Whether the past of a contact that has just closed is made consistent with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum HistoryProjection {
     /// The past keeps the approach.
     #[default]

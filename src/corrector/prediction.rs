@@ -36,6 +36,7 @@ pub struct Prediction<'a, T: Real> {
 
 /// On which contacts a prediction is projected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Extent {
     /// All that it violates.
     #[default]

@@ -46,7 +46,17 @@ impl<T: Real> Corrector<T> for Release {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.each_released(Correction::give_back)
+        for i in 0..step.released().len() {
+            let row = step.released()[i];
+            let taken = step.contacts().dissipated()[row];
+            if taken > T::zero() {
+                let impulse = step.exchange_energy(row, taken)?;
+                if impulse != T::zero() {
+                    step.move_past(row, impulse)?;
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -142,7 +152,8 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         super::PersistencyCorrection::new().correct(step)?;
-        step.each_released(|step, row| {
+        for i in 0..step.released().len() {
+            let row = step.released()[i];
             let force = step.previous_force(row).max(T::zero());
             let impulse = match self.0 {
                 Waves::Transit(transit) => T::of(0.5 * transit) * force,
@@ -152,7 +163,9 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
                     if s > T::zero() { opening / s } else { T::zero() }
                 }
             };
-            step.part(row, impulse)
-        })
+            step.apply_impulses(&[row], &[impulse])?;
+            step.move_past(row, impulse)?;
+        }
+        Ok(())
     }
 }

@@ -30,7 +30,15 @@ impl<T: Real> Corrector<T> for ZeroAcceleration {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.solve_velocity_jumps()?;
         step.solve_acceleration_jumps()?;
-        step.stop_accelerations();
+        let (share, weight) = (T::of(step.force_share()), T::of(step.momentum_weights()[2]));
+        for i in 0..step.engaged().len() {
+            let (row, force) = (step.engaged()[i], step.jump_forces()[i]);
+            step.report_force(row, step.contacts().forces()[row] + share * force);
+            step.book_impulse(row, weight * force);
+            for (dof, _) in step.row(row).filter(|(_, entry)| *entry != T::zero()) {
+                step.acceleration_mut()[dof] = T::zero();
+            }
+        }
         Ok(())
     }
 }

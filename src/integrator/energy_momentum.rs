@@ -11,7 +11,7 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// u' = u + ½ h (v + v'),     M (v' − v)/h = f(t + ½ h; u → u', v̄) + Gᵀ λ,     v̄ = ½ (v + v')
 /// ```
 ///
-/// The force of the path u → u' is the system's own ([`force_along`](crate::System::force_along)), or, if it has none,
+/// The force of the path u → u' is the system's own ([`path_force`](crate::System::path_force)), or, if it has none,
 /// the mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; this mean
 /// reads [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and
 /// takes three forces and two tangents an iteration.

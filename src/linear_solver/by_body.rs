@@ -5,7 +5,6 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
-use std::convert::Infallible;
 use std::ops::Range;
 
 /// Factorizes each body on its own.
@@ -299,10 +298,11 @@ impl<T: Real> Part<T> {
     }
 
     /// Completes the solution in `column`.
-    fn expand(&mut self, interface: &[T]) {
-        if let Some(condensed) = self.factor.condensation().filter(|_| self.interface.len() > 0) {
-            condensed.expand(self.interface.read(interface, &mut self.on_interface), &mut self.column);
-        }
+    fn expand(&mut self, interface: &[T]) -> Result<()> {
+        let Self { dofs, factor, interface: places, column, on_interface, .. } = self;
+        let Some(condensed) = factor.condensation().filter(|_| places.len() > 0) else { return Ok(()) };
+        let expanded = condensed.expand(places.read(interface, on_interface), column);
+        expanded.map_err(|error| in_system(error, |dof| dofs.at(dof)))
     }
 
     fn touches(&self) -> bool {
@@ -426,31 +426,30 @@ impl<T: Real> Condensation<T> for Factors<T> {
         Ok(())
     }
 
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         if self.apart {
-            let Ok(()) = threads::try_each(&mut self.parts, &|part| {
-                part.expand(interface);
-                Ok::<(), Infallible>(())
-            });
+            threads::try_each(&mut self.parts, &|part| part.expand(interface))?;
             for part in &self.parts {
                 part.dofs.scatter(&part.column, solution);
             }
-            return;
+            return Ok(());
         }
         for part in &mut self.parts {
             let Part { dofs, factor, interface: places, on_interface, .. } = part;
             let condensed = factor.condensation().filter(|_| places.len() > 0);
             if let (Selection::Range(range), Some(condensed)) = (dofs, condensed) {
                 // In place.
-                condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
+                let expanded = condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
+                expanded.map_err(|error| in_system(error, |dof| range.start + dof))?;
             } else {
-                part.expand(interface);
+                part.expand(interface)?;
                 part.dofs.scatter(&part.column, solution);
             }
         }
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         let Self { parts, height, on_interface, .. } = self;
         for part in parts.iter_mut().filter(|part| part.touches()) {
             let own = part.interface.len();
@@ -463,11 +462,13 @@ impl<T: Real> Condensation<T> for Factors<T> {
                 continue;
             }
             if let Some(condensed) = part.factor.condensation() {
-                condensed.solve(columns);
+                let solved = condensed.solve(columns);
+                solved.map_err(|error| in_system(error, |dof| part.dofs.at(dof)))?;
             }
             for (forces, column) in forces.chunks_exact_mut(*height).zip(columns.chunks_exact(own)) {
                 part.interface.scatter(column, forces);
             }
         }
+        Ok(())
     }
 }

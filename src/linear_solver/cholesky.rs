@@ -341,20 +341,21 @@ impl<T: Real> Condensation<T> for Factor<T> {
         Ok(())
     }
 
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         let first = self.trailing().start;
         for (&value, &place) in interface.iter().zip(&self.interface) {
             self.sweep[first + place] = value;
         }
         self.backward(first);
         self.give(solution);
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         let trailing = self.trailing();
         let height = trailing.len();
         if height == 0 {
-            return;
+            return Ok(());
         }
         let Self { symbolic, values, below, trailing: x, interface: places, .. } = self;
         let columns = forces.len() / height;
@@ -379,5 +380,6 @@ impl<T: Real> Condensation<T> for Factor<T> {
                 *force = x[place];
             }
         }
+        Ok(())
     }
 }

@@ -90,14 +90,15 @@ impl<T: Real> Condensation<T> for Inverse<T> {
         Ok(())
     }
 
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         solution.copy_from_slice(&self.solution);
         for (&x, &dof) in interface.iter().zip(&self.interface) {
             solution[dof] = x;
         }
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         if !self.interface.is_empty() {
             for column in forces.chunks_exact_mut(self.interface.len()) {
                 for (x, &dof) in column.iter_mut().zip(&self.interface) {
@@ -105,5 +106,6 @@ impl<T: Real> Condensation<T> for Inverse<T> {
                 }
             }
         }
+        Ok(())
     }
 }

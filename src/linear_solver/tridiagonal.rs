@@ -396,15 +396,16 @@ impl<T: Real> Condensation<T> for Factor<T> {
         Ok(())
     }
 
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         for (&x, &at) in interface.iter().zip(&self.interface) {
             self.x[at] = x;
         }
         self.backward(Part::Interior);
         self.numbering.scatter(&self.x, solution);
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         for column in forces.chunks_exact_mut(self.places.len().max(1)) {
             for (&force, &place) in column.iter().zip(&self.places) {
                 self.on_ends[place] = force;
@@ -414,5 +415,6 @@ impl<T: Real> Condensation<T> for Factor<T> {
                 *x = self.on_ends[place];
             }
         }
+        Ok(())
     }
 }

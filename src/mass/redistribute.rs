@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 /// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, that meets its conditions
 /// (theory, section 14); they differ in how far mass may go and in what is kept besides the total.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum Redistribution<'a> {
     /// The neighbors of each massless dof that keep mass, in proportion to their mass (Hager, Hüeber, Wohlmuth, Int. J.
     /// Numer. Methods Eng. 73, 2008, do the like by quadrature in the elements at the contact boundary).

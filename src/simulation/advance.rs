@@ -30,8 +30,9 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step), and [`Error::EnergyNotFinite`] if an
-    /// observer asks for the energy, and it is NaN or infinite; the step itself has been taken.
+    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step); [`Error::EnergyNotFinite`] if an
+    /// observer asks for the energy, and it is NaN or infinite, and what an observer returns: the step itself has then
+    /// been taken.
     pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
@@ -56,7 +57,7 @@ impl<T: Real> Simulation<'_, T> {
             }
         };
         let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
-        Ok(observer.observe(&view))
+        observer.observe(&view)
     }
 
     /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it

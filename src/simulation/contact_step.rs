@@ -71,7 +71,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         // Displacements of supports, or h times their velocities.
         let mut support = |t: f64, values: &mut [T], what: fn(&[T; 3], T) -> T| {
             if !prescribed.is_empty() {
-                system.prescribed_motion(t, supports);
+                system.prescribed_motion(t, supports)?;
                 finite_supports(t, prescribed, supports)?;
                 for (&dof, support) in prescribed.iter().zip(supports.iter()) {
                     values[dof] = what(support, h);

@@ -6,7 +6,7 @@ use crate::contact::ContactJacobian;
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::{ContactState, State};
-use crate::system::{Damping, System};
+use crate::system::System;
 
 /// Accumulates [`Works`]; costs one load, one product with C and, with supports, one evaluation of f a step.
 #[derive(Debug)]
@@ -77,8 +77,8 @@ impl<T: Real> Ledger<T> {
         rows: Rows<'_, '_, T>,
     ) -> Result<()> {
         let reactions = reactions(system, state, rows)?;
-        let power = self.damping_power(system, state.displacement(), state.velocity());
-        system.external_load(state.time(), &mut self.old_load);
+        let power = self.damping_power(system, state.displacement(), state.velocity())?;
+        system.external_load(state.time(), &mut self.old_load)?;
         let sums = [reactions.iter().copied().sum(), power, self.old_load.iter().copied().sum()];
         for (what, value) in ["the force of the supports", "the power of damping", "the load"].into_iter().zip(sums) {
             finite(state.time(), what, value)?;
@@ -93,11 +93,10 @@ impl<T: Real> Ledger<T> {
         Ok(())
     }
 
-    fn damping_power(&mut self, system: &mut dyn System<T>, u: &[T], v: &[T]) -> T {
-        match system.damping_force(u, v, &mut self.residual) {
-            Damping::None => T::zero(),
-            Damping::Present => -dot(&self.residual, v),
-        }
+    fn damping_power(&mut self, system: &mut dyn System<T>, u: &[T], v: &[T]) -> Result<T> {
+        let Some(damping) = system.damping_force() else { return Ok(T::zero()) };
+        damping.evaluate(u, v, &mut self.residual)?;
+        Ok(-dot(&self.residual, v))
     }
 
     /// Remembers the displacements that the step starts from.
@@ -119,7 +118,7 @@ impl<T: Real> Ledger<T> {
             works.supports += mean * (u[dof] - self.old_u[dof]);
         }
         // The load at the end is kept in the spare vector until the step is accepted.
-        system.external_load(books.t, &mut self.old_load);
+        system.external_load(books.t, &mut self.old_load)?;
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&old, &new)| half * (old + new));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
@@ -133,7 +132,7 @@ impl<T: Real> Ledger<T> {
         let forces = self.contact.iter().zip(&self.next_contact).map(|(&old, &new)| old + newest * (new - old));
         works.contact += moves.zip(forces).map(|(du, f)| du * f).sum();
         works.corrections += books.corrections;
-        let power = self.damping_power(system, u, v);
+        let power = self.damping_power(system, u, v)?;
         works.damping += half * (self.power + power) * T::of(books.h);
         self.next = (works, power);
         works.check(books.t)

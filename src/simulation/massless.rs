@@ -8,7 +8,7 @@ use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver}
 use crate::real::Real;
 use crate::sparse::{self, Combination};
 use crate::state::Motion;
-use crate::system::{Damping, Linearity, System, TangentWeights};
+use crate::system::{Linearity, System, TangentWeights};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat};
 
 /// The dofs b without mass of a linear system, and their part of K.
@@ -194,25 +194,27 @@ impl<T: Real> Condensation<T> for Embedded<T> {
     }
 
     /// Entries of other dofs are left as they are.
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) {
+    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         let Self { inner, dofs, places, vector, on_interface, .. } = self;
         gather(interface, places, on_interface);
         if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-            condensed.expand(on_interface, vector);
+            condensed.expand(on_interface, vector)?;
         }
         scatter(vector, dofs, solution);
+        Ok(())
     }
 
-    fn solve(&mut self, forces: &mut [T]) {
+    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         let Self { inner, places, on_interface, interface, .. } = self;
         for column in forces.chunks_exact_mut((*interface).max(1)) {
             gather(column, places, on_interface);
             column.fill(T::zero());
             if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-                condensed.solve(on_interface);
+                condensed.solve(on_interface)?;
                 scatter(on_interface, places, column);
             }
         }
+        Ok(())
     }
 }
 
@@ -254,7 +256,7 @@ impl<T: Real> MasslessBlock<T> {
                  system is nonlinear; choose an implicit scheme, or give the dofs a mass",
             );
         }
-        if is_damped(system, dofs) {
+        if is_damped(system, dofs)? {
             return refuse(
                 "explicit stages balance dofs without mass by stiffness alone, and damping acts on them; choose \
                  damping proportional to mass or an implicit scheme, or give the dofs a mass",
@@ -276,12 +278,14 @@ impl<T: Real> MasslessBlock<T> {
 }
 
 /// Whether damping forces depend on the velocities of some dofs.
-pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> bool {
+pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> Result<bool> {
     let mut v = vec![T::zero(); system.dofs()];
     let (u, mut force) = (v.clone(), v.clone());
     for &dof in dofs {
         // (Scattered values, so that nothing cancels.)
         v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
     }
-    system.damping_force(&u, &v, &mut force) == Damping::Present && force.iter().any(|&force| force != T::zero())
+    let Some(damping) = system.damping_force() else { return Ok(false) };
+    damping.evaluate(&u, &v, &mut force)?;
+    Ok(force.iter().any(|&force| force != T::zero()))
 }

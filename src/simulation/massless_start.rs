@@ -13,6 +13,7 @@ use crate::system::System;
 
 /// How dofs without mass were moved when a simulation was built, before its first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StartAdjustment<T> {
     /// Change of the potential energy, that of the load (minus its force times the displacement) included; not
     /// positive. The run would have lost this energy in a jump. None if the system has no potential.
@@ -37,7 +38,7 @@ pub(super) fn balance_start<T: Real>(
     dofs: &[usize],
     [h, ahead]: [f64; 2],
 ) -> Result<Option<StartAdjustment<T>>> {
-    if dofs.is_empty() || is_damped(system, dofs) {
+    if dofs.is_empty() || is_damped(system, dofs)? {
         return Ok(None);
     }
     let t = motion.t;
@@ -99,7 +100,7 @@ pub(super) fn balance_start<T: Real>(
             let &dof =
                 dofs.iter().max_by(|&&i, &&j| moves(i).abs().value().total_cmp(&moves(j).abs().value())).unwrap_or(&0);
             let energies = [system.potential_energy(&given), system.potential_energy(&motion.u)];
-            system.external_load(t, &mut residual);
+            system.external_load(t, &mut residual)?;
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
             return Ok(Some(StartAdjustment { energy, largest: moves(dof).abs(), dof }));

@@ -175,7 +175,10 @@ impl<T: Real> Operator<T> {
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
             match at.of {
                 TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
-                TangentOf::Path(path) => system.tangent_along(at.t, path, at.v, weights, part)?,
+                TangentOf::Path(path) => match system.path_force() {
+                    Some(own) => own.tangent_along(at.t, path, at.v, weights, part)?,
+                    None => system.tangent(at.t, path.mean, at.v, weights, part)?,
+                },
                 TangentOf::Simpson { end } => {
                     // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which that of the middle
                     // term counts half: ⅔ K in the middle and ⅓ K at the end.
@@ -233,7 +236,7 @@ impl<T: Real> Operator<T> {
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
-            condensed.expand(on_interface, increment);
+            condensed.expand(on_interface, increment)?;
         } else if *contact == ContactPath::Apart {
             for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
                 increment[dof] = x;
@@ -434,8 +437,7 @@ fn respond<T: Real>(
 ) -> Result<()> {
     // A condensation answers on the interface without a full solve, whether steps condense or not.
     if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
-        condensed.solve(forces);
-        return Ok(());
+        return condensed.solve(forces);
     }
     let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
     for forces in forces.chunks_mut(COLUMNS * height) {

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
 use crate::state::{History, Motion, State};
-use crate::system::{Damping, Path, PathForce, System, check_vector};
+use crate::system::{System, check_vector};
 use crate::tableau::{ContactLevel, Tableau};
 
 /// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
@@ -56,10 +56,10 @@ pub(super) fn check_corrections<T: Real>(
         };
         return refuse(&**corrector, reason);
     }
-    let damping = damping(system);
+    let damped = system.damping_force().is_some();
     for corrector in correctors {
         let mut checked = corrector.check(tableau);
-        if damping == Damping::Present {
+        if damped {
             checked = checked.and_then(|()| corrector.check_damping(tableau));
         }
         if let Err(reason) = checked {
@@ -89,9 +89,7 @@ pub(super) fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError
 
 /// Refuses systems that have neither a potential nor a force of their own for paths.
 pub(super) fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_>, motion: &Motion<T>) -> Result<()> {
-    let path = Path { from: &motion.u, to: &motion.u, mean: &motion.u };
-    let own = system.force_along(motion.t, path, &motion.v, &mut vec![T::zero(); motion.u.len()])?;
-    match own == PathForce::Present || system.potential_energy(&motion.u).is_some() {
+    match system.path_force().is_some() || system.potential_energy(&motion.u).is_some() {
         true => Ok(()),
         false => Err(Error::Incompatible {
             part: scheme.integrator.name(),
@@ -108,7 +106,7 @@ pub(super) fn check_lagged_damping<T: Real>(
 ) -> Result<()> {
     let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
     let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
-    if lags && grows() && damping(system) == Damping::Present {
+    if lags && grows() && system.damping_force().is_some() {
         return Err(Error::Incompatible {
             part: integrator.name(),
             reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
@@ -116,12 +114,6 @@ pub(super) fn check_lagged_damping<T: Real>(
         });
     }
     Ok(())
-}
-
-/// Whether a system has damping.
-pub(super) fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
-    let still = vec![T::zero(); system.dofs()];
-    system.damping_force(&still, &still, &mut still.clone())
 }
 
 /// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not

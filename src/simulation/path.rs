@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::real::Real;
-use crate::system::{Damping, Path, PathForce, System};
+use crate::system::{Path, System};
 
 /// How the force of a path was formed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,9 +46,9 @@ impl<T: Real> PathWork<T> {
         v: &[T],
         out: &mut [T],
     ) -> Result<()> {
-        if system.force_along(t, Path { from, to, mean }, v, out)? == PathForce::Present {
+        if let Some(own) = system.path_force() {
             self.form = PathForm::Own;
-            return Ok(());
+            return own.force_along(t, Path { from, to, mean }, v, out);
         }
         let Self { start, form, load, scratch } = self;
         system.force(t, mean, v, out)?;
@@ -59,8 +59,9 @@ impl<T: Real> PathWork<T> {
         *form = PathForm::Simpson;
         let work = |force: &[T]| (0..to.len()).map(|i| force[i] * (to[i] - from[i])).sum::<T>();
         // The external part, loads and damping, is the same in all three.
-        system.external_load(t, load);
-        if system.damping_force(mean, v, scratch) == Damping::Present {
+        system.external_load(t, load)?;
+        if let Some(damping) = system.damping_force() {
+            damping.evaluate(mean, v, scratch)?;
             T::axpy(-T::one(), scratch, load);
         }
         let other = work(load);

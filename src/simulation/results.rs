@@ -29,6 +29,7 @@ pub struct Statistics {
 
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// The time was reached.
     Reached,
@@ -38,6 +39,7 @@ pub enum Outcome {
 
 /// Energy of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Energy<T> {
     /// ½ vᵀ M v.
     pub kinetic: T,
@@ -66,6 +68,7 @@ impl<T: Real> Energy<T> {
 /// works of forces of the model; the remainder is the energy that the scheme itself adds (positive) or dissipates
 /// (negative).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Works<T> {
     /// Work of the external load.
     pub load: T,

@@ -7,7 +7,7 @@ use crate::mass::InverseMass;
 use crate::real::Real;
 use crate::sparse::{self, Symmetry};
 use crate::state::Motion;
-use crate::system::{Damping, Linearity, System, TangentWeights};
+use crate::system::{Linearity, System, TangentWeights};
 use crate::tableau::Tableau;
 use faer::sparse::SparseColMatRef;
 use faer::{Mat, Side};
@@ -98,9 +98,9 @@ pub(super) fn check_step<T: Real>(
         // The highest mode is taken to have the strongest damping of all modes: exact for Rayleigh damping, on the safe
         // side otherwise.
         let still = vec![T::zero(); system.dofs()];
-        let damping = lanczos.highest(system, 0.0, |system, x, y| {
-            system.damping_force(&still, x, y);
-            Ok(())
+        let damping = lanczos.highest(system, 0.0, |system, x, y| match system.damping_force() {
+            Some(damping) => damping.evaluate(&still, x, y),
+            None => Ok(()),
         })?;
         let xi = 0.5 * damping.at_least / highest.at_least.sqrt();
         critical = analysis::critical_omega(tableau, xi).map_or(critical, |damped| damped.min(critical));
@@ -119,9 +119,7 @@ pub(super) fn check_step<T: Real>(
 
 /// Whether the system is damped, and the scheme takes damping forces from before the stage.
 fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
-    let still = vec![T::zero(); system.dofs()];
-    tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0)
-        && system.damping_force(&still, &still, &mut still.clone()) == Damping::Present
+    tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0) && system.damping_force().is_some()
 }
 
 /// Bounds of the highest eigenvalue ω².

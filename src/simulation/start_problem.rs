@@ -107,7 +107,7 @@ impl<T: Real> StartProblem<T> {
         let mut y = vec![T::zero(); constraints.len()];
         let prescribed = system.prescribed().to_vec();
         let mut supports = vec![[T::zero(); 3]; prescribed.len()];
-        system.prescribed_motion(t, &mut supports);
+        system.prescribed_motion(t, &mut supports)?;
         finite_supports(t, &prescribed, &supports)?;
         // y = (y without contact) + factor S λ.
         let (factor, open) = match contact {

@@ -51,7 +51,7 @@ pub(super) fn put_supports<T: Real>(
     if prescribed.is_empty() {
         return Ok(());
     }
-    system.prescribed_motion(t, supports);
+    system.prescribed_motion(t, supports)?;
     finite_supports(t, prescribed, supports)?;
     for (&dof, support) in prescribed.iter().zip(supports.iter()) {
         (motion.u[dof], motion.v[dof]) = (support[0], support[1]);
@@ -69,7 +69,7 @@ pub(super) fn put_initial_supports<T: Real>(
 ) -> Result<Vec<[T; 3]>> {
     let prescribed = system.prescribed().to_vec();
     let mut supports = vec![[T::zero(); 3]; prescribed.len()];
-    system.prescribed_motion(t, &mut supports);
+    system.prescribed_motion(t, &mut supports)?;
     finite_supports(t, &prescribed, &supports)?;
     for (&dof, support) in prescribed.iter().zip(&supports) {
         put(&mut u[dof], support[0], "displacement", dof)?;

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::mass::{self, Mass};
 use crate::real::Real;
 use crate::sparse::Combination;
-use crate::system::{Damping, Linearity, Path, System, TangentWeights};
+use crate::system::{Linearity, Path, System, TangentWeights};
 
 /// Where a tangent is taken.
 #[derive(Clone, Copy, Debug)]
@@ -56,11 +56,7 @@ pub(super) fn check_sources<T: Real>(
 /// The pattern of an effective matrix, of those of K, C and M that enter it, and no larger.
 pub(super) fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Tangent, Combination)> {
     let dofs = system.dofs();
-    let damped = weights[1] != 0.0 && {
-        let mut force = vec![T::zero(); dofs];
-        let still = vec![T::zero(); dofs];
-        system.damping_force(&still, &still, &mut force) == Damping::Present
-    };
+    let damped = weights[1] != 0.0 && system.damping_force().is_some();
     let tangent = match weights[0] != 0.0 || damped {
         true => Tangent::Present,
         false => Tangent::Absent,

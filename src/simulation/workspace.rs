@@ -5,7 +5,6 @@ use super::contact_step::ContactWork;
 use super::interface::InterfaceWork;
 use super::massless::MasslessBlock;
 use super::newton::NewtonWork;
-use super::pairing::damping;
 use super::program::Program;
 use super::rate_check::RateCheck;
 use super::stage_vectors::StageVectors;
@@ -13,7 +12,7 @@ use super::supports::Supports;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
-use crate::system::{Damping, System};
+use crate::system::System;
 
 /// Memory of a step.
 pub(super) struct Workspace<T: Real> {
@@ -56,10 +55,7 @@ impl<T: Real> Workspace<T> {
         slots: usize,
     ) -> Self {
         let dofs = system.dofs();
-        let damped = match damping(system) {
-            Damping::Present if !correctors.is_empty() => dofs,
-            _ => 0,
-        };
+        let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
         let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
         let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());

@@ -1,14 +1,14 @@
 //! Linear systems: constant M, C and K, a load of time, fixed and driven degrees of freedom.
 
-use super::{Damping, Linearity, System, TangentWeights};
+use super::{DampingForce, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
 use crate::sparse::{self, Combination, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 
-type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
-type Motion<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
+type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) -> Result<()> + Send + 'a>;
+type Motion<'a, T> = Box<dyn FnMut(f64) -> Result<[T; 3]> + Send + 'a>;
 
 /// `M a + C v + K u = F(t) + Gᵀ λ` with constant M, C and K (both triangles stored), M symmetric.
 ///
@@ -186,7 +186,35 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces a load
     /// given before.
     #[must_use]
-    pub fn load(mut self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
+    pub fn load(self, mut load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
+        self.try_load(move |t, out| {
+            load(t, out);
+            Ok(())
+        })
+    }
+
+    /// The external load F(t) of a closure that may fail, as [`load`](Self::load) otherwise. Its error
+    /// ([`Error::Host`], or [`Error::Inadmissible`] if a smaller step may help) undoes the step.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Error, LinearSystem, Newmark, Simulation};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// let recorded = [0.0, 1.0, 4.0]; // the load at t = 0, 1, 2
+    /// let system = LinearSystem::lumped(vec![1.0], k)?.try_load(move |t, force| {
+    ///     let known = recorded.get(t.round() as usize);
+    ///     force[0] = *known.ok_or(Error::Host { callback: "load", source: "nothing recorded".into() })?;
+    ///     Ok(())
+    /// });
+    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1.0).build()?;
+    /// run.run_until(2.0, &mut ())?;
+    /// assert!(matches!(run.step(), Err(Error::Host { callback: "load", .. })));
+    /// assert_eq!(run.time(), 2.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn try_load(mut self, load: impl FnMut(f64, &mut [T]) -> Result<()> + Send + 'a) -> Self {
         self.load = Some(Box::new(load));
         self
     }
@@ -206,7 +234,17 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// # Errors
     ///
     /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
-    pub fn drive(self, dof: usize, motion: impl FnMut(f64) -> [T; 3] + Send + 'a) -> Result<Self> {
+    pub fn drive(self, dof: usize, mut motion: impl FnMut(f64) -> [T; 3] + Send + 'a) -> Result<Self> {
+        self.try_drive(dof, move |t| Ok(motion(t)))
+    }
+
+    /// Drives a dof by a closure that may fail, as [`drive`](Self::drive) otherwise. Its error ([`Error::Host`], or
+    /// [`Error::Inadmissible`] if a smaller step may help) undoes the step.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    pub fn try_drive(self, dof: usize, motion: impl FnMut(f64) -> Result<[T; 3]> + Send + 'a) -> Result<Self> {
         self.prescribe(dof, Some(Box::new(motion)))
     }
 
@@ -282,7 +320,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             (load, symmetry) => {
                 out.fill(T::zero());
                 if let Some(load) = load {
-                    load(t, out);
+                    load(t, out)?;
                 }
                 symmetry.product(minus, self.stiffness.as_ref(), moved, out);
             }
@@ -316,20 +354,11 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         Ok(())
     }
 
-    fn damping_force(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Damping {
-        match &self.damping {
-            StoredDamping::None => return Damping::None,
-            StoredDamping::General(c, symmetry) => {
-                out.fill(T::zero());
-                symmetry.product(T::one(), c.as_ref(), v, out);
-            }
-            StoredDamping::Rayleigh { mass, stiffness } => {
-                out.fill(T::zero());
-                self.symmetry.product(*stiffness, self.stiffness.as_ref(), v, out);
-                self.mass.view().add_product(*mass, v, out);
-            }
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+        match self.damping {
+            StoredDamping::None => None,
+            StoredDamping::General(..) | StoredDamping::Rayleigh { .. } => Some(self),
         }
-        Damping::Present
     }
 
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
@@ -344,20 +373,34 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
         Some(T::of(0.5) * (0..u.len()).map(energy).sum::<T>())
     }
 
-    fn external_load(&mut self, t: f64, out: &mut [T]) {
+    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
         out.fill(T::zero());
-        if let Some(load) = &mut self.load {
-            load(t, out);
-        }
+        self.load.as_mut().map_or(Ok(()), |load| load(t, out))
     }
 
     fn prescribed(&self) -> &[usize] {
         &self.prescribed
     }
 
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
         for (motion, out) in self.motions.iter_mut().zip(out) {
-            *out = motion.as_mut().map_or([T::zero(); 3], |motion| motion(t));
+            *out = motion.as_mut().map_or(Ok([T::zero(); 3]), |motion| motion(t))?;
         }
+        Ok(())
+    }
+}
+
+impl<T: Real> DampingForce<T> for LinearSystem<'_, T> {
+    fn evaluate(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+        out.fill(T::zero());
+        match &self.damping {
+            StoredDamping::None => {}
+            StoredDamping::General(c, symmetry) => symmetry.product(T::one(), c.as_ref(), v, out),
+            StoredDamping::Rayleigh { mass, stiffness } => {
+                self.symmetry.product(*stiffness, self.stiffness.as_ref(), v, out);
+                self.mass.view().add_product(*mass, v, out);
+            }
+        }
+        Ok(())
     }
 }

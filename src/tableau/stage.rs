@@ -52,6 +52,7 @@ pub enum StageForce {
 
 /// One stage of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Stage {
     /// Rows of the new state.
     pub recovery: Rows,

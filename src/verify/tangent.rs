@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::system::{self, Damping, System, TangentWeights};
+use crate::system::{self, System, TangentWeights};
 
 /// How far the parts of a system are from the derivatives of its force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,10 +150,12 @@ pub fn tangent<T: Real>(
     let (damping, _) = compare(T::zero(), T::one(), &damping)?;
 
     let mut out = vec![T::nan(); u.len()];
-    let damps = system.damping_force(u, v, &mut out);
+    match system.damping_force() {
+        Some(damping) => damping.evaluate(u, v, &mut out)?,
+        None => out.fill(T::zero()),
+    }
     let mut damping_force = Worst::default();
-    for (dof, (&still, &moving)) in still.iter().zip(&moving).enumerate() {
-        let given = if damps == Damping::Present { out[dof] } else { T::zero() };
+    for (dof, ((&still, &moving), &given)) in still.iter().zip(&moving).zip(&out).enumerate() {
         damping_force.compare((dof, 0), given, still - moving);
     }
 
@@ -162,7 +164,7 @@ pub fn tangent<T: Real>(
         let varied = Varied { name: "the step of displacements", at: u, step };
         let gradient = varied.gradient(|u| system.potential_energy(u).unwrap_or_else(T::nan))?;
         out.fill(T::nan());
-        system.external_load(t, &mut out);
+        system.external_load(t, &mut out)?;
         // At rest both forces are rounding: what a step changes is the least scale.
         let mut worst = Worst { scale: largest * step, found: None };
         for (dof, gradient) in gradient.into_iter().enumerate() {

@@ -40,7 +40,8 @@ fn check<T: Real>(side: usize, exact: f64) {
     }
     let offset = offset(&w, &multipliers, &gaps);
     let tolerance = vec![T::zero(); n];
-    let problem = |version| ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version };
+    let problem =
+        |version| ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version };
     let mut solver = ActiveSet::default();
     let mut cold = vec![T::zero(); n];
     solver.solve(&problem(3), &mut cold).unwrap();
@@ -71,11 +72,9 @@ fn four_hundred_supports_of_a_rigid_table() {
     let side = 20;
     let n = side * side;
     let place = |i: usize| [1.0, (i % side) as f64 - 9.5, (i / side) as f64 - 9.5];
-    let w: Vec<f64> =
-        (0..n * n).map(|e| place(e / n).iter().zip(place(e % n)).map(|(a, b)| a * b).sum()).collect();
+    let w: Vec<f64> = (0..n * n).map(|e| place(e / n).iter().zip(place(e % n)).map(|(a, b)| a * b).sum()).collect();
     let (offset, bounds, tolerance) = (vec![-1.0; n], vec![Bound::NonNegative; n], vec![1e-14; n]);
-    let problem =
-        ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
+    let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
     let mut lambda = vec![0.0; n];
     ActiveSet::default().solve(&problem, &mut lambda).unwrap();
     for axis in 0..3 {

@@ -920,11 +920,23 @@ impl System<f64> for Pendulum {
     fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
         self.truss.tangent(t, u, v, w, out)
     }
-    fn force_along(&mut self, t: f64, path: Path<'_, f64>, v: &[f64], out: &mut [f64]) -> Result<PathForce> {
+    fn path_force(&mut self) -> Option<&mut dyn PathForce<f64>> {
         match self.along {
-            Along::Generic => Ok(PathForce::None),
-            Along::Symmetric | Along::Exact => self.truss.force_along(t, path, v, out),
+            Along::Generic => None,
+            Along::Symmetric | Along::Exact => Some(self),
         }
+    }
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        self.truss.potential_energy(u)
+    }
+    fn prescribed(&self) -> &[usize] {
+        self.truss.prescribed()
+    }
+}
+
+impl PathForce<f64> for Pendulum {
+    fn force_along(&mut self, t: f64, path: Path<'_, f64>, v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.truss.force_along(t, path, v, out)
     }
     fn tangent_along(
         &mut self,
@@ -934,7 +946,6 @@ impl System<f64> for Pendulum {
         w: TangentWeights<f64>,
         out: &mut [f64],
     ) -> Result<()> {
-        assert_ne!(self.along, Along::Generic, "not asked for without a force of the path");
         self.truss.tangent_along(t, path, v, w, out)?;
         if self.along == Along::Exact {
             // EA/L³ x̄ x(to)ᵀ in place of EA/L³ x̄ x̄ᵀ; the support is the first node, the mass the second.
@@ -952,12 +963,6 @@ impl System<f64> for Pendulum {
             }
         }
         Ok(())
-    }
-    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
-        self.truss.potential_energy(u)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.truss.prescribed()
     }
 }
 

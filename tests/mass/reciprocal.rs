@@ -234,7 +234,7 @@ fn bars_with_reciprocal_masses_collide() {
                 let dof = body.contact.0;
                 [body.u[dof] + h * product(body.c.as_ref(), &body.p)[dof]]
             });
-            let sides = [0, 1].map(|s| Side { free: &free[s], flexibility: &flexibility[s..=s] });
+            let sides = [0, 1].map(|s| Side::new(&free[s], &flexibility[s..=s]));
             let force = frame.solve(sides, &[bars.gap]).unwrap().forces()[0];
             for Explicit { p, contact: (dof, sign), .. } in &mut bodies {
                 p[*dof] += h * *sign * force;

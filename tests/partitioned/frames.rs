@@ -127,7 +127,7 @@ impl Host {
         let Self { bodies, frames: [frame, rates], gaps, force, pressed } = self;
         bodies.iter_mut().for_each(Body::advance);
         let free = [0, 1].map(|s| bodies[s].at_interface(&bodies[s].u));
-        let sides = [0, 1].map(|s| Side { free: &free[s], flexibility: &bodies[s].flexibility });
+        let sides = [0, 1].map(|s| Side::new(&free[s], &bodies[s].flexibility));
         let interface = frame.solve(sides, gaps).unwrap().clone();
         // Both sides are where the frame says.
         for body in &mut *bodies {
@@ -152,7 +152,7 @@ impl Host {
         };
         let v = rate(bodies, |body| &body.v);
         let held = engaged(interface.closed(), &v);
-        let sides = [0, 1].map(|s| Side { free: &v[s], flexibility: &bodies[s].inertia });
+        let sides = [0, 1].map(|s| Side::new(&v[s], &bodies[s].inertia));
         let impulses = rates.hold(sides, &still, &held).unwrap().forces().to_vec();
         for body in &mut *bodies {
             let jump = body.jump(&impulses);
@@ -160,7 +160,7 @@ impl Host {
         }
         let a = rate(bodies, |body| &body.a);
         let held = engaged(&held, &a);
-        let sides = [0, 1].map(|s| Side { free: &a[s], flexibility: &bodies[s].inertia });
+        let sides = [0, 1].map(|s| Side::new(&a[s], &bodies[s].inertia));
         let forces = rates.hold(sides, &still, &held).unwrap().forces().to_vec();
         for body in &mut *bodies {
             let jump = body.jump(&forces);
@@ -242,7 +242,7 @@ fn check(interface: &Interface<f64>, sides: [Side<'_, f64>; 2], gaps: &[f64], si
     let (n, l) = (gaps.len(), interface.forces());
     for i in 0..n {
         let d = [(0, -1.0), (1, 1.0)].map(|(side, sign)| {
-            let Side { free, flexibility } = sides[side];
+            let Side { free, flexibility, .. } = sides[side];
             free[i] + sign * (0..n).map(|j| flexibility[i + j * n] * l[j]).sum::<f64>()
         });
         let (x, tiny) = (interface.positions()[i], 1e-12);
@@ -276,7 +276,7 @@ fn frames_meet_the_equations_of_localized_multipliers() {
         });
         let free = [0, 1].map(|_| (0..n).map(|_| random() - 0.5).collect::<Vec<_>>());
         let gaps: Vec<f64> = (0..n).map(|_| random() - 0.3).collect();
-        let sides = [0, 1].map(|s| Side { free: &free[s], flexibility: &f[s] });
+        let sides = [0, 1].map(|s| Side::new(&free[s], &f[s]));
         let found = frame.solve(sides, &gaps).unwrap().clone();
         check(&found, sides, &gaps, true);
         pressed += found.closed().iter().filter(|closed| **closed).count();
@@ -291,9 +291,9 @@ fn frames_meet_the_equations_of_localized_multipliers() {
         let (length, force) = (1e4, 1e-7);
         let scaled = |x: &[f64], by: f64| x.iter().map(|x| x * by).collect::<Vec<_>>();
         let units = [0, 1].map(|s| (scaled(&free[s], length), scaled(&f[s], length / force)));
-        let sides = [0, 1].map(|s| Side { free: &units[s].0, flexibility: &units[s].1 });
+        let sides = [0, 1].map(|s| Side::new(&units[s].0, &units[s].1));
         let other = frame.solve(sides, &scaled(&gaps, length)).unwrap();
-        let expected = reference.solve([0, 1].map(|s| Side { free: &free[s], flexibility: &f[s] }), &gaps).unwrap();
+        let expected = reference.solve([0, 1].map(|s| Side::new(&free[s], &f[s])), &gaps).unwrap();
         assert_eq!(other.closed(), expected.closed());
         for (x, y) in other.forces().iter().zip(expected.forces()) {
             assert!((x / force - y).abs() < 1e-8 * (1.0 + y));
@@ -307,9 +307,11 @@ fn bodies_in_a_row_alternate() {
     // Masses 1, 2, 4 in a row: the outer ones are the first side, with the normal of the second contact toward the
     // middle.
     let (mass, v) = ([1.0, 2.0, 4.0], [3.0, 0.0, -1.0]);
-    let first = Side { free: &[v[0], -v[2]], flexibility: &[1.0 / mass[0], 0.0, 0.0, 1.0 / mass[2]] };
+    let (free, flexibility) = ([v[0], -v[2]], [1.0 / mass[0], 0.0, 0.0, 1.0 / mass[2]]);
+    let first = Side::new(&free, &flexibility);
     // Seen along the second normal the middle mass moves the other way.
-    let second = Side { free: &[v[1], -v[1]], flexibility: &[0.5, -0.5, -0.5, 0.5] };
+    let middle = [v[1], -v[1]];
+    let second = Side::new(&middle, &[0.5, -0.5, -0.5, 0.5]);
     let mut frame = Frame::<f64>::new(2).unwrap();
     let found = frame.hold([first, second], &[0.0; 2], &[true; 2]).unwrap();
     let common = mass.iter().zip(v).map(|(m, v)| m * v).sum::<f64>() / 7.0;
@@ -321,22 +323,22 @@ fn bodies_in_a_row_alternate() {
 #[test]
 fn frames_refuse_what_is_no_interface() {
     let mut frame = Frame::<f64>::new(2).unwrap();
-    let good = Side { free: &[0.0, 0.0], flexibility: &[2.0, 1.0, 1.0, 2.0] };
+    let good = Side::new(&[0.0, 0.0], &[2.0, 1.0, 1.0, 2.0]);
     let mut refused = |side: Side<'_, f64>, gaps: &[f64]| frame.solve([good, side], gaps).map(|_| ()).unwrap_err();
-    let short = Side { free: &[0.0], ..good };
+    let short = Side::new(&[0.0], good.flexibility);
     assert!(matches!(refused(short, &[0.0; 2]), Error::Dimension { expected: 2, found: 1, .. }));
-    let short = Side { flexibility: &[1.0], ..good };
+    let short = Side::new(good.free, &[1.0]);
     assert!(matches!(refused(short, &[0.0; 2]), Error::Dimension { expected: 4, found: 1, .. }));
     assert!(matches!(refused(good, &[0.0; 3]), Error::Dimension { expected: 2, found: 3, .. }));
     assert!(matches!(refused(good, &[0.0, f64::NAN]), Error::NotFinite { index: 1, .. }));
-    let open = Side { free: &[f64::INFINITY, 0.0], ..good };
+    let open = Side::new(&[f64::INFINITY, 0.0], good.flexibility);
     assert!(matches!(refused(open, &[0.0; 2]), Error::NotFinite { index: 0, .. }));
-    let one_sided = Side { flexibility: &[2.0, 1.0, -1.0, 2.0], ..good };
+    let one_sided = Side::new(good.free, &[2.0, 1.0, -1.0, 2.0]);
     assert!(matches!(refused(one_sided, &[0.0; 2]), Error::Asymmetric { matrix: "flexibility", .. }));
-    let wrong_sign = Side { flexibility: &[2.0, 0.0, 0.0, -1.0], ..good };
+    let wrong_sign = Side::new(good.free, &[2.0, 0.0, 0.0, -1.0]);
     assert!(matches!(refused(wrong_sign, &[0.0; 2]), Error::Singular { dof: 1, .. }));
     // Between rigid sides nothing gives way.
-    let rigid = Side { free: &[0.0, 0.0], flexibility: &[0.0; 4] };
+    let rigid = Side::new(&[0.0, 0.0], &[0.0; 4]);
     let found = frame.solve([rigid; 2], &[0.1, -0.1]).map(|_| ()).unwrap_err();
     let failure = |failure: &ContactFailure<f64>| matches!(failure, ContactFailure::NotConverged { row: 1, .. });
     assert!(matches!(&found, Error::Frame { failure: found } if failure(found)), "{found:?}");

@@ -6,7 +6,7 @@ use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, Symboli
 use contact_dynamics::observer::EnergyRecorder;
 use contact_dynamics::tableau::{A, ContactLevel, Row, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
-    Bathe, CdLagrange, CentralDifference, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha,
+    Bathe, CdLagrange, CentralDifference, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha,
     Gssss, LinearRows, LinearSystem, Linearity, Mass, MoreauJean, Newmark, Park, PersistencyCorrection, Real, Result,
     Simulation, SimulationBuilder, System, TangentWeights, TimeIntegrator,
 };
@@ -129,26 +129,37 @@ impl System<f64> for Faulty {
         out[1] += self.fault.of(Part::Tangent);
         Ok(())
     }
-    fn damping_force(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Damping {
-        let damping = self.inner.damping_force(u, v, out);
-        out[2] += self.fault.of(Part::Damping);
-        damping
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
+        match self.inner.damping_force().is_some() {
+            true => Some(self),
+            false => None,
+        }
     }
     fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
         self.inner.potential_energy(u)
     }
-    fn external_load(&mut self, t: f64, out: &mut [f64]) {
-        self.inner.external_load(t, out);
+    fn external_load(&mut self, t: f64, out: &mut [f64]) -> Result<()> {
+        self.inner.external_load(t, out)?;
         out[1] += self.fault.of(Part::Load);
+        Ok(())
     }
     fn prescribed(&self) -> &[usize] {
         self.inner.prescribed()
     }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) {
-        self.inner.prescribed_motion(t, out);
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
+        self.inner.prescribed_motion(t, out)?;
         for (k, x) in out[0].iter_mut().enumerate() {
             *x += self.fault.of(Part::Support(k));
         }
+        Ok(())
+    }
+}
+
+impl DampingForce<f64> for Faulty {
+    fn evaluate(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.inner.evaluate(u, v, out)?;
+        out[2] += self.fault.of(Part::Damping);
+        Ok(())
     }
 }
 

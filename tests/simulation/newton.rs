@@ -5,9 +5,9 @@ use contact_dynamics::contact::{ContactLaw, GapFunction, Side, Sphere};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
-    Bathe, Composite, Corrector, Damping, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem, Linearity,
-    Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp, StepControl,
-    System, TangentWeights, TimeIntegrator,
+    Bathe, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem,
+    Linearity, Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp,
+    StepControl, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::hosts::Bare;
 use contact_dynamics_scenes::schemes::{Listed, all};
@@ -36,20 +36,20 @@ impl<T: Real, S: System<T>> System<T> for Unknowing<S> {
     fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
         self.0.tangent(t, u, v, weights, out)
     }
-    fn damping_force(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Damping {
-        self.0.damping_force(u, v, out)
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+        self.0.damping_force()
     }
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         self.0.potential_energy(u)
     }
-    fn external_load(&mut self, t: f64, out: &mut [T]) {
-        self.0.external_load(t, out);
+    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
+        self.0.external_load(t, out)
     }
     fn prescribed(&self) -> &[usize] {
         self.0.prescribed()
     }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) {
-        self.0.prescribed_motion(t, out);
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
+        self.0.prescribed_motion(t, out)
     }
 }
 
@@ -113,19 +113,26 @@ impl System<f64> for Pendulum {
         }
         Ok(())
     }
-    fn damping_force(&mut self, _: &[f64], v: &[f64], out: &mut [f64]) -> Damping {
-        if self.drag == 0.0 {
-            return Damping::None;
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
+        match self.drag == 0.0 {
+            true => None,
+            false => Some(self),
         }
-        let speed = v[0] * v[0] + v[1] * v[1];
-        out.copy_from_slice(&[self.drag * speed * v[0], self.drag * speed * v[1]]);
-        Damping::Present
     }
-    fn external_load(&mut self, t: f64, out: &mut [f64]) {
+    fn external_load(&mut self, t: f64, out: &mut [f64]) -> Result<()> {
         out.copy_from_slice(&self.load.map(|load| load * t));
+        Ok(())
     }
     fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
         Some(0.5 * self.axial * self.length * self.strain(self.place(u)).powi(2))
+    }
+}
+
+impl DampingForce<f64> for Pendulum {
+    fn evaluate(&mut self, _: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        let speed = v[0] * v[0] + v[1] * v[1];
+        out.copy_from_slice(&[self.drag * speed * v[0], self.drag * speed * v[1]]);
+        Ok(())
     }
 }
 
@@ -643,8 +650,9 @@ fn a_failed_step_leaves_the_rows_of_the_state() {
         fn prescribed(&self) -> &[usize] {
             &[1]
         }
-        fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) {
+        fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
             out[0] = [t, 1.0, 0.0];
+            Ok(())
         }
     }
     let counter = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(usize::MAX));

@@ -6,7 +6,7 @@ use contact_dynamics::corrector::Correction;
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::observer::{ContactRecorder, DofRecorder};
 use contact_dynamics::{
-    ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, Damping, Error, Factorization,
+    ActiveSet, Automatic, Cholesky, Composite, ContactSolver, Control, Corrector, DampingForce, Error, Factorization,
     LinearSolver, Linearity, Mass, Newmark, Observer, Outcome, PersistencyCorrection, Real, Result, Simulation,
     StepView, System, TangentWeights, TimeIntegrator,
 };
@@ -57,9 +57,8 @@ impl<T: Real> System<T> for Oscillator<T> {
         out[0] = weights.stiffness * self.stiffness + weights.damping * self.damping;
         Ok(())
     }
-    fn damping_force(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Damping {
-        out[0] = self.damping * v[0];
-        Damping::Present
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+        Some(self)
     }
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         Some(T::of(0.5) * self.stiffness * u[0] * u[0])
@@ -69,6 +68,13 @@ impl<T: Real> System<T> for Oscillator<T> {
         if self.commits == 1000 {
             return Err(Error::Host { callback: "commit", source: "full".into() });
         }
+        Ok(())
+    }
+}
+
+impl<T: Real> DampingForce<T> for Oscillator<T> {
+    fn evaluate(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+        out[0] = self.damping * v[0];
         Ok(())
     }
 }
@@ -306,7 +312,7 @@ fn observers_pair_up_and_may_stop_the_run() {
         }
     };
     let record = |step: &StepView<'_, f64>| {
-        recorder.observe(step);
+        recorder.observe(step)?;
         forces.observe(step)
     };
     let outcome = run.run_until(1.0, &mut ((record, ()), stop)).unwrap();

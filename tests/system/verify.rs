@@ -2,7 +2,7 @@
 
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::verify::{self, TangentError};
-use contact_dynamics::{Damping, Error, Linearity, Mass, Real, Result, System, TangentWeights};
+use contact_dynamics::{DampingForce, Error, Linearity, Mass, Real, Result, System, TangentWeights};
 
 const NODES: usize = 4;
 const STIFFNESS: [f64; NODES - 1] = [3.0, 5.0, 2.0];
@@ -113,17 +113,11 @@ impl<T: Real> System<T> for Chain<T> {
         }
         Ok(())
     }
-    fn damping_force(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Damping {
-        if self.mistake == Mistake::DampingForce {
-            return Damping::None;
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
+        match self.mistake {
+            Mistake::DampingForce => None,
+            _ => Some(self),
         }
-        out.fill(T::zero());
-        for i in 0..NODES - 1 {
-            let ((_, s), (_, rate)) = (Self::stretch(i, u), Self::stretch(i, v));
-            out[i] -= (T::one() + s * s) * rate;
-            out[i + 1] += (T::one() + s * s) * rate;
-        }
-        Damping::Present
     }
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let energy = |i: usize| {
@@ -133,11 +127,24 @@ impl<T: Real> System<T> for Chain<T> {
         };
         Some((0..NODES - 1).map(energy).sum())
     }
-    fn external_load(&mut self, t: f64, out: &mut [T]) {
+    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
         out.fill(if self.mistake == Mistake::Load { T::zero() } else { T::of(t) });
+        Ok(())
     }
     fn prescribed(&self) -> &[usize] {
         &[0]
+    }
+}
+
+impl<T: Real> DampingForce<T> for Chain<T> {
+    fn evaluate(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
+        out.fill(T::zero());
+        for i in 0..NODES - 1 {
+            let ((_, s), (_, rate)) = (Self::stretch(i, u), Self::stretch(i, v));
+            out[i] -= (T::one() + s * s) * rate;
+            out[i + 1] += (T::one() + s * s) * rate;
+        }
+        Ok(())
     }
 }
 

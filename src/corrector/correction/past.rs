@@ -1,7 +1,7 @@
 //! Edits of the past: its projection onto contacts that have just closed, and velocities given to it with those of the
 //! state.
 
-use super::{Buffers, Correction, rounding};
+use super::{Buffers, Correction};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -78,36 +78,16 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Gives back along a row the energy that corrections have taken since it closed, unless it is below the rounding
-    /// of the velocities: the bodies leave each other faster, and the past that later rows read gets the same velocity.
-    pub(in crate::corrector) fn give_back(&mut self, row: usize) -> Result<()> {
-        let (s, rate) = (self.compliance(row), self.rate(row)?);
-        let taken = self.contacts.dissipated[row];
-        // The gap rate is a small difference of larger numbers; this is their rounding.
-        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
-        if !(s > T::zero() && T::of(2.0) * s * taken > noise * noise) {
-            return Ok(());
-        }
-        // Without cancellation: ½ S j² + j rate = taken.
-        let root = (rate * rate + T::of(2.0) * s * taken).sqrt();
-        let impulse = match rate > T::zero() {
-            true => T::of(2.0) * taken / (root + rate),
-            false => (root - rate) / s,
-        };
-        self.apply(&[row], &[impulse])?;
-        self.move_past(row, impulse)
-    }
-
-    /// Applies an impulse along a row to the velocities, and to the past as if they had always been so.
-    pub(in crate::corrector) fn part(&mut self, row: usize, impulse: T) -> Result<()> {
-        self.apply_impulses(&[row], &[impulse])?;
-        self.move_past(row, impulse)
-    }
-
     /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
     /// rows read them. Otherwise a scheme that takes velocities from differences of displacements would see a part of
-    /// Δv only, or more than all of it.
-    fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
+    /// Δv only, or more than all of it. The impulse itself is applied by [`apply_impulses`](Self::apply_impulses) or
+    /// [`exchange_energy`](Self::exchange_energy), which come first.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Incompatible`](crate::Error::Incompatible) if later rows read the past, and the corrector's
+    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
+    pub fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
         // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
         let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));

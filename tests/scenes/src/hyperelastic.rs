@@ -289,44 +289,11 @@ impl<const D: usize> System<f64> for Hyperelastic<D> {
         Ok(())
     }
 
-    fn force_along(&mut self, _: f64, path: Path<'_, f64>, _: &[f64], out: &mut [f64]) -> Result<PathForce> {
-        if self.law != Law::StVenantKirchhoff {
-            return Ok(PathForce::None);
+    fn path_force(&mut self) -> Option<&mut dyn PathForce<f64>> {
+        match self.law == Law::StVenantKirchhoff {
+            true => Some(self),
+            false => None,
         }
-        out.copy_from_slice(&self.particles.load);
-        for (index, element, points) in self.elements() {
-            for point in points {
-                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
-                Self::admitted("force_along", index, &ends[1].gradient)?;
-                let [f, s] = self.along(ends);
-                Self::subtract(point, element, &tensor(|i, j| dot(&f[i], &s[j])), out);
-            }
-        }
-        Ok(PathForce::Present)
-    }
-
-    fn tangent_along(
-        &mut self,
-        t: f64,
-        path: Path<'_, f64>,
-        v: &[f64],
-        weights: TangentWeights<f64>,
-        out: &mut [f64],
-    ) -> Result<()> {
-        if self.law != Law::StVenantKirchhoff {
-            return self.tangent(t, path.mean, v, weights, out);
-        }
-        out.fill(0.0);
-        // The exact derivative has F(to) on one side of the material part; F̄ on both makes it symmetric.
-        for (index, element, points) in self.elements() {
-            for point in points {
-                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
-                Self::admitted("tangent_along", index, &ends[1].gradient)?;
-                let [f, s] = self.along(ends);
-                self.add_stiffness(index, point, &f, &s, weights.stiffness, out);
-            }
-        }
-        Ok(())
     }
 
     /// NaN if an element of a Neo-Hookean body is turned inside out.
@@ -338,12 +305,50 @@ impl<const D: usize> System<f64> for Hyperelastic<D> {
         Some(self.elements().map(element).sum())
     }
 
-    fn external_load(&mut self, _: f64, out: &mut [f64]) {
+    fn external_load(&mut self, _: f64, out: &mut [f64]) -> Result<()> {
         out.copy_from_slice(&self.particles.load);
+        Ok(())
     }
 
     fn prescribed(&self) -> &[usize] {
         &self.particles.fixed
+    }
+}
+
+/// Of St. Venant–Kirchhoff bodies.
+impl<const D: usize> PathForce<f64> for Hyperelastic<D> {
+    fn force_along(&mut self, _: f64, path: Path<'_, f64>, _: &[f64], out: &mut [f64]) -> Result<()> {
+        out.copy_from_slice(&self.particles.load);
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
+                Self::admitted("force_along", index, &ends[1].gradient)?;
+                let [f, s] = self.along(ends);
+                Self::subtract(point, element, &tensor(|i, j| dot(&f[i], &s[j])), out);
+            }
+        }
+        Ok(())
+    }
+
+    fn tangent_along(
+        &mut self,
+        _: f64,
+        path: Path<'_, f64>,
+        _: &[f64],
+        weights: TangentWeights<f64>,
+        out: &mut [f64],
+    ) -> Result<()> {
+        out.fill(0.0);
+        // The exact derivative has F(to) on one side of the material part; F̄ on both makes it symmetric.
+        for (index, element, points) in self.elements() {
+            for point in points {
+                let ends = [path.from, path.to].map(|u| point.deformation(element, u));
+                Self::admitted("tangent_along", index, &ends[1].gradient)?;
+                let [f, s] = self.along(ends);
+                self.add_stiffness(index, point, &f, &s, weights.stiffness, out);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -485,7 +490,7 @@ mod tests {
             let mut body = Hyperelastic::new(&plate(), law);
             let u = body.particles.displaced(|[x, y]| [x, -0.5 * y]);
             let (v, mut out) = (vec![0.0; u.len()], vec![0.0; body.pattern().row_idx().len()]);
-            let weights = TangentWeights { stiffness: 1.0, damping: 0.0 };
+            let weights = TangentWeights::new(1.0, 0.0);
             let tangent = body.tangent(0.0, &u, &v, weights, &mut out);
             assert!(matches!(tangent, Err(Error::Inadmissible { callback: "tangent", .. })));
             let error = body.force(0.0, &u, &v, &mut out[..u.len()]).unwrap_err();

@@ -210,7 +210,7 @@ impl<const D: usize> Assembly<D> {
 pub(crate) mod tests {
     use super::*;
     use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
-    use contact_dynamics::{Path, PathForce, System, TangentWeights};
+    use contact_dynamics::{Path, System, TangentWeights};
 
     /// Displacements or velocities without any symmetry, of size `size`.
     pub(crate) fn scattered(count: usize, size: f64, phase: f64) -> Vec<f64> {
@@ -238,7 +238,7 @@ pub(crate) mod tests {
 
     pub(crate) fn stiffness_at(system: &mut dyn System<f64>, u: &[f64]) -> Vec<f64> {
         let mut out = vec![f64::NAN; system.pattern().row_idx().len()];
-        let weights = TangentWeights { stiffness: 1.0, damping: 0.0 };
+        let weights = TangentWeights::new(1.0, 0.0);
         system.tangent(0.0, u, &vec![0.0; u.len()], weights, &mut out).unwrap();
         out
     }
@@ -249,9 +249,9 @@ pub(crate) mod tests {
 
     fn force_along(system: &mut dyn System<f64>, from: &[f64], to: &[f64]) -> Vec<f64> {
         let mut out = vec![f64::NAN; from.len()];
-        let path = Path { from, to, mean: &middle(from, to) };
-        let present = system.force_along(0.0, path, &vec![0.0; from.len()], &mut out).unwrap();
-        assert_eq!(present, PathForce::Present);
+        let mean = middle(from, to);
+        let own = system.path_force().unwrap();
+        own.force_along(0.0, Path::new(from, to, &mean), &vec![0.0; from.len()], &mut out).unwrap();
         out
     }
 
@@ -262,9 +262,10 @@ pub(crate) mod tests {
         let mut neglected = |length: f64| {
             let to: Vec<f64> = from.iter().zip(direction).map(|(u, d)| u + length * d).collect();
             let mut values = vec![f64::NAN; system.pattern().row_idx().len()];
-            let weights = TangentWeights { stiffness: 1.0, damping: 0.0 };
-            let path = Path { from, to: &to, mean: &middle(from, &to) };
-            system.tangent_along(0.0, path, &vec![0.0; n], weights, &mut values).unwrap();
+            let weights = TangentWeights::new(1.0, 0.0);
+            let mean = middle(from, &to);
+            let path = Path::new(from, &to, &mean);
+            system.path_force().unwrap().tangent_along(0.0, path, &vec![0.0; n], weights, &mut values).unwrap();
             assert!(asymmetry(system.pattern(), &values) <= 1e-15 * largest(&values));
             let (mut worst, step) = (0.0_f64, 1e-5);
             for column in 0..n {

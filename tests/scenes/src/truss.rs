@@ -237,13 +237,33 @@ impl<const D: usize> System<f64> for Truss<D> {
         Ok(())
     }
 
-    fn force_along(&mut self, _: f64, path: Path<'_, f64>, _: &[f64], out: &mut [f64]) -> Result<PathForce> {
+    fn path_force(&mut self) -> Option<&mut dyn PathForce<f64>> {
+        Some(self)
+    }
+
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        let energy = |bar: &Bar<D>| 0.5 * bar.axial * bar.length * bar.strain(&bar.extension(u)).powi(2);
+        Some(self.bars.iter().map(energy).sum())
+    }
+
+    fn external_load(&mut self, _: f64, out: &mut [f64]) -> Result<()> {
+        out.copy_from_slice(&self.particles.load);
+        Ok(())
+    }
+
+    fn prescribed(&self) -> &[usize] {
+        &self.particles.fixed
+    }
+}
+
+impl<const D: usize> PathForce<f64> for Truss<D> {
+    fn force_along(&mut self, _: f64, path: Path<'_, f64>, _: &[f64], out: &mut [f64]) -> Result<()> {
         out.copy_from_slice(&self.particles.load);
         for bar in &self.bars {
             let (strain, x) = bar.along(path);
             bar.subtract(strain, &x, out);
         }
-        Ok(PathForce::Present)
+        Ok(())
     }
 
     fn tangent_along(
@@ -258,19 +278,6 @@ impl<const D: usize> System<f64> for Truss<D> {
         // a bar that turns without a change of length: x̄ is then normal to x(to) − x̄.
         self.add_stiffness(weights.stiffness, out, |bar| bar.along(path));
         Ok(())
-    }
-
-    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
-        let energy = |bar: &Bar<D>| 0.5 * bar.axial * bar.length * bar.strain(&bar.extension(u)).powi(2);
-        Some(self.bars.iter().map(energy).sum())
-    }
-
-    fn external_load(&mut self, _: f64, out: &mut [f64]) {
-        out.copy_from_slice(&self.particles.load);
-    }
-
-    fn prescribed(&self) -> &[usize] {
-        &self.particles.fixed
     }
 }
 
