@@ -6,6 +6,8 @@ use crate::real::Real;
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default))]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
@@ -29,6 +31,7 @@ pub struct Statistics {
 
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
     /// The time was reached.
     Reached,
@@ -38,6 +41,7 @@ pub enum Outcome {
 
 /// Energy of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Energy<T> {
     /// ½ vᵀ M v.
     pub kinetic: T,
@@ -66,6 +70,7 @@ impl<T: Real> Energy<T> {
 /// works of forces of the model; the remainder is the energy that the scheme itself adds (positive) or dissipates
 /// (negative).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Works<T> {
     /// Work of the external load.
     pub load: T,

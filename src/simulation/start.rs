@@ -36,6 +36,7 @@ pub(super) struct Start<'s, T: Real> {
 /// Gaps within the rounding of the numbers that they are computed from count as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum InitialOverclosure {
     /// [`Error::InitialViolation`], which names the depth.
     #[default]
