@@ -94,9 +94,6 @@ impl System<f64> for Reluctant {
         self.inner.mass()
     }
     fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        if (self.window[0]..self.window[1]).contains(&t) && t - self.last > self.limit * (1.0 + 1e-6) {
-            return Err(Error::Inadmissible { callback: "force", source: "an element is turned inside out".into() });
-        }
         self.inner.force(t, u, v, out)
     }
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
@@ -106,6 +103,9 @@ impl System<f64> for Reluctant {
         self.inner.tangent(t, u, v, weights, out)
     }
     fn commit(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<()> {
+        if (self.window[0]..self.window[1]).contains(&t) && t - self.last > self.limit * (1.0 + 1e-6) {
+            return Err(Error::Inadmissible { callback: "commit", source: "an element is turned inside out".into() });
+        }
         self.last = t;
         Ok(())
     }
@@ -209,14 +209,40 @@ fn controlled_runs_of_every_scheme_go_on_bit_for_bit() {
         for step in 0..150 {
             run.step().unwrap();
             smallest = smallest.min(run.step_size());
-            if step % 7 == 0 || run.step_size() != run.checkpoint().history().step_size() {
+            if step % 7 == 0 || run.step_size() < H && step % 2 == 0 {
                 let t = run.time();
                 let mut branch = builder(t).resume_from(run.checkpoint()).build().unwrap();
                 let resumed = |checkpoint| builder(t).resume_from(checkpoint).build().unwrap();
                 go_on(&mut branch, resumed, 20, &format!("{} at {t}", scheme.name()));
             }
         }
-        assert!(smallest <= H / 8.0 && run.step_size() == H, "{}: {smallest}", scheme.name());
+        assert!(smallest == H / 8.0 && run.step_size() == H, "{}: {smallest}", scheme.name());
+    }
+}
+
+#[test]
+fn a_refused_step_leaves_no_trace_in_a_file() {
+    for scheme in schemes() {
+        let builder = |limit: f64| {
+            let bars = Bars::paper(10).delayed(0.4, H);
+            let system = Reluctant { inner: bars.system(), last: 0.0, window: [0.1495, 0.1505], limit };
+            Simulation::builder(system, (scheme.make)(), H).velocity(bars.velocities()).constraint(bars.contact())
+        };
+        let (mut run, mut other) = (builder(0.5 * H).build().unwrap(), builder(H).build().unwrap());
+        for run in [&mut run, &mut other] {
+            for _ in 0..149 {
+                run.step().unwrap();
+            }
+        }
+        let before = save(&run);
+        run.step().unwrap_err();
+        assert_eq!(save(&run), before, "{}", scheme.name());
+        // The step that is taken instead knows nothing of it either.
+        for run in [&mut run, &mut other] {
+            run.set_step_size(0.5 * H).unwrap();
+            run.step().unwrap();
+        }
+        assert_eq!(save(&run), save(&other), "{}", scheme.name());
     }
 }
 
@@ -391,7 +417,7 @@ fn documents_with_one_wrong_value_are_refused_or_run() {
             }
         }
     }
-    assert!(refused > 10 * taken / 4 && taken > 100, "{refused} {taken}");
+    assert!(refused > taken && taken > 100, "{refused} {taken}");
 }
 
 #[test]
@@ -522,7 +548,7 @@ fn a_file_can_be_read_without_a_run() {
     let [checkpoint, _] = read::<f64>(&save(&run));
     assert_eq!(checkpoint.state(), run.state());
     assert_eq!(checkpoint.scheme(), alpha().name());
-    assert_eq!(checkpoint.history().step_size(), run.step_size());
+    assert_eq!(checkpoint.history().step_size().to_bits(), run.step_size().to_bits());
     assert_eq!(checkpoint.history().past(1), run.history().past(1));
     let contacts: &ContactState<f64> = checkpoint.state().contacts();
     assert_eq!(contacts.ids().len(), 2);

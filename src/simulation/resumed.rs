@@ -54,7 +54,7 @@ impl<T: Real> Resumed<T> {
             Some(rows) => fitted(&state, history, scheme, rows)?,
             None => history,
         };
-        history.check(dofs, scheme.depth + scheme.tableau.stages.len(), massless)?;
+        history.check(dofs, scheme.slots(), massless)?;
         check_vector("the resumed displacement", &state.motion.u, dofs)?;
         check_vector("the resumed velocity", &state.motion.v, dofs)?;
         check_vector("the resumed acceleration", &state.motion.a, dofs)?;
@@ -93,7 +93,7 @@ fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_
     if scheme.tableau.fingerprint() != rows {
         return refuse("the rows of its scheme were others, though their name was that of the scheme of this run");
     }
-    let slots = scheme.depth + scheme.tableau.stages.len();
+    let slots = scheme.slots();
     let trail = history.trail.room();
     let shifted = scheme.shifts.map(|shift| shift != 0.0);
     // Values at the time of the state are there where, and only where, the stored ones live elsewhere.

@@ -143,7 +143,7 @@ impl<'r, T: Real> Record<'r, T> {
             scheme: (&history.scheme).into(),
             rows: *rows,
             state: StateRecord { motion, shown: both(shown), contacts: ContactsRecord::of(contacts) },
-            history: HistoryRecord::of(history),
+            history: HistoryRecord::of(history, is_shifted(state)),
         }
     }
 
@@ -155,8 +155,9 @@ impl<'r, T: Real> Record<'r, T> {
         let [v, a] = shown;
         let shown = [optional("a velocity shown", v, dofs)?, optional("an acceleration shown", a, dofs)?];
         let contacts = contacts.checked()?;
-        let history = history.checked(scheme.into_owned(), dofs)?;
-        Ok(Checkpoint { state: State { motion, shown, contacts }, history, rows })
+        let state = State { motion, shown, contacts };
+        let history = history.checked(scheme.into_owned(), dofs, is_shifted(&state))?;
+        Ok(Checkpoint { state, history, rows })
     }
 }
 
@@ -213,15 +214,21 @@ impl<'r, T: Real> ContactsRecord<'r, T> {
     }
 }
 
+/// Whether the scheme stores v or a of another time than that of the state.
+fn is_shifted<T: Real>(state: &State<T>) -> bool {
+    state.shown.iter().any(|shown| !shown.is_empty())
+}
+
 /// Number of past states that steps and changes of the step size read, when so many are known and smooth. (One-step
 /// schemes read none; where they store v or a of another time, a first change of the step size reads one.)
-fn read(known: usize, smooth: usize) -> usize {
-    known.max(smooth.min(2)).saturating_sub(1)
+fn read(known: usize, smooth: usize, shifted: bool) -> usize {
+    let needed = if shifted { smooth.min(2) } else { 1 };
+    known.max(needed).saturating_sub(1)
 }
 
 impl<'r, T: Real> HistoryRecord<'r, T> {
-    fn of(history: &'r History<T>) -> Self {
-        let past = history.slots.iter().skip(1).take(read(history.known, history.smooth));
+    fn of(history: &'r History<T>, shifted: bool) -> Self {
+        let past = history.slots.iter().skip(1).take(read(history.known, history.smooth, shifted));
         Self {
             past: past.map(MotionRecord::of).collect(),
             known: history.known,
@@ -237,12 +244,12 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
         }
     }
 
-    fn checked(self, scheme: String, dofs: usize) -> Result<History<T>> {
+    fn checked(self, scheme: String, dofs: usize, shifted: bool) -> Result<History<T>> {
         let Self { past, known, smooth, clock, pace, made_with, trail_room, trail, unmoved, slopes, overclosures } =
             self;
         count("the number of known states of a checkpoint", known as u64, 1..=MAX_PAST as u64)?;
         count("the number of smooth states of a checkpoint", smooth as u64, 1..=COUNT)?;
-        length("the past of a checkpoint", past.len(), read(known, smooth))?;
+        length("the past of a checkpoint", past.len(), read(known, smooth, shifted))?;
         clock.check_read()?;
         pace.check_read(clock.h)?;
         let size = |h| number("a step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite());
