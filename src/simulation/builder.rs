@@ -300,7 +300,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit.
-    /// Initial values and start time given elsewhere are ignored.
+    /// Initial values and start time given elsewhere are ignored. (What was saved to a file goes through
+    /// `resume_from`, with the feature `serde`.)
     #[must_use]
     pub fn resume(mut self, state: State<T>, history: History<T>) -> Self {
         self.resumed = Some(Resumed::new(state, history));

@@ -10,8 +10,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// the feature `serde`.
 ///
 /// Made by [`Simulation::checkpoint`](crate::Simulation::checkpoint), taken by
-/// [`SimulationBuilder::resume_from`](crate::SimulationBuilder::resume_from): the run goes on bit for bit, if the format
-/// keeps the bits of numbers. Binary ones do; `serde_json` does with its feature `float_roundtrip`.
+/// [`SimulationBuilder::resume_from`](crate::SimulationBuilder::resume_from): the run goes on bit for bit, if the
+/// format keeps the bits of numbers. Binary ones do; `serde_json` does with its feature `float_roundtrip`.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -40,11 +40,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 ///
 /// # What is in it, and what is not
 ///
-/// A file names its format (1), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of schemes
-/// apart. The format changes when what is stored changes, and files of another one are refused; results, and with them
-/// the bits of a run, may change between versions of the crate without that. Stored are the vectors of the state and of
-/// the past that is read, the contacts, the clock, the place of a controlled step size in the nominal grid, and the
-/// depths of overlaps at the start.
+/// A file names its format (1), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of
+/// schemes apart. The format changes when what is stored changes, and files of another one are refused; results, and
+/// with them the bits of a run, may change between versions of the crate without that. Stored are the vectors of the
+/// state and of the past that is read, the contacts, the clock, the place of a controlled step size in the nominal grid,
+/// and the depths of overlaps at the start.
 ///
 /// Not in it are system, constraints, correctors and settings: the host builds these again as they were. A history of
 /// the host's own (plastic strains, as [`System::commit`](crate::System::commit) moves them) is the host's to save.
