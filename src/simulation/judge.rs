@@ -1,7 +1,5 @@
 //! Settings of the step-size control, and the judgement of a step: fine enough, or too coarse.
 
-#[cfg(feature = "serde")]
-use super::settings::ControlRecord;
 use crate::analysis::LocalError;
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -45,8 +43,6 @@ use crate::state::{Motion, State};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "ControlRecord", try_from = "ControlRecord"))]
 pub struct StepControl {
     pub(super) smallest: f64,
     pub(super) tolerance: Option<f64>,

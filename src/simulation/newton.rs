@@ -1,14 +1,11 @@
 //! Settings of Newton's method, what it reports of its iterations, and its memory.
 
 use super::path::PathWork;
-#[cfg(feature = "serde")]
-use super::settings::NewtonRecord;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// When the effective matrix is formed and factorized anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum TangentUpdate {
     Iteration,
     Stage,
@@ -38,8 +35,6 @@ pub(super) enum TangentUpdate {
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "NewtonRecord", try_from = "NewtonRecord"))]
 pub struct Newton {
     pub(super) tangent: TangentUpdate,
     pub(super) line_search: bool,

@@ -2,60 +2,75 @@
 
 use super::judge::StepControl;
 use super::newton::{Newton, TangentUpdate};
-use crate::error::{Error, Result};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// [`StepControl`] in a file.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ControlRecord {
+#[serde(rename = "StepControl")]
+struct ControlRecord {
     smallest: f64,
     local_error: Option<f64>,
     contact_changes: Option<usize>,
 }
 
-impl From<StepControl> for ControlRecord {
-    fn from(control: StepControl) -> Self {
-        let StepControl { smallest, tolerance, changes } = control;
-        Self { smallest, local_error: tolerance, contact_changes: changes }
+impl Serialize for StepControl {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { smallest, tolerance, changes } = *self;
+        ControlRecord { smallest, local_error: tolerance, contact_changes: changes }.serialize(serializer)
     }
 }
 
-impl TryFrom<ControlRecord> for StepControl {
-    type Error = Error;
-
-    fn try_from(record: ControlRecord) -> Result<Self> {
-        let control = Self::halving(record.smallest)?;
-        let control = record.local_error.map_or(Ok(control), |tolerance| control.local_error(tolerance))?;
-        record.contact_changes.map_or(Ok(control), |limit| control.contact_changes(limit))
+impl<'de> Deserialize<'de> for StepControl {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let ControlRecord { smallest, local_error, contact_changes } = ControlRecord::deserialize(deserializer)?;
+        let control = Self::halving(smallest).map_err(D::Error::custom)?;
+        let control = local_error.map_or(Ok(control), |tolerance| control.local_error(tolerance));
+        let control = control.map_err(D::Error::custom)?;
+        contact_changes.map_or(Ok(control), |limit| control.contact_changes(limit)).map_err(D::Error::custom)
     }
 }
 
 /// [`Newton`] in a file.
 #[derive(Serialize, Deserialize)]
-pub(super) struct NewtonRecord {
-    tangent: TangentUpdate,
+#[serde(rename = "Newton")]
+struct NewtonRecord {
+    tangent: TangentRecord,
     line_search: bool,
+    /// In force and displacement.
     tolerances: [f64; 2],
     iterations: usize,
 }
 
-impl From<Newton> for NewtonRecord {
-    fn from(newton: Newton) -> Self {
-        let Newton { tangent, line_search, force, displacement, iterations } = newton;
-        Self { tangent, line_search, tolerances: [force, displacement], iterations }
+/// Which of the methods begins the settings.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum TangentRecord {
+    Full,
+    Modified,
+}
+
+impl Serialize for Newton {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { tangent, line_search, force, displacement, iterations } = *self;
+        let tangent = match tangent {
+            TangentUpdate::Iteration => TangentRecord::Full,
+            TangentUpdate::Stage => TangentRecord::Modified,
+        };
+        NewtonRecord { tangent, line_search, tolerances: [force, displacement], iterations }.serialize(serializer)
     }
 }
 
-impl TryFrom<NewtonRecord> for Newton {
-    type Error = Error;
-
-    fn try_from(record: NewtonRecord) -> Result<Self> {
-        let NewtonRecord { tangent, line_search, tolerances: [force, displacement], iterations } = record;
+impl<'de> Deserialize<'de> for Newton {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let NewtonRecord { tangent, line_search, tolerances: [force, displacement], iterations } =
+            NewtonRecord::deserialize(deserializer)?;
         let newton = match tangent {
-            TangentUpdate::Iteration => Self::full(),
-            TangentUpdate::Stage => Self::modified(),
+            TangentRecord::Full => Self::full(),
+            TangentRecord::Modified => Self::modified(),
         };
         let newton = if line_search { newton.line_search() } else { newton };
-        newton.tolerances(force, displacement)?.iterations(iterations)
+        let newton = newton.tolerances(force, displacement).map_err(D::Error::custom)?;
+        newton.iterations(iterations).map_err(D::Error::custom)
     }
 }

@@ -1,7 +1,8 @@
 //! A run at an instant as one value, to be written to a file and read again.
 
+use super::State;
+use super::history::History;
 use super::record::Record;
-use super::{History, State};
 use crate::real::Real;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -86,12 +87,13 @@ impl<T: Real> Checkpoint<T> {
 
 impl<T: Real> Serialize for Checkpoint<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Record::of(self).serialize(serializer)
+        Record::of(&self.state, &self.history, self.rows).serialize(serializer)
     }
 }
 
 impl<'de, T: Real> Deserialize<'de> for Checkpoint<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Record::deserialize(deserializer)?.checked().map_err(D::Error::custom)
+        let (state, history, rows) = Record::deserialize(deserializer)?.checked().map_err(D::Error::custom)?;
+        Ok(Self { state, history, rows })
     }
 }

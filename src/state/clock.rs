@@ -1,7 +1,7 @@
 //! Time, and where a step size that changes stands in the grid of its nominal one.
 
 #[cfg(feature = "serde")]
-use super::record::{COUNT, count, number};
+use super::read::{COUNT, count, number};
 use crate::error::{Error, Result};
 
 /// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin

@@ -1,10 +1,13 @@
 //! What a file of a checkpoint holds, in this order, and what is refused of it. Whatever changes here changes
 //! [`FORMAT`].
 
-use super::history::Trail;
-use super::{Checkpoint, Clock, ContactState, History, Motion, Pace, State};
+use super::clock::{Clock, Pace};
+use super::contacts::ContactState;
+use super::history::{History, Trail};
+use super::read::{COUNT, count, length, number, optional, vector};
+use super::{Motion, State};
 use crate::contact_id::ContactId;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::Overclosures;
 use crate::tableau::MAX_PAST;
@@ -17,9 +20,6 @@ const FORMAT: u32 = 1;
 
 /// How every file begins.
 const KIND: &str = "contact-dynamics checkpoint";
-
-/// Counts up to here are taken as those of a run; they are exact in `f64`, and far from overflow.
-pub(super) const COUNT: u64 = 1 << 53;
 
 /// A checkpoint as it is written, borrowed from one, or as it was read.
 #[derive(Serialize, Deserialize)]
@@ -133,22 +133,21 @@ impl<T: Real> TryFrom<String> for ScalarName<T> {
 }
 
 impl<'r, T: Real> Record<'r, T> {
-    pub(super) fn of(checkpoint: &'r Checkpoint<T>) -> Self {
-        let Checkpoint { state, history, rows } = checkpoint;
+    pub(super) fn of(state: &'r State<T>, history: &'r History<T>, rows: u32) -> Self {
         let State { motion, shown, contacts } = state;
         let motion = MotionRecord::of(motion);
         Self {
             format: Format,
             scalar: ScalarName(PhantomData),
             scheme: (&history.scheme).into(),
-            rows: *rows,
+            rows,
             state: StateRecord { motion, shown: both(shown), contacts: ContactsRecord::of(contacts) },
             history: HistoryRecord::of(history, is_shifted(state)),
         }
     }
 
-    /// The checkpoint, if a run may have left it.
-    pub(super) fn checked(self) -> Result<Checkpoint<T>> {
+    /// State, history and the fingerprint of the rows, if a run may have left them.
+    pub(super) fn checked(self) -> Result<(State<T>, History<T>, u32)> {
         let Self { format: _, scalar: _, scheme, rows, state: StateRecord { motion, shown, contacts }, history } = self;
         let dofs = motion.displacement.len();
         let motion = motion.checked(dofs)?;
@@ -157,7 +156,7 @@ impl<'r, T: Real> Record<'r, T> {
         let contacts = contacts.checked()?;
         let state = State { motion, shown, contacts };
         let history = history.checked(scheme.into_owned(), dofs, is_shifted(&state))?;
-        Ok(Checkpoint { state, history, rows })
+        Ok((state, history, rows))
     }
 }
 
@@ -291,39 +290,4 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
 
 fn both<T: Real>(fields: &[Vec<T>; 2]) -> [Cow<'_, [T]>; 2] {
     fields.each_ref().map(Into::into)
-}
-
-fn length(what: &'static str, found: usize, expected: usize) -> Result<()> {
-    match found == expected {
-        true => Ok(()),
-        false => Err(Error::Dimension { what, expected, found }),
-    }
-}
-
-/// The numbers of a vector, if they are finite and as many as expected.
-fn vector<T: Real>(what: &'static str, values: Cow<'_, [T]>, expected: usize) -> Result<Vec<T>> {
-    length(what, values.len(), expected)?;
-    match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
-        None => Ok(values.into_owned()),
-    }
-}
-
-/// The same of a vector that may be missing: it is empty then.
-fn optional<T: Real>(what: &'static str, values: Cow<'_, [T]>, expected: usize) -> Result<Vec<T>> {
-    let expected = if values.is_empty() { 0 } else { expected };
-    vector(what, values, expected)
-}
-
-/// Refuses a number that is not in range.
-pub(super) fn number(name: &'static str, value: f64, range: &'static str, is_fine: impl Fn(f64) -> bool) -> Result<()> {
-    match is_fine(value) {
-        true => Ok(()),
-        false => Err(Error::Parameter { name, value, range }),
-    }
-}
-
-/// Refuses a count that is not in range.
-pub(super) fn count(name: &'static str, value: u64, range: std::ops::RangeInclusive<u64>) -> Result<()> {
-    number(name, value as f64, "a count that a run may have", |_| range.contains(&value))
 }
