@@ -488,6 +488,29 @@ fn other_files_and_formats_are_refused_in_words() {
     assert!(refused.contains("closed flags") && refused.contains("size 1, expected 2"), "{refused}");
 }
 
+#[test]
+fn another_layout_is_another_format() {
+    let [files, _] = samples();
+    let document: Value = serde_json::from_str(&files.text).unwrap();
+    assert_eq!(document["format"], "contact-dynamics checkpoint 1");
+    // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
+    for (path, names) in [
+        ("", "format history rows scalar scheme state"),
+        ("/state", "contacts motion shown"),
+        ("/state/motion", "acceleration displacement time velocity"),
+        ("/state/contacts", "closed dissipated forces gaps ids impulses lambda_a lambda_v raw_forces"),
+        ("/history", "clock known made_with overclosures pace past slopes smooth trail trail_room unmoved"),
+        ("/history/clock", "elapsed h origin steps"),
+        ("/history/pace", "grown level nominal patience position steps"),
+        ("/history/overclosures", "depths over start"),
+    ] {
+        let fields = document.pointer(path).and_then(Value::as_object).unwrap();
+        let mut found: Vec<&str> = fields.keys().map(String::as_str).collect();
+        found.sort_unstable();
+        assert_eq!(found.join(" "), names, "{path}");
+    }
+}
+
 /// A scheme that calls itself by another's name.
 #[derive(Debug)]
 struct Disguised(GeneralizedAlpha, String);
