@@ -2,6 +2,7 @@
 
 /// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactId {
     /// Index of the constraint in the simulation.
     pub constraint: usize,

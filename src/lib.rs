@@ -51,6 +51,8 @@ pub use simulation::{
     Energy, InitialOverclosure, Iteration, Newton, Outcome, Simulation, SimulationBuilder, StartAdjustment, Statistics,
     StepControl, Works,
 };
+#[cfg(feature = "serde")]
+pub use state::Checkpoint;
 pub use state::{ContactState, History, State};
 pub use system::{DampingForce, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
 pub use tableau::StartUp;

@@ -3,6 +3,8 @@
 //! A host's debug build would compile generic loops without optimization. Functions instantiated here stay fast with
 //! `[profile.dev.package."*"] opt-level = 3`.
 
+mod stored;
+
 use crate::kernels::chain::{self, Chains};
 use crate::kernels::cholesky::{self, Columns, Factorization, Simplicial, Supernodal};
 use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
@@ -21,12 +23,13 @@ use num_traits::{Float, NumAssign};
 use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 use std::ops::Range;
+use stored::Stored;
 
 /// A real scalar, `f32` or `f64` (sealed).
 ///
 /// Time, step size and scheme coefficients are `f64` in every run; `Real` is the type of matrices and vectors.
 pub trait Real:
-    Kernels + Float + NumAssign + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
+    Kernels + Stored + Float + NumAssign + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
 {
     /// The scalar nearest to `x`.
     fn of(x: f64) -> Self;

@@ -3,6 +3,8 @@
 mod admitted;
 mod advance;
 mod builder;
+#[cfg(feature = "serde")]
+mod checkpoint;
 mod closing;
 mod constraints;
 mod contact_multipliers;
@@ -32,8 +34,11 @@ mod rate_check;
 mod resample;
 mod responses;
 pub(crate) mod results;
+mod resumed;
 mod run;
 mod scheme;
+#[cfg(feature = "serde")]
+mod settings;
 mod stability;
 mod stage;
 mod stage_vectors;

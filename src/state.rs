@@ -1,11 +1,19 @@
 //! The state of a run: its motion, as later steps and as users read it, and its contacts.
 
 mod backup;
+#[cfg(feature = "serde")]
+mod checkpoint;
 mod clock;
 mod contacts;
 mod history;
+#[cfg(feature = "serde")]
+mod read;
+#[cfg(feature = "serde")]
+mod record;
 
 pub(crate) use backup::Backup;
+#[cfg(feature = "serde")]
+pub use checkpoint::Checkpoint;
 pub(crate) use clock::{Clock, Pace, resolution};
 pub use contacts::ContactState;
 pub use history::History;

@@ -9,6 +9,8 @@
 //! Three recovery rows give u, h v, h² a of the new state; three balance rows give ū, h v̄, h² ā at which
 //! `M ā = f(t_n + load h, ū, v̄) + Gᵀ λ` holds. Coefficients are pure numbers; h never appears in them.
 
+#[cfg(feature = "serde")]
+mod fingerprint;
 mod momentum;
 mod row;
 mod stage;
@@ -25,6 +27,7 @@ use crate::error::{Error, Result};
 /// From free flight (no acceleration) the straight line is exact, and both forms use it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StartUp {
     /// The first steps are trapezoidal, until the past is known: no overshoot of stiff modes, one more factorization.
     #[default]

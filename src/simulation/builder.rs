@@ -7,12 +7,13 @@ use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
-    check_corrections, check_lagged_damping, check_massless, check_path, check_resumed, is_correctable, local_error,
+    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
 };
 use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::rate_check::RateCheck;
 use super::results::Statistics;
+use super::resumed::Resumed;
 use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
@@ -52,7 +53,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     start_up: StartUp,
     newton: Option<Newton>,
     control: Option<StepControl>,
-    resumed: Option<(State<T>, History<T>)>,
+    pub(super) resumed: Option<Resumed<T>>,
     balance: EnergyBalance,
     stability: Stability,
     overclosure: InitialOverclosure,
@@ -299,10 +300,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit.
-    /// Initial values and start time given elsewhere are ignored.
+    /// Initial values and start time given elsewhere are ignored. (What was saved to a file goes through
+    /// `resume_from`, with the feature `serde`.)
     #[must_use]
     pub fn resume(mut self, state: State<T>, history: History<T>) -> Self {
-        self.resumed = Some((state, history));
+        self.resumed = Some(Resumed::new(state, history));
         self
     }
 
@@ -316,7 +318,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         step_size::<T>(h)?;
         check_times(t, self.overclosure)?;
-        self.resumed.as_ref().map_or_else(|| Clock::new(t, h), |(_, history)| history.clock).check()?;
+        self.resumed.as_ref().map_or_else(|| Clock::new(t, h), Resumed::clock).check()?;
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
@@ -331,9 +333,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 
         let massless = mass::massless(system.mass(), system.prescribed());
         let follows = check_massless(&scheme, massless.first())?;
-        let begin = if let Some((state, history)) = &self.resumed {
-            let own = if self.control.is_some() { history.pace.nominal } else { history.clock.h };
-            check_resumed(state, history, &scheme, (own, h), [dofs, massless.len()])?;
+        let fits = |resumed: Resumed<T>| resumed.checked(&scheme, (self.control, h), [dofs, massless.len()]);
+        let resumed = self.resumed.map(fits).transpose()?;
+        let begin = if let Some((state, _)) = &resumed {
             (state.motion.t, &state.motion.u[..], &state.motion.v[..])
         } else {
             put_initial_supports(&mut *system, t, &mut u, &mut v)?;
@@ -348,7 +350,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
         let mut projection = start::projection(&*system, dofs, rows)?;
-        let begun = if let Some((state, history)) = self.resumed {
+        let begun = if let Some((state, history)) = resumed {
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
             if let Some(overclosures) = &history.overclosures {

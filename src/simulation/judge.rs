@@ -45,8 +45,8 @@ use crate::state::{Motion, State};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepControl {
     pub(super) smallest: f64,
-    tolerance: Option<f64>,
-    changes: Option<usize>,
+    pub(super) tolerance: Option<f64>,
+    pub(super) changes: Option<usize>,
 }
 
 impl StepControl {

@@ -38,8 +38,8 @@ pub(super) enum TangentUpdate {
 pub struct Newton {
     pub(super) tangent: TangentUpdate,
     pub(super) line_search: bool,
-    force: f64,
-    displacement: f64,
+    pub(super) force: f64,
+    pub(super) displacement: f64,
     pub(super) iterations: usize,
 }
 

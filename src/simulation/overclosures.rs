@@ -1,10 +1,13 @@
 //! Bodies that overlap when a run starts: the depths of the overlaps, and the share of them that is left later.
 
 use crate::contact::ContactId;
+#[cfg(feature = "serde")]
+use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// Depths of overlaps at the start of a run, which are added to the gaps from then on, or for a time.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Overclosures<T> {
     /// (constraint, feature) and the depth, ascending.
     depths: Vec<((usize, usize), T)>,
@@ -26,6 +29,27 @@ impl<T: Real> Overclosures<T> {
         }
         depths.sort_unstable_by_key(|(feature, _)| *feature);
         Self { depths, start, over }
+    }
+
+    /// Of a checkpoint that was read: refuses what no run leaves.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check_read(&self) -> Result<()> {
+        let Self { depths, start, over } = self;
+        let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
+        let above = |x: f64| x > 0.0 && x.is_finite();
+        if !start.is_finite() {
+            return refuse("the start of the overclosures of a checkpoint", *start, "finite");
+        }
+        if let Some(over) = over.filter(|&over| !above(over)) {
+            return refuse("the time over which overclosures are removed", over, "positive and finite");
+        }
+        if let Some((_, depth)) = depths.iter().find(|(_, depth)| !depth.is_finite()) {
+            return refuse("an overclosure of a checkpoint", depth.value(), "finite");
+        }
+        match depths.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
+            Some(pair) => refuse("a feature of the overclosures of a checkpoint", pair[1].0.1 as f64, "ascending"),
+            None => Ok(()),
+        }
     }
 
     /// Whether the depths are removed in time.

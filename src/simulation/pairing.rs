@@ -1,5 +1,5 @@
 //! Whether the parts of a run go together: the scheme with dofs without mass, with corrections, damping and
-//! paths, with an estimate of the local error, and with the past of a resumed run.
+//! paths, with an estimate of the local error.
 
 use super::constraints::Constraints;
 use super::scheme::Scheme;
@@ -9,8 +9,8 @@ use crate::corrector::Corrector;
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
-use crate::state::{History, Motion, State};
-use crate::system::{System, check_vector};
+use crate::state::Motion;
+use crate::system::System;
 use crate::tableau::{ContactLevel, Tableau};
 
 /// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
@@ -125,31 +125,4 @@ pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constrain
         && constraints.capacity() > 0
         && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
         && constraints.interface().iter().any(has_mass)
-}
-
-/// Refuses a state and history that another run could not have left.
-pub(super) fn check_resumed<T: Real>(
-    state: &State<T>,
-    history: &History<T>,
-    scheme: &Scheme<'_>,
-    (own, h): (f64, f64),
-    [dofs, massless]: [usize; 2],
-) -> Result<()> {
-    history.check(dofs, scheme.depth + scheme.tableau.stages.len(), massless)?;
-    check_vector("the resumed displacement", &state.motion.u, dofs)?;
-    check_vector("the resumed velocity", &state.motion.v, dofs)?;
-    check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-    if history.scheme != scheme.integrator.name() {
-        let part = format!("a history of {} in a run by {}", history.scheme, scheme.integrator.name());
-        return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
-    }
-    let (t, end) = (state.motion.t, history.clock.at(0.0));
-    if (t - end).abs() > 1e-6 * history.clock.h {
-        let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
-        return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
-    }
-    if own.to_bits() != h.to_bits() {
-        return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
-    }
-    Ok(())
 }

@@ -218,10 +218,15 @@ fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<No
     known.into_iter().map(node).collect()
 }
 
-/// Begins to keep the computed motions, enough of them for ratios of step sizes up to 3.
-fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
+/// Number of computed motions that are kept: enough of them for ratios of step sizes up to 3.
+pub(super) fn trail_length(scheme: &Scheme<'_>) -> usize {
     let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
-    let length = if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) };
+    if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) }
+}
+
+/// Begins to keep the computed motions.
+fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
+    let length = trail_length(scheme);
     if history.trail.is_empty() && length > 0 {
         // One-step schemes read no past, but the motion before the present one is still in its slot.
         let known = history.known.max(history.smooth.min(2));

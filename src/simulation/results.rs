@@ -6,6 +6,8 @@ use crate::real::Real;
 /// Work counts since the start of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default))]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
@@ -30,6 +32,7 @@ pub struct Statistics {
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
     /// The time was reached.
     Reached,
@@ -40,6 +43,7 @@ pub enum Outcome {
 /// Energy of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Energy<T> {
     /// ½ vᵀ M v.
     pub kinetic: T,
@@ -69,6 +73,7 @@ impl<T: Real> Energy<T> {
 /// (negative).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Works<T> {
     /// Work of the external load.
     pub load: T,

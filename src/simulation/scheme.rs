@@ -36,6 +36,14 @@ impl<'a> Scheme<'a> {
         Self { integrator, tableau, depth, shifts, start_up, starter, covectors }
     }
 
+    /// Number of motions in a history: the states that are read, and one for each stage to write. Where stored v and a
+    /// are those of another time, a change of the step size reads the state before the present one, though the steps of
+    /// a one-step scheme do not: a step that is undone must not have written there.
+    pub(super) fn slots(&self) -> usize {
+        let is_shifted = self.shifts.iter().any(|shift| shift.abs() > 0.0);
+        self.depth.max(if is_shifted { 2 } else { 1 }) + self.tableau.stages.len()
+    }
+
     /// How far ahead of the state a step imposes contact, in steps.
     pub(super) fn ahead(&self) -> f64 {
         self.tableau.stages.iter().map(|stage| stage.end + stage.contact.lead()).fold(1.0, f64::max)

@@ -36,6 +36,7 @@ pub(super) struct Start<'s, T: Real> {
 /// Gaps within the rounding of the numbers that they are computed from count as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum InitialOverclosure {
     /// [`Error::InitialViolation`], which names the depth.
     #[default]
@@ -91,7 +92,7 @@ impl<T: Real> Start<'_, T> {
         let (scheme, h, t) = (self.scheme, self.h, self.t);
         let Found { mut motion, contacts, adjustment } = self.motion(u, v, constraints, g, projection, violation)?;
         let depth = scheme.depth;
-        let mut slots = vec![Motion::zero(motion.u.len()); depth + scheme.tableau.stages.len()];
+        let mut slots = vec![Motion::zero(motion.u.len()); scheme.slots()];
         straight_past(&motion, h, &mut slots[1..depth]);
         let known = if is_free_flight(self.system, projection, &motion, &slots[1..depth], h)? {
             depth

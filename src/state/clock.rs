@@ -1,10 +1,13 @@
 //! Time, and where a step size that changes stands in the grid of its nominal one.
 
+#[cfg(feature = "serde")]
+use super::read::{COUNT, count, number};
 use crate::error::{Error, Result};
 
 /// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin
 /// does not round: runs are the same whenever they start.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Clock {
     /// Time at the start of the run.
     origin: f64,
@@ -55,6 +58,20 @@ impl Clock {
     }
 }
 
+/// Of a checkpoint that was read.
+#[cfg(feature = "serde")]
+impl Clock {
+    /// Refuses what no run leaves.
+    pub(super) fn check_read(&self) -> Result<()> {
+        let Self { origin, elapsed, steps, h } = *self;
+        number("the start time of a checkpoint", origin, "finite", f64::is_finite)?;
+        number("the time elapsed of a checkpoint", elapsed, "finite, not negative", |x| x >= 0.0 && x.is_finite())?;
+        number("the step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite())?;
+        count("the number of steps of a checkpoint", steps, 0..=COUNT)?;
+        number("the time of a checkpoint", self.at(0.0), "finite", f64::is_finite)
+    }
+}
+
 /// The distance between times near t that an `f64` can tell apart.
 pub(crate) fn resolution(t: f64) -> f64 {
     t.abs().next_up() - t.abs()
@@ -62,6 +79,7 @@ pub(crate) fn resolution(t: f64) -> f64 {
 
 /// Where the present step size stands in the nominal grid, for runs that control it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pace {
     /// The step size given, of which all others are halves, quarters and so on.
     pub(crate) nominal: f64,
@@ -84,19 +102,32 @@ impl Pace {
         Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0] }
     }
 
+    /// Of a checkpoint that was read: refuses what no run with a present step size of h leaves.
+    #[cfg(feature = "serde")]
+    pub(super) fn check_read(&self, h: f64) -> Result<()> {
+        let Self { nominal, level, position, steps: _, grown: _, patience } = *self;
+        let halved = |nominal: f64| (0..level).fold(nominal, |h, _| 0.5 * h);
+        let levels = u64::from(f64::MANTISSA_DIGITS) + u64::from(f64::MAX_EXP.unsigned_abs());
+        count("the halvings of a checkpoint", level.into(), 0..=levels)?;
+        let range = "that of the step, times a power of two";
+        number("the nominal step size of a checkpoint", nominal, range, |size| halved(size).to_bits() == h.to_bits())?;
+        count("the place in the nominal grid of a checkpoint", position, 0..=COUNT)?;
+        count("the patience of a checkpoint", patience.into(), PATIENCE[0].into()..=PATIENCE[1].into())
+    }
+
     /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer.
     pub(crate) fn halve(&mut self) {
         if self.grown && self.steps == 0 {
             self.patience = (2 * self.patience).min(PATIENCE[1]);
         }
-        (self.level, self.position) = (self.level + 1, 2 * self.position);
+        (self.level, self.position) = (self.level + 1, self.position.saturating_mul(2));
         (self.steps, self.grown) = (0, false);
     }
 
     /// After a good step: says whether the size may grow here.
     pub(crate) fn advance(&mut self) -> bool {
         self.position = if self.level > 0 { self.position + 1 } else { 0 };
-        self.steps += 1;
+        self.steps = self.steps.saturating_add(1);
         if self.grown {
             self.patience = PATIENCE[0];
         }

@@ -49,6 +49,20 @@ impl<T: Real> Trail<T> {
         trail
     }
 
+    /// Room for `length` states, of which these are known.
+    #[cfg(feature = "serde")]
+    pub(super) fn of(known: Vec<(Motion<T>, f64)>, length: usize, dofs: usize) -> Self {
+        let mut trail = Self { known: known.len(), states: known };
+        trail.states.resize_with(length, || (Motion::zero(dofs), 0.0));
+        trail
+    }
+
+    /// Number of states that there is room for.
+    #[cfg(feature = "serde")]
+    pub(crate) fn room(&self) -> usize {
+        self.states.len()
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.states.is_empty()
     }

@@ -1,0 +1,293 @@
+//! What a file of a checkpoint holds, in this order, and what is refused of it. Whatever changes here changes
+//! [`FORMAT`].
+
+use super::clock::{Clock, Pace};
+use super::contacts::ContactState;
+use super::history::{History, Trail};
+use super::read::{COUNT, count, length, number, optional, vector};
+use super::{Motion, State};
+use crate::contact_id::ContactId;
+use crate::error::Result;
+use crate::real::Real;
+use crate::simulation::Overclosures;
+use crate::tableau::MAX_PAST;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::marker::PhantomData;
+
+/// The format that is written, and the only one that is read.
+const FORMAT: u32 = 1;
+
+/// How every file begins.
+const KIND: &str = "contact-dynamics checkpoint";
+
+/// A checkpoint as it is written, borrowed from one, or as it was read.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "T: Real", expecting = "a checkpoint of contact-dynamics")]
+pub(super) struct Record<'r, T: Real> {
+    // These two come first: other files are refused by them, not by what they lack.
+    format: Format,
+    scalar: ScalarName<T>,
+    scheme: Cow<'r, str>,
+    rows: u32,
+    state: StateRecord<'r, T>,
+    history: HistoryRecord<'r, T>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
+struct MotionRecord<'r, T: Real> {
+    time: f64,
+    displacement: Cow<'r, [T]>,
+    velocity: Cow<'r, [T]>,
+    acceleration: Cow<'r, [T]>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
+struct StateRecord<'r, T: Real> {
+    motion: MotionRecord<'r, T>,
+    /// v and a at the time of the state, where the stored ones live elsewhere.
+    shown: [Cow<'r, [T]>; 2],
+    contacts: ContactsRecord<'r, T>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
+struct ContactsRecord<'r, T: Real> {
+    /// Constraint, feature, candidate.
+    ids: Vec<[usize; 3]>,
+    forces: Cow<'r, [T]>,
+    raw_forces: Cow<'r, [T]>,
+    closed: Cow<'r, [bool]>,
+    gaps: Cow<'r, [T]>,
+    impulses: Cow<'r, [T]>,
+    lambda_v: Cow<'r, [T]>,
+    lambda_a: Cow<'r, [T]>,
+    dissipated: Cow<'r, [T]>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
+struct HistoryRecord<'r, T: Real> {
+    /// Past states 1, 2, …, as far as they are read.
+    past: Vec<MotionRecord<'r, T>>,
+    known: usize,
+    smooth: usize,
+    clock: Clock,
+    pace: Pace,
+    made_with: f64,
+    /// Length of the trail, 0 if there is none, and the motions known of it, with the step sizes that made them.
+    trail_room: usize,
+    trail: Vec<(MotionRecord<'r, T>, f64)>,
+    unmoved: [Cow<'r, [T]>; 2],
+    slopes: Cow<'r, [T]>,
+    overclosures: Cow<'r, Option<Overclosures<T>>>,
+}
+
+/// Kind and format of the file.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+struct Format;
+
+impl From<Format> for String {
+    fn from(_: Format) -> Self {
+        format!("{KIND} {FORMAT}")
+    }
+}
+
+impl TryFrom<String> for Format {
+    type Error = String;
+
+    fn try_from(found: String) -> std::result::Result<Self, String> {
+        match found.strip_prefix(KIND).map(|number| number.trim_start().parse()) {
+            Some(Ok(FORMAT)) => Ok(Self),
+            Some(Ok::<u32, _>(other)) => {
+                Err(format!("a checkpoint of format {other}; this version of contact-dynamics reads format {FORMAT}"))
+            }
+            _ => Err("this is no checkpoint of contact-dynamics".into()),
+        }
+    }
+}
+
+/// Name of the scalar.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String", bound = "T: Real")]
+struct ScalarName<T>(PhantomData<T>);
+
+impl<T: Real> From<ScalarName<T>> for String {
+    fn from(_: ScalarName<T>) -> Self {
+        T::NAME.into()
+    }
+}
+
+impl<T: Real> TryFrom<String> for ScalarName<T> {
+    type Error = String;
+
+    fn try_from(found: String) -> std::result::Result<Self, String> {
+        match found == T::NAME {
+            true => Ok(Self(PhantomData)),
+            false => Err(format!("a checkpoint of a run in {found:?} cannot be continued in {}", T::NAME)),
+        }
+    }
+}
+
+impl<'r, T: Real> Record<'r, T> {
+    pub(super) fn of(state: &'r State<T>, history: &'r History<T>, rows: u32) -> Self {
+        let State { motion, shown, contacts } = state;
+        let motion = MotionRecord::of(motion);
+        Self {
+            format: Format,
+            scalar: ScalarName(PhantomData),
+            scheme: (&history.scheme).into(),
+            rows,
+            state: StateRecord { motion, shown: both(shown), contacts: ContactsRecord::of(contacts) },
+            history: HistoryRecord::of(history, is_shifted(state)),
+        }
+    }
+
+    /// State, history and the fingerprint of the rows, if a run may have left them.
+    pub(super) fn checked(self) -> Result<(State<T>, History<T>, u32)> {
+        let Self { format: _, scalar: _, scheme, rows, state: StateRecord { motion, shown, contacts }, history } = self;
+        let dofs = motion.displacement.len();
+        let motion = motion.checked(dofs)?;
+        let [v, a] = shown;
+        let shown = [optional("a velocity shown", v, dofs)?, optional("an acceleration shown", a, dofs)?];
+        let contacts = contacts.checked()?;
+        let state = State { motion, shown, contacts };
+        let history = history.checked(scheme.into_owned(), dofs, is_shifted(&state))?;
+        Ok((state, history, rows))
+    }
+}
+
+impl<'r, T: Real> MotionRecord<'r, T> {
+    fn of(motion: &'r Motion<T>) -> Self {
+        let Motion { t, u, v, a } = motion;
+        Self { time: *t, displacement: u.into(), velocity: v.into(), acceleration: a.into() }
+    }
+
+    fn checked(self, dofs: usize) -> Result<Motion<T>> {
+        let Self { time, displacement, velocity, acceleration } = self;
+        number("a time of a checkpoint", time, "finite", f64::is_finite)?;
+        Ok(Motion {
+            t: time,
+            u: vector("a displacement of a checkpoint", displacement, dofs)?,
+            v: vector("a velocity of a checkpoint", velocity, dofs)?,
+            a: vector("an acceleration of a checkpoint", acceleration, dofs)?,
+        })
+    }
+}
+
+impl<'r, T: Real> ContactsRecord<'r, T> {
+    fn of(contacts: &'r ContactState<T>) -> Self {
+        let ContactState { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated } = contacts;
+        Self {
+            ids: ids.iter().map(|id| [id.constraint, id.feature, id.candidate]).collect(),
+            forces: lambda.into(),
+            raw_forces: lambda_raw.into(),
+            closed: closed.into(),
+            gaps: gap.into(),
+            impulses: impulse.into(),
+            lambda_v: lambda_v.into(),
+            lambda_a: lambda_a.into(),
+            dissipated: dissipated.into(),
+        }
+    }
+
+    fn checked(self) -> Result<ContactState<T>> {
+        let n = self.ids.len();
+        let id = |[constraint, feature, candidate]: [usize; 3]| ContactId { constraint, feature, candidate };
+        let closed = self.closed.into_owned();
+        length("the closed flags of a checkpoint", closed.len(), n)?;
+        Ok(ContactState {
+            ids: self.ids.into_iter().map(id).collect(),
+            lambda: vector("the contact forces of a checkpoint", self.forces, n)?,
+            lambda_raw: vector("the raw multipliers of a checkpoint", self.raw_forces, n)?,
+            closed,
+            gap: vector("the gaps of a checkpoint", self.gaps, n)?,
+            impulse: vector("the impulses of a checkpoint", self.impulses, n)?,
+            lambda_v: vector("λ_v of a checkpoint", self.lambda_v, n)?,
+            lambda_a: vector("λ_a of a checkpoint", self.lambda_a, n)?,
+            dissipated: vector("the dissipated energies of a checkpoint", self.dissipated, n)?,
+        })
+    }
+}
+
+/// Whether the scheme stores v or a of another time than that of the state.
+fn is_shifted<T: Real>(state: &State<T>) -> bool {
+    state.shown.iter().any(|shown| !shown.is_empty())
+}
+
+/// Number of past states that steps and changes of the step size read, when so many are known and smooth. (One-step
+/// schemes read none; where they store v or a of another time, a first change of the step size reads one.)
+fn read(known: usize, smooth: usize, shifted: bool) -> usize {
+    let needed = if shifted { smooth.min(2) } else { 1 };
+    known.max(needed).saturating_sub(1)
+}
+
+impl<'r, T: Real> HistoryRecord<'r, T> {
+    fn of(history: &'r History<T>, shifted: bool) -> Self {
+        let past = history.slots.iter().skip(1).take(read(history.known, history.smooth, shifted));
+        Self {
+            past: past.map(MotionRecord::of).collect(),
+            known: history.known,
+            smooth: history.smooth,
+            clock: history.clock,
+            pace: history.pace,
+            made_with: history.made_with,
+            trail_room: history.trail.room(),
+            trail: history.trail.known().map(|(motion, h)| (MotionRecord::of(motion), h)).collect(),
+            unmoved: both(&history.unmoved),
+            slopes: (&history.slopes).into(),
+            overclosures: Cow::Borrowed(&history.overclosures),
+        }
+    }
+
+    fn checked(self, scheme: String, dofs: usize, shifted: bool) -> Result<History<T>> {
+        let Self { past, known, smooth, clock, pace, made_with, trail_room, trail, unmoved, slopes, overclosures } =
+            self;
+        count("the number of known states of a checkpoint", known as u64, 1..=MAX_PAST as u64)?;
+        count("the number of smooth states of a checkpoint", smooth as u64, 1..=COUNT)?;
+        length("the past of a checkpoint", past.len(), read(known, smooth, shifted))?;
+        clock.check_read()?;
+        pace.check_read(clock.h)?;
+        let size = |h| number("a step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite());
+        size(made_with)?;
+        // No scheme keeps more: see `keep_trail`.
+        count("the length of the trail of a checkpoint", trail_room as u64, 0..=3 * MAX_PAST as u64)?;
+        count("the known length of the trail of a checkpoint", trail.len() as u64, 0..=trail_room as u64)?;
+        let mut slots = vec![Motion::zero(dofs)];
+        for motion in past {
+            slots.push(motion.checked(dofs)?);
+        }
+        let mut computed = Vec::with_capacity(trail_room);
+        for (motion, h) in trail {
+            size(h)?;
+            computed.push((motion.checked(dofs)?, h));
+        }
+        let [v, a] = unmoved;
+        let unmoved = [optional("an unmoved velocity", v, dofs)?, optional("an unmoved acceleration", a, dofs)?];
+        let massless = slopes.len();
+        let overclosures = overclosures.into_owned();
+        if let Some(overclosures) = &overclosures {
+            overclosures.check_read()?;
+        }
+        Ok(History {
+            slots,
+            known,
+            smooth,
+            clock,
+            pace,
+            made_with,
+            trail: Trail::of(computed, trail_room, dofs),
+            unmoved,
+            slopes: vector("the slopes of a checkpoint", slopes, massless)?,
+            scheme,
+            overclosures,
+        })
+    }
+}
+
+fn both<T: Real>(fields: &[Vec<T>; 2]) -> [Cow<'_, [T]>; 2] {
+    fields.each_ref().map(Into::into)
+}
