@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod active_set;
+mod equations;
 mod failure;
 mod gauss_seidel;
 mod many_rows;

@@ -42,9 +42,11 @@ fn patch(plate: &Solid<3>, cells: [usize; 3], side: usize) -> Vec<usize> {
     let first = |axis: usize| (cells[axis] + 1 - side) / 2;
     let inside = |node: &usize| {
         let x = plate.nodes[*node];
-        x[2] == 0.0
-            && (0..2)
-                .all(|axis| (first(axis)..first(axis) + side).contains(&((x[axis] / width(axis)).round() as usize)))
+        let among = |axis: usize| {
+            let cell = x[axis] / width(axis) - first(axis) as f64;
+            (-0.5..side as f64 - 0.5).contains(&cell)
+        };
+        x[2] == 0.0 && (0..2).all(among)
     };
     (0..plate.nodes.len()).filter(inside).collect()
 }

@@ -1,9 +1,8 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
 use super::acceptance::{Acceptance, Settings};
-use super::many_rows::ManyRows;
+use super::equations::{Equations, Solved, Symmetry};
 use super::{Bound, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
-use crate::dense::DenseCholesky;
 use crate::real::Real;
 
 /// Primal–dual active set (semismooth Newton) on the dense Delassus operator, safeguarded by Murty's least-index rule.
@@ -28,14 +27,9 @@ use crate::real::Real;
 /// rows always go the way of proximal steps.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
-    factor: DenseCholesky<T>,
-    /// In place of a factor, on many rows.
-    many: ManyRows<T>,
+    equations: Equations<T>,
     /// Whether W is symmetric, and the version of which that is known.
     symmetry: (u64, Symmetry),
-    /// The version of W and the rows that `factor` or `many` belongs to, and which of the two.
-    factored: (u64, Vec<usize>),
-    method: Method,
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
@@ -50,26 +44,6 @@ pub struct ActiveSet<T = f64> {
     /// The last resort on rows that are nearly dependent.
     pivoting: Pivoting<T>,
 }
-
-/// Whether W is symmetric to rounding.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Symmetry {
-    #[default]
-    Symmetric,
-    General,
-}
-
-/// How the equations of the active rows are solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Method {
-    #[default]
-    Factor,
-    Iteration,
-}
-
-/// Active rows from which on the equations are solved by iteration, if they are independent of one another: a factor
-/// costs the cube of their number.
-const MANY: usize = 256;
 
 /// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is
 /// given.)
@@ -158,9 +132,7 @@ impl<T: Real> ActiveSet<T> {
         acceptance: &mut Acceptance<'_, T>,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { factor, many, symmetry, factored, method, active, rows, solution, .. } = self;
-        let (y, own, noise, shift) = (&mut self.y, &mut self.own, &mut self.noise, &self.shift);
-        let offset = &self.offset;
+        let Self { equations, symmetry, active, rows, solution, y, own, noise, shift, offset, .. } = self;
         let (_, symmetry) = *symmetry;
         active.clear();
         active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
@@ -172,49 +144,15 @@ impl<T: Real> ActiveSet<T> {
         for iteration in 1..=limit {
             rows.clear();
             rows.extend((0..size).filter(|&i| active[i]));
-            let known = problem.version > 0 && factored.0 == problem.version && factored.1 == *rows && !proximal;
-            if !known {
-                factored.0 = 0;
-                let iterates = rows.len() >= MANY && symmetry == Symmetry::Symmetric && !proximal;
-                *method = if iterates && many.prepare(problem, rows) { Method::Iteration } else { Method::Factor };
-            }
-            let right = |solution: &mut Vec<T>| {
-                solution.clear();
-                solution.extend(rows.iter().map(|&i| -offset[i]));
+            solution.clear();
+            solution.extend(rows.iter().map(|&i| -offset[i]));
+            let solved = equations.solve(problem, (rows, symmetry), proximal.then_some(shift), solution);
+            let not_finite = |row| ContactFailure::NotConverged { iterations: iteration, row, residual: T::nan() };
+            let singular = match solved.map_err(not_finite)? {
+                Solved::Once => false,
+                Solved::LeastNorm => true,
+                Solved::Not => return Ok(Exchanges::Stuck(iteration)),
             };
-            right(solution);
-            let iterated = *method == Method::Iteration && many.solve(problem, rows, solution).is_some();
-            if !iterated {
-                if !known || *method == Method::Iteration {
-                    *method = Method::Factor;
-                    factored.0 = 0;
-                    let diagonal = |i: usize| if proximal { shift[i] } else { T::zero() };
-                    let entry = |i: usize, j: usize| {
-                        let w = problem.row(rows[i])[rows[j]];
-                        if i == j { w + diagonal(rows[i]) } else { w }
-                    };
-                    let not_finite = |i: usize| ContactFailure::NotConverged {
-                        iterations: iteration,
-                        row: rows[i],
-                        residual: T::nan(),
-                    };
-                    match symmetry {
-                        Symmetry::Symmetric => factor.factorize(rows.len(), entry).map_err(not_finite)?,
-                        Symmetry::General => factor.factorize_general(rows.len(), entry).map_err(not_finite)?,
-                    }
-                }
-                if symmetry == Symmetry::General && factor.is_singular() {
-                    // There is no solution of least norm from an LU.
-                    return Ok(Exchanges::Stuck(iteration));
-                }
-                right(solution);
-                factor.solve(solution);
-            }
-            if factored.0 == 0 && !proximal {
-                factored.0 = problem.version;
-                factored.1.clone_from(rows);
-            }
-            let singular = !iterated && factor.is_singular();
             multipliers.fill(T::zero());
             for (&i, &lambda) in rows.iter().zip(solution.iter()) {
                 multipliers[i] = lambda;
@@ -340,16 +278,11 @@ impl<T: Real> ActiveSet<T> {
 impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     fn reserve(&mut self, size: usize) {
         let reals = || Vec::with_capacity(size);
-        // (Of large problems the dense ways are last resorts.)
-        let dense = if size < MANY { size } else { FORESEEN };
         let mut pivoting = Pivoting::default();
-        pivoting.reserve(dense);
+        pivoting.reserve(size.min(FORESEEN));
         *self = Self {
-            factor: DenseCholesky::with_capacity(dense),
-            many: ManyRows::default(),
-            method: Method::Factor,
+            equations: Equations::with_capacity(size),
             symmetry: (0, Symmetry::Symmetric),
-            factored: (0, Vec::with_capacity(size)),
             active: Vec::with_capacity(size),
             rows: Vec::with_capacity(size),
             solution: reals(),

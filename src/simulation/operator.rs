@@ -327,7 +327,7 @@ impl<T: Real> Operator<T> {
                     }
                 }
                 ContactPath::Condensed | ContactPath::Full => {
-                    responses.add_coupling(g, j, rows, size, &mut values[k..]);
+                    responses.couple(g, j, rows, (size, &mut values[k..]));
                 }
             }
         }

@@ -31,6 +31,8 @@ pub(super) struct Responses<T> {
     columns: usize,
     /// The dofs or rows whose columns are missing.
     missing: Vec<usize>,
+    /// The response to a row.
+    whole: Vec<T>,
 }
 
 /// Dofs of an interface whose responses take little memory, all together.
@@ -45,7 +47,15 @@ impl<T: Real> Responses<T> {
     pub(super) fn new(unit: Unit, size: usize) -> Self {
         let small = if size <= SMALL { size } else { 0 };
         let blocks = (0..small.div_ceil(COLUMNS)).map(|_| vec![T::zero(); COLUMNS * size]).collect();
-        Self { unit, size, slots: Vec::with_capacity(small), blocks, columns: 0, missing: Vec::with_capacity(small) }
+        Self {
+            unit,
+            size,
+            slots: Vec::with_capacity(small),
+            blocks,
+            columns: 0,
+            missing: Vec::with_capacity(small),
+            whole: Vec::with_capacity(size),
+        }
     }
 
     /// Forgets all columns: they belong to another matrix. Their memory is used again.
@@ -61,7 +71,7 @@ impl<T: Real> Responses<T> {
         }
     }
 
-    /// Makes known what [`add_coupling`](Self::add_coupling) and [`respond`](Self::respond) need of some rows
+    /// Makes known what [`couple`](Self::couple) and [`respond`](Self::respond) need of some rows
     /// (ascending); `solve` replaces up to [`COLUMNS`] columns of forces by their responses.
     pub(super) fn prepare(
         &mut self,
@@ -69,7 +79,7 @@ impl<T: Real> Responses<T> {
         rows: &[usize],
         mut solve: impl FnMut(&mut [T]) -> Result<()>,
     ) -> Result<()> {
-        let Self { unit, size, slots, blocks, columns, missing } = self;
+        let Self { unit, size, slots, blocks, columns, missing, .. } = self;
         slots.resize(if *unit == Unit::Row { g.rows() } else { *size }, NONE);
         missing.clear();
         let mut ask = |index: usize| {
@@ -85,7 +95,9 @@ impl<T: Real> Responses<T> {
             }
         }
         // (Should a solve fail nothing is known of these.)
-        missing.iter().for_each(|&index| slots[index] = NONE);
+        for &index in missing.iter() {
+            slots[index] = NONE;
+        }
         let mut rest = &missing[..];
         while !rest.is_empty() {
             // Blocks are full but for the last one, which is filled up first.
@@ -118,17 +130,28 @@ impl<T: Real> Responses<T> {
         &self.blocks[block][place * self.size..(place + 1) * self.size]
     }
 
-    /// Column j of W = G A⁻¹ Gᵀ: adds G_i A⁻¹ G_jᵀ of all `rows` i to `out`, whose entries are `stride` apart.
-    pub(super) fn add_coupling(&self, g: &ContactJacobian<T>, j: usize, rows: &[usize], stride: usize, out: &mut [T]) {
-        let mut add = |weight: T, column: &[T]| {
-            for (entry, &i) in out.iter_mut().step_by(stride).zip(rows) {
-                *entry += weight * g.interface_product(i, column);
+    /// Column j of W = G A⁻¹ Gᵀ: writes G_i A⁻¹ G_jᵀ of all `rows` i to `out`, whose entries are `stride` apart.
+    pub(super) fn couple(
+        &mut self,
+        g: &ContactJacobian<T>,
+        j: usize,
+        rows: &[usize],
+        (stride, out): (usize, &mut [T]),
+    ) {
+        let mut whole = std::mem::take(&mut self.whole);
+        let response = match self.unit {
+            Unit::Row => self.column(j),
+            Unit::Dof => {
+                whole.clear();
+                whole.resize(self.size, T::zero());
+                g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place), &mut whole));
+                &whole
             }
         };
-        match self.unit {
-            Unit::Row => add(T::one(), self.column(j)),
-            Unit::Dof => g.located(j).for_each(|(place, weight)| add(weight, self.column(place))),
+        for (entry, &i) in out.iter_mut().step_by(stride).zip(rows) {
+            *entry = g.interface_product(i, response);
         }
+        self.whole = whole;
     }
 
     /// A⁻¹ Gᵀ λ of some rows, whose forces Gᵀ λ on the interface are known.

@@ -66,7 +66,9 @@ fn candidates_that_stay_open_take_no_part() {
     let pressed = closed(&all);
     assert!(pressed > 1000 && pressed == closed(&few), "{pressed} {}", closed(&few));
     for dof in (0..count).filter(near) {
-        assert_eq!(all.state().displacement()[dof], few.state().displacement()[dof]);
-        assert_eq!(all.state().velocity()[dof], few.state().velocity()[dof]);
+        let of = |run: &Simulation<'_, f64>| {
+            [run.state().displacement()[dof], run.state().velocity()[dof]].map(f64::to_bits)
+        };
+        assert_eq!(of(&all), of(&few));
     }
 }
