@@ -15,6 +15,7 @@ mod surface;
 pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps, rounding};
 pub use law::ContactLaw;
+pub(crate) use law::Measure;
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]
 pub use node_to_facet::NodeToFacet;

@@ -2,7 +2,7 @@
 //! contact conditions.
 
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ContactLaw, ErasedGaps, rounding};
+use crate::contact::{ContactId, ContactJacobian, ErasedGaps, rounding};
 use crate::contact_solver::{Bound, ContactProblem, ContactSolver, contact_error};
 use crate::error::Result;
 use crate::real::Real;
@@ -59,9 +59,7 @@ impl<T: Real> Prediction<'_, T> {
     /// [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
     pub fn project(&mut self, extent: Extent) -> Result<()> {
         let count = self.ids.len();
-        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| {
-            matches!(constraints.0.law(row), ContactLaw::Rigid | ContactLaw::Equality)
-        };
+        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| constraints.0.law(row).is_plain();
         let mut rows = std::mem::take(&mut self.buffers.closed);
         let mut mu = std::mem::take(&mut self.buffers.impulses);
         rows.clear();

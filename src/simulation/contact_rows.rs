@@ -3,27 +3,12 @@
 use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
 use super::program::{CompiledStage, ContactTarget};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates, Measure};
 use crate::contact_solver::Bound;
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{Clock, Motion};
-
-/// What a row constrains in a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Measure {
-    /// What the scheme asks for: the gap, or h times its rate.
-    AsScheme,
-    /// The change of the gap since the start of the stage.
-    Increment,
-    /// h times the rate of the gap, by a scheme that asks for the gap.
-    Rate,
-    /// Nothing: the row is open in this stage.
-    Nothing,
-    /// Decided once the motion of the stage without contact is known.
-    Undecided,
-}
 
 /// Which rows a contact problem is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,12 +141,7 @@ impl<T: Real> ContactRowsWork<T> {
             // A contact at rest has a gap that is small beside the way that its force prevents: that from the gap at
             // the start to the gap of the free motion.
             let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
-            *measure = match (constraints.law(row), closed) {
-                (ContactLaw::RateCondition, true) => Measure::Increment,
-                (ContactLaw::RateCondition, false) => Measure::Nothing,
-                (ContactLaw::PersistencySwitch, true) => Measure::Rate,
-                _ => Measure::AsScheme,
-            };
+            *measure = constraints.law(row).measure(closed);
         }
     }
 

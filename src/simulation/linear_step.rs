@@ -7,8 +7,8 @@ use super::massless::MasslessBlock;
 use super::stage::StageSolve;
 use super::stage_vectors::{StageVectors, residual};
 use crate::error::Result;
-use crate::real::Real;
 use crate::kernels::vector::Accumulate;
+use crate::real::Real;
 use crate::state::Motion;
 
 impl<T: Real> StageSolve<'_, '_, T> {

@@ -127,10 +127,9 @@ pub(super) fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
 /// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
 /// known yet), on dofs with mass.
 pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
-    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
         && constraints.capacity() > 0
-        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
+        && (constraints.len() == 0 || constraints.laws().iter().any(ContactLaw::is_plain))
         && constraints.interface().iter().any(has_mass)
 }

@@ -8,7 +8,7 @@ use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, Start, Violation};
 use super::tangent::{At, TangentOf};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
 use crate::real::Real;
@@ -118,8 +118,7 @@ impl<T: Real> Simulation<'_, T> {
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
         // Rows whose law reads the gap where a stage starts may hold it anywhere.
-        let elsewhere = |law: ContactLaw| law.is_compliant() || law.reads_start();
-        let rigid = closed.map(|(_, row)| row).filter(|&row| !elsewhere(constraints.law(row)));
+        let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
