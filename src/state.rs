@@ -7,7 +7,7 @@ mod history;
 
 pub(crate) use backup::Backup;
 pub(crate) use clock::{Clock, Pace, resolution};
-pub use contacts::ContactState;
+pub use contacts::{ContactState, ContactStatus};
 pub use history::History;
 pub(crate) use history::Trail;
 

@@ -210,6 +210,11 @@ impl ContactLaw {
         self.is_compliant() && self.inertia() == 0.0 && !self.is_predictive()
     }
 
+    /// Whether the rates of the gap matter: to the condition, or to corrections.
+    pub(crate) fn reads_rates(&self) -> bool {
+        !self.is_compliant() || self.inertia() > 0.0
+    }
+
     /// Whether the force is no piecewise linear function of the gap: it is then linearized until it is met.
     pub(crate) fn is_nonlinear(&self) -> bool {
         matches!(self, Self::PowerLaw { .. })

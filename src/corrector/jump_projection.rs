@@ -237,6 +237,11 @@ impl<T: Real> JumpProjection<T> {
     /// Makes the rows known to [`push`](Self::push).
     pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         if let InverseMass::Consistent { .. } = self.inverse {
+            let count = rows.iter().max().map_or(0, |last| last + 1);
+            if count > self.computed.len() {
+                self.computed.resize(count, false);
+                self.columns.resize(count * self.dofs, T::zero());
+            }
             for &row in rows {
                 if !self.computed[row] {
                     let column = &mut self.columns[row * self.dofs..(row + 1) * self.dofs];

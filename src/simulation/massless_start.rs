@@ -61,7 +61,7 @@ pub(super) fn balance_start<T: Real>(
             }
             Err(other) => return Err(other),
         };
-        let mut operator = Operator::of_part(Box::new(factor), constraints.capacity(), &interface)?;
+        let mut operator = Operator::of_part(Box::new(factor), constraints.room(), &interface)?;
         operator.begin(&mut residual, &mut on_interface)?;
         let sliver = press_start(
             solver,

@@ -94,7 +94,7 @@ impl<T: Real> Operator<T> {
         let (factor, contact) = analyze(solver, combination.pattern(), interface, varies)?;
         let columns = memory::zeros(rows, interface.len(), "the responses of the contact rows")?;
         let full = match contact {
-            ContactPath::Full if rows > 0 => {
+            ContactPath::Full if !interface.is_empty() => {
                 memory::zeros(COLUMNS, system.dofs(), "the responses of the contact rows")?
             }
             _ => Vec::new(),
@@ -265,6 +265,7 @@ impl<T: Real> Operator<T> {
 
     /// Makes A⁻¹ G_rowᵀ available in [`response`](Self::response) for ascending rows.
     pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        self.make_room(rows.last().map_or(0, |&last| last + 1))?;
         let mut rest = rows;
         while let Some(&first) = rest.first() {
             // Consecutive rows are solved for together.
@@ -282,6 +283,18 @@ impl<T: Real> Operator<T> {
                 self.computed[first..end].fill(true);
             }
             rest = &rest[(end - first).max(1)..];
+        }
+        Ok(())
+    }
+
+    /// Memory for the responses of so many rows, and more of it by doubling.
+    fn make_room(&mut self, rows: usize) -> Result<()> {
+        if rows > self.computed.len() {
+            let (rows, size) = (rows.max(2 * self.computed.len()), self.interface.len());
+            let mut columns = memory::zeros(rows, size, "the responses of the contact rows")?;
+            columns[..self.columns.len()].copy_from_slice(&self.columns);
+            self.columns = columns;
+            self.computed.resize(rows, false);
         }
         Ok(())
     }

@@ -70,13 +70,13 @@ pub(super) fn check_corrections<T: Real>(
 }
 
 /// What the local error of a scheme follows from; refused where contact would not show in it.
-pub(super) fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError> {
+pub(super) fn local_error(scheme: &Scheme<'_>, may_press: bool) -> Result<LocalError> {
     let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
     let refuse = |reason| {
         let part = format!("an estimate of the local error with {}", scheme.integrator.name());
         Err(Error::Incompatible { part, reason })
     };
-    if rows > 0 && ahead {
+    if may_press && ahead {
         return refuse(
             "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
         );
@@ -129,7 +129,7 @@ pub(super) fn damping<T: Real>(system: &mut dyn System<T>) -> Damping {
 pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
-        && constraints.capacity() > 0
+        && constraints.may_press()
         && (constraints.len() == 0 || constraints.laws().iter().any(ContactLaw::is_plain))
         && constraints.interface().iter().any(has_mass)
 }

@@ -121,7 +121,7 @@ impl<T: Real> Simulation<'_, T> {
         let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
-            let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
+            let mut projection = start::projection(&**system, newest.u.len(), constraints.room())?;
             projection.close_rows(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
                 project(motion, constraints, g, &mut projection, &closed)?;
@@ -161,11 +161,11 @@ impl<T: Real> Simulation<'_, T> {
         let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
+        let mut projection = start::projection(&**system, u.len(), constraints.room())?;
         let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
         let Begun { state: begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
-        let rows = constraints.capacity();
+        let rows = constraints.room();
         contact_solver.reserve(rows);
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {

@@ -147,7 +147,7 @@ impl<T: Real> Start<'_, T> {
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
         RateCheck::new(constraints.len()).check(constraints, &motion, h, g)?;
         projection.reset();
-        let mut contacts = ContactState::with_capacity(constraints.capacity());
+        let mut contacts = ContactState::with_capacity(constraints.room());
         contacts.reset(&constraints.ids);
         let mut touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
         let mut adjustment = None;
