@@ -1,10 +1,21 @@
 //! The name of a contact, which errors give and states keep.
 
 /// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
+///
+/// Feature and candidate are given by the constraint ([`Contacts::push`](crate::contact::Contacts::push)):
+///
+/// | constraint | feature | candidate |
+/// | --- | --- | --- |
+/// | [`LinearRows`](crate::contact::LinearRows) | the row, in the order in which rows were added | 0 |
+/// | [`GapFunction`](crate::contact::GapFunction) | the function, in the order in which they were added | 0 |
+/// | [`NodesOnObstacle`](crate::contact::NodesOnObstacle) | the node | 0 |
+/// | `NodeToFacet` | the node | the pass: 0 for nodes of `one`, 1 for those of `other` |
+/// | of a host | what it says | what it says |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactId {
-    /// Index of the constraint in the simulation.
+    /// Index of the constraint in the simulation, in the order given: that of
+    /// [`Simulation::constraint`](crate::Simulation::constraint).
     pub constraint: usize,
     /// Feature of the body (a node, a row), given by the constraint.
     pub feature: usize,

@@ -100,6 +100,24 @@ pub enum Error {
         /// The dof.
         dof: usize,
     },
+    /// A contact constraint names a degree of freedom that does not exist in the system.
+    #[error("contact constraint {constraint} names dof {dof}, but the system has {dofs} dofs")]
+    MissingContactDof {
+        /// The constraint, by its place in the order in which they were given.
+        constraint: usize,
+        /// The dof named.
+        dof: usize,
+        /// Number of dofs of the system.
+        dofs: usize,
+    },
+    /// A contact constraint names a degree of freedom more than once.
+    #[error("contact constraint {constraint} names dof {dof} more than once; `dofs` names each once")]
+    RepeatedContactDof {
+        /// The constraint, by its place in the order in which they were given.
+        constraint: usize,
+        /// The dof.
+        dof: usize,
+    },
     /// A degree of freedom is prescribed twice.
     #[error("dof {dof} is prescribed twice; fix or drive it once")]
     PrescribedTwice {
@@ -243,13 +261,16 @@ pub enum Error {
         /// The contact.
         contact: ContactId,
     },
-    /// A contact row acts on a dof that its constraint has not announced.
-    #[error("contact {contact} acts on dof {dof}, which `dofs` of its constraint does not list")]
-    UnannouncedDof {
+    /// A contact row acts where its constraint has no dof that it may act on.
+    #[error(
+        "contact {contact} acts on place {place} of its constraint's dofs, but `dofs` lists no such place, or `only_reads` \
+         says that no row acts there; rows name places in `dofs`, not dofs of the system"
+    )]
+    UnlistedPlace {
         /// The contact.
         contact: ContactId,
-        /// The dof.
-        dof: usize,
+        /// The place.
+        place: usize,
     },
     /// Closed contacts demand opposite things: no contact forces meet them all.
     #[error(

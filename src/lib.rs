@@ -48,11 +48,11 @@ pub use observer::{Control, Observer, StepView};
 pub use preset::Preset;
 pub use real::Real;
 pub use simulation::{
-    Energy, InitialOverclosure, Iteration, Newton, Outcome, Simulation, SimulationBuilder, StartAdjustment, Statistics,
-    StepControl, Works,
+    ContactForce, Energy, InitialOverclosure, Iteration, Newton, Outcome, Simulation, SimulationBuilder,
+    StartAdjustment, Statistics, StepControl, Works,
 };
 #[cfg(feature = "serde")]
 pub use state::Checkpoint;
-pub use state::{ContactState, History, State};
+pub use state::{ContactState, ContactStatus, History, State};
 pub use system::{DampingForce, LinearSystem, Linearity, Path, PathForce, System, TangentWeights};
 pub use tableau::StartUp;

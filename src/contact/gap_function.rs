@@ -1,15 +1,16 @@
 //! Gaps that are any function of some displacements.
 
-use super::{Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates};
+use super::dofs::DofList;
+use super::{Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, check_local};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
-type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a>;
+type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]> + Send + 'a>;
 
 /// A row and where it is linearized.
 struct Row<'a, T> {
     function: Function<'a, T>,
-    /// The dofs with the gradient there.
+    /// The places of the dofs with the gradient there.
     entries: Vec<(usize, T)>,
     place: Vec<T>,
     /// Whether there is no gradient there: then there is no gap.
@@ -30,7 +31,8 @@ struct Row<'a, T> {
 /// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
 ///
 /// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step
-/// ([`Error::ContactNotFinite`]), which a smaller one mends. Rows are identified by their order.
+/// ([`Error::ContactNotFinite`]), which a smaller one mends; a function that may fail otherwise is given to
+/// [`fallible`](Self::fallible). Rows are identified by their order: (row, 0).
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, GapFunction};
@@ -48,10 +50,10 @@ struct Row<'a, T> {
 /// };
 /// let mut contact = GapFunction::new(&[6, 7], parabola).and(&[0, 2], tether);
 ///
-/// let (mut u, mut gaps) = ([0.0; 8], [0.0; 2]);
-/// u[6] = 2.0;
-/// contact.search(0.0, &u, &[0.0; 8], 0.0)?;
-/// contact.gap(0.0, &u, &mut gaps);
+/// // Displacements of the dofs in the order in which they are named: 6, 7, 0, 2.
+/// let (u, mut gaps) = ([2.0, 0.0, 0.0, 0.0], [0.0; 2]);
+/// contact.search(0.0, &u, &[0.0; 4], 0.0)?;
+/// contact.gaps(0.0, &u, &mut gaps)?;
 /// assert_eq!(gaps, [0.0, 1.5]);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
@@ -79,6 +81,7 @@ struct Row<'a, T> {
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub struct GapFunction<'a, T: Real> {
+    dofs: DofList,
     rows: Vec<Row<'a, T>>,
     law: ContactLaw,
     scale: T,
@@ -96,19 +99,40 @@ impl<T: Real> std::fmt::Debug for GapFunction<'_, T> {
 
 impl<'a, T: Real> GapFunction<'a, T> {
     /// One row, a function of the displacements of these dofs.
-    pub fn new(dofs: &[usize], function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a) -> Self {
+    pub fn new(dofs: &[usize], mut function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a) -> Self {
+        Self::fallible(dofs, move |t, x, v, gradient| Ok(function(t, x, v, gradient)))
+    }
+
+    /// The same with a function that may fail, for instance as [`Error::Host`]: the step fails with its error.
+    pub fn fallible(
+        dofs: &[usize],
+        function: impl FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]> + Send + 'a,
+    ) -> Self {
         let (law, buffers) = (ContactLaw::Rigid, [const { Vec::new() }; 3]);
-        Self { rows: Vec::new(), law, scale: T::zero(), candidates: 0, buffers }.and(dofs, function)
+        let list = DofList::default();
+        Self { dofs: list, rows: Vec::new(), law, scale: T::zero(), candidates: 0, buffers }
+            .and_fallible(dofs, function)
     }
 
     /// One row more.
     #[must_use]
     pub fn and(
+        self,
+        dofs: &[usize],
+        mut function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a,
+    ) -> Self {
+        self.and_fallible(dofs, move |t, x, v, gradient| Ok(function(t, x, v, gradient)))
+    }
+
+    /// One row more, of a function that may fail.
+    #[must_use]
+    pub fn and_fallible(
         mut self,
         dofs: &[usize],
-        function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a,
+        function: impl FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]> + Send + 'a,
     ) -> Self {
-        let (entries, place) = (dofs.iter().map(|&dof| (dof, T::zero())).collect(), vec![T::zero(); dofs.len()]);
+        let entries = dofs.iter().map(|&dof| (self.dofs.place(dof), T::zero())).collect();
+        let place = vec![T::zero(); dofs.len()];
         self.rows.push(Row { function: Box::new(function), entries, place, broken: false });
         for buffer in &mut self.buffers {
             buffer.resize(buffer.len().max(dofs.len()), T::zero());
@@ -138,7 +162,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
 
     /// Linearizes all rows at u; whether a gradient changed.
     fn linearize(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        self.check(u.len())?;
+        check_local(u.len(), self.dofs.as_slice().len())?;
         let Self { rows, buffers: [_, still, gradient], .. } = self;
         still.fill(T::zero());
         let mut found = Candidates::Unchanged;
@@ -149,7 +173,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
             let gradient = &mut gradient[..entries.len()];
             // An entry that the function does not write is not that of another row.
             gradient.fill(T::nan());
-            function(t, place, &still[..place.len()], gradient);
+            function(t, place, &still[..place.len()], gradient)?;
             // Without a gradient the row stays as it was, and reports a gap that is NaN.
             *broken = !gradient.iter().all(|x| x.is_finite());
             if !*broken {
@@ -165,29 +189,38 @@ impl<'a, T: Real> GapFunction<'a, T> {
 }
 
 impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
-    fn max_candidates(&self) -> usize {
-        self.rows.len()
+    fn dofs(&self) -> &[usize] {
+        self.dofs.as_slice()
     }
 
-    fn max_entries(&self) -> usize {
-        self.rows.iter().map(|row| row.entries.len()).sum()
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        for (row, Row { entries, .. }) in self.rows[..self.candidates].iter().enumerate() {
+            contacts.push((row, 0), self.law, entries).magnitude(self.scale);
+        }
     }
 
-    fn check(&self, dofs: usize) -> Result<()> {
-        for row in &self.rows {
-            if row.entries.is_empty() {
-                let what = "the list of dofs of a gap function";
-                return Err(Error::Empty { what, remedy: "name the dofs that the gap depends on" });
-            }
-            if let Some(&(dof, _)) = row.entries.iter().find(|(dof, _)| *dof >= dofs) {
-                return Err(Error::MissingDof { what: "a gap function", dof, dofs });
-            }
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        let Self { rows, buffers: [_, still, gradient], candidates, .. } = self;
+        still.fill(T::zero());
+        for (Row { function, entries, place, broken }, out) in rows[..*candidates].iter_mut().zip(gaps) {
+            let [gap, ..] = function(t, place, &still[..place.len()], &mut gradient[..place.len()])?;
+            let moved = entries.iter().zip(&*place).map(|(&(dof, weight), &x)| weight * (u[dof] - x));
+            *out = if *broken { T::nan() } else { gap + moved.sum() };
         }
         Ok(())
     }
 
-    fn dofs(&self, out: &mut Vec<usize>) {
-        out.extend(self.rows.iter().flat_map(|row| &row.entries).map(|entry| entry.0));
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let Self { rows, buffers: [x, w, gradient], candidates, .. } = self;
+        for (Row { function, entries, .. }, out) in rows[..*candidates].iter_mut().zip(rates) {
+            let (x, w) = (&mut x[..entries.len()], &mut w[..entries.len()]);
+            for ((x, w), &(dof, _)) in x.iter_mut().zip(w.iter_mut()).zip(&*entries) {
+                (*x, *w) = (u[dof], v[dof]);
+            }
+            let [_, rate, acceleration] = function(t, x, w, &mut gradient[..entries.len()])?;
+            *out = GapRates { rate, acceleration };
+        }
+        Ok(Rates::Given)
     }
 
     fn search(&mut self, t: f64, u: &[T], _v: &[T], _ahead: f64) -> Result<Candidates> {
@@ -204,50 +237,6 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
                 let contact = ContactId { constraint: 0, feature, candidate: 0 };
                 Err(Error::ContactNotFinite { t, what: "the gradient of the gap", contact, value: f64::NAN })
             }
-        }
-    }
-
-    fn candidates(&self) -> usize {
-        self.candidates
-    }
-
-    fn identity(&self, row: usize) -> (usize, usize) {
-        (row, 0)
-    }
-
-    fn law(&self, _: usize) -> ContactLaw {
-        self.law
-    }
-
-    fn magnitude(&self, _: usize) -> T {
-        self.scale
-    }
-
-    fn jacobian(&self, out: &mut ContactJacobian<T>) {
-        for row in &self.rows[..self.candidates] {
-            out.push(&row.entries);
-        }
-    }
-
-    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
-        let Self { rows, buffers: [_, still, gradient], candidates, .. } = self;
-        still.fill(T::zero());
-        for (Row { function, entries, place, broken }, out) in rows[..*candidates].iter_mut().zip(out) {
-            let [gap, ..] = function(t, place, &still[..place.len()], &mut gradient[..place.len()]);
-            let moved = entries.iter().zip(&*place).map(|(&(dof, weight), &x)| weight * (u[dof] - x));
-            *out = if *broken { T::nan() } else { gap + moved.sum() };
-        }
-    }
-
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
-        let Self { rows, buffers: [x, w, gradient], candidates, .. } = self;
-        for (Row { function, entries, .. }, out) in rows[..*candidates].iter_mut().zip(out) {
-            let (x, w) = (&mut x[..entries.len()], &mut w[..entries.len()]);
-            for ((x, w), &(dof, _)) in x.iter_mut().zip(w.iter_mut()).zip(&*entries) {
-                (*x, *w) = (u[dof], v[dof]);
-            }
-            let [_, rate, acceleration] = function(t, x, w, &mut gradient[..entries.len()]);
-            *out = GapRates { rate, acceleration };
         }
     }
 }

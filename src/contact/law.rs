@@ -141,6 +141,21 @@ pub enum ContactLaw {
     },
 }
 
+/// What a row constrains in a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Measure {
+    /// What the scheme asks for: the gap, or h times its rate.
+    AsScheme,
+    /// The change of the gap since the start of the stage.
+    Increment,
+    /// h times the rate of the gap, by a scheme that asks for the gap.
+    Rate,
+    /// Nothing: the row is open in this stage.
+    Nothing,
+    /// Decided once the motion of the stage without contact is known.
+    Undecided,
+}
+
 impl ContactLaw {
     /// Hertz' law for two elastic bodies: λ = 4/3 E* √R ⟨−g⟩^{3/2}, with 1/E* = Σ (1 − ν²)/E and 1/R = Σ 1/Rᵢ.
     pub fn hertz(modulus: f64, radius: f64) -> Self {
@@ -159,6 +174,66 @@ impl ContactLaw {
             | Self::StabilizedBipenalty { .. }
             | Self::AugmentedLagrangian { .. } => true,
         }
+    }
+
+    /// e of Newton's impact law, the share of the approach with which a contact leaves, for rows under that law.
+    pub(crate) fn restitution(&self) -> Option<f64> {
+        match *self {
+            Self::Restitution { coefficient } => Some(coefficient),
+            _ => None,
+        }
+    }
+
+    /// Whether a contact leaves with a share of its approach.
+    pub(crate) fn rebounds(&self) -> bool {
+        self.restitution().is_some_and(|coefficient| coefficient > 0.0)
+    }
+
+    /// What a row constrains, which was closed at the start of the stage or open.
+    pub(crate) fn measure(&self, closed: bool) -> Measure {
+        match (self, closed) {
+            (Self::RateCondition, true) => Measure::Increment,
+            (Self::RateCondition, false) => Measure::Nothing,
+            (Self::PersistencySwitch, true) => Measure::Rate,
+            _ => Measure::AsScheme,
+        }
+    }
+
+    /// Whether the row demands of the scheme that its unknown moves what contact constrains: a multiplier holds it.
+    /// (Forces of the others follow from the gaps.)
+    pub(crate) fn needs_multiplier(&self) -> bool {
+        !self.is_compliant() || self.is_predictive()
+    }
+
+    /// Whether the force follows from the gap of the state alone, without masses and predictions.
+    pub(crate) fn is_spring(&self) -> bool {
+        self.is_compliant() && self.inertia() == 0.0 && !self.is_predictive()
+    }
+
+    /// Whether the rates of the gap matter: to the condition, or to corrections.
+    pub(crate) fn reads_rates(&self) -> bool {
+        !self.is_compliant() || self.inertia() > 0.0
+    }
+
+    /// Whether the force is no piecewise linear function of the gap: it is then linearized until it is met.
+    pub(crate) fn is_nonlinear(&self) -> bool {
+        matches!(self, Self::PowerLaw { .. })
+    }
+
+    /// Whether the gap of a closed row may be other than zero.
+    pub(crate) fn may_penetrate(&self) -> bool {
+        self.is_compliant() || self.reads_start()
+    }
+
+    /// Whether a closed row leaves jumps of velocity and acceleration that correctors remove.
+    pub(crate) fn leaves_jumps(&self) -> bool {
+        !self.is_compliant()
+    }
+
+    /// Whether the row constrains the gap, or its rate where the scheme does, and nothing else. (Predictions of
+    /// displacements are projected on such rows.)
+    pub(crate) fn is_plain(&self) -> bool {
+        matches!(self, Self::Rigid | Self::Equality)
     }
 
     /// Whether a compliant law reads the gap that the scheme constrains, ahead of the state, beside those of the step.

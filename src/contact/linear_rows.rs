@@ -1,7 +1,8 @@
 //! Contact rows with constant G: gap = G u + g0(t).
 
+use super::dofs::DofList;
 use super::obstacle::unit;
-use super::{ContactConstraint, ContactJacobian, ContactLaw, GapRates};
+use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, Contacts, GapRates, Rates, Variation};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::sparse::SparseRowMatRef;
@@ -38,7 +39,7 @@ impl<T: Real> From<T> for GapOffset<'_, T> {
     }
 }
 
-/// Any number of rows `g = G u + g0(t)` with constant G.
+/// Any number of rows `g = G u + g0(t)` with constant G. Rows are identified by their order: (row, 0).
 ///
 /// ```
 /// use contact_dynamics::LinearRows;
@@ -55,10 +56,14 @@ impl<T: Real> From<T> for GapOffset<'_, T> {
 /// ```
 #[derive(Debug)]
 pub struct LinearRows<'a, T: Real> {
+    dofs: DofList,
+    /// In places of the list.
     jacobian: ContactJacobian<T>,
     laws: Vec<ContactLaw>,
     offsets: Vec<GapOffset<'a, T>>,
     coordinates: T,
+    /// Whether the numbers given have been looked at.
+    checked: bool,
 }
 
 impl<T: Real> Default for LinearRows<'_, T> {
@@ -70,7 +75,8 @@ impl<T: Real> Default for LinearRows<'_, T> {
 impl<'a, T: Real> LinearRows<'a, T> {
     /// No rows yet.
     pub fn new() -> Self {
-        Self { jacobian: ContactJacobian::default(), laws: Vec::new(), offsets: Vec::new(), coordinates: T::zero() }
+        let (dofs, jacobian) = (DofList::default(), ContactJacobian::default());
+        Self { dofs, jacobian, laws: Vec::new(), offsets: Vec::new(), coordinates: T::zero(), checked: false }
     }
 
     /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
@@ -116,7 +122,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// let (lower, upper) = ([0, 1], [2, 3]); // x and y dofs
     /// let mut contact = LinearRows::new().pair(ContactLaw::Rigid, lower, upper, [3.0, 4.0], 0.1)?;
     /// let mut gap = [0.0_f64];
-    /// contact.gap(0.0, &[0.0, 0.0, 0.0, -0.1], &mut gap);
+    /// contact.gaps(0.0, &[0.0, 0.0, 0.0, -0.1], &mut gap)?;
     /// assert!((gap[0] - 0.02).abs() < 1e-15);
     /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
@@ -137,9 +143,11 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// Adds a row under any law.
     #[must_use]
     pub fn row(mut self, law: ContactLaw, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
-        self.jacobian.push(entries);
+        let entries = entries.iter().map(|&(dof, weight)| (self.dofs.place(dof), weight));
+        self.jacobian.push_entries(entries);
         self.laws.push(law);
         self.offsets.push(offset.into());
+        self.checked = false;
         self
     }
 
@@ -149,6 +157,24 @@ impl<'a, T: Real> LinearRows<'a, T> {
     pub fn coordinates(mut self, size: T) -> Self {
         self.coordinates = size.abs();
         self
+    }
+
+    /// Refuses numbers that are none.
+    fn check(&self) -> Result<()> {
+        let weights = &self.jacobian.weights;
+        if let Some(index) = weights.iter().position(|weight| !weight.is_finite()) {
+            let value = weights[index].value();
+            return Err(Error::NotFinite { what: "the weights of the contact rows", index, value });
+        }
+        for (index, offset) in self.offsets.iter().enumerate() {
+            match offset {
+                GapOffset::Constant(gap) if !gap.is_finite() => {
+                    return Err(Error::NotFinite { what: "the gaps of the contact rows", index, value: gap.value() });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Number of rows.
@@ -163,70 +189,37 @@ impl<'a, T: Real> LinearRows<'a, T> {
 }
 
 impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
-    fn max_candidates(&self) -> usize {
-        self.laws.len()
+    fn dofs(&self) -> &[usize] {
+        self.dofs.as_slice()
     }
 
-    fn max_entries(&self) -> usize {
-        self.jacobian.dofs.len()
-    }
-
-    fn check(&self, dofs: usize) -> Result<()> {
-        if let Some(&dof) = self.jacobian.dofs.iter().find(|&&dof| dof >= dofs) {
-            return Err(Error::MissingDof { what: "a contact row", dof, dofs });
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        for (row, &law) in self.laws.iter().enumerate() {
+            contacts.push_row((row, 0), law, (&self.jacobian, row)).magnitude(self.coordinates);
         }
-        if let Some(index) = self.jacobian.weights.iter().position(|w| !w.is_finite()) {
-            let value = self.jacobian.weights[index].value();
-            return Err(Error::NotFinite { what: "the weights of the contact rows", index, value });
+    }
+
+    fn search(&mut self, _t: f64, _u: &[T], _v: &[T], _ahead: f64) -> Result<Candidates> {
+        if !std::mem::replace(&mut self.checked, true) {
+            self.check()?;
         }
-        for (index, offset) in self.offsets.iter().enumerate() {
-            match offset {
-                GapOffset::Constant(gap) if !gap.is_finite() => {
-                    return Err(Error::NotFinite { what: "the gaps of the contact rows", index, value: gap.value() });
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+        Ok(Candidates::Unchanged)
     }
 
-    fn is_affine(&self) -> bool {
-        true
-    }
-
-    fn candidates(&self) -> usize {
-        self.laws.len()
-    }
-
-    fn identity(&self, row: usize) -> (usize, usize) {
-        (row, 0)
-    }
-
-    fn law(&self, row: usize) -> ContactLaw {
-        self.laws[row]
-    }
-
-    fn magnitude(&self, _: usize) -> T {
-        self.coordinates
-    }
-
-    fn jacobian(&self, out: &mut ContactJacobian<T>) {
-        out.append(&self.jacobian);
-    }
-
-    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
-        for (row, (offset, gap)) in self.offsets.iter_mut().zip(out).enumerate() {
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        for (row, (offset, gap)) in self.offsets.iter_mut().zip(gaps).enumerate() {
             let g0 = match offset {
                 GapOffset::Constant(g0) => *g0,
                 GapOffset::Moving(f) => f(t)[0],
             };
             *gap = self.jacobian.product(row, u) + g0;
         }
+        Ok(())
     }
 
-    fn rates(&mut self, t: f64, _u: &[T], _v: &[T], out: &mut [GapRates<T>]) {
-        for (offset, out) in self.offsets.iter_mut().zip(out) {
-            *out = match offset {
+    fn rates(&mut self, t: f64, _u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        for (offset, rates) in self.offsets.iter_mut().zip(rates) {
+            *rates = match offset {
                 GapOffset::Constant(_) => GapRates::default(),
                 GapOffset::Moving(f) => {
                     let [_, rate, acceleration] = f(t);
@@ -234,5 +227,10 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
                 }
             };
         }
+        Ok(Rates::Given)
+    }
+
+    fn variation(&self) -> Variation {
+        Variation::Never
     }
 }

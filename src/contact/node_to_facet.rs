@@ -4,8 +4,9 @@ mod candidates;
 mod passage;
 mod rows;
 
+use super::dofs::DofList;
 use super::surface::{Facet, Neighborhood, Point, Shape, Surface, overhang};
-use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, GapRates, Stride, check_mesh};
+use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_mesh};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use rows::Rows;
@@ -88,26 +89,24 @@ impl Pass {
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
-/// use contact_dynamics::contact::{ContactJacobian, NodeToFacet};
+/// use contact_dynamics::contact::{Contacts, NodeToFacet};
 ///
 /// // The top side of a body, walked with the body on the left, and a node 0.1 above it.
 /// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.25, 0.1]];
 /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
 /// let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]])?;
 ///
+/// // The dofs in the order in which the constraint reads them: those of the node come first.
+/// assert_eq!(contact.dofs(), [6, 7, 0, 1, 2, 3, 4, 5]);
 /// let mut u = [0.0; 8];
 /// contact.search(0.0, &u, &[0.0; 8], 0.0)?;
-/// assert_eq!(contact.candidates(), 1);
-/// assert_eq!(contact.identity(0), (3, 0));
-/// assert_eq!(contact.facet(0), 1);
+/// let contacts = Contacts::of(&contact);
+/// assert_eq!((contacts.len(), contacts.name(0), contact.facet(0)), (1, (3, 0), 1));
+/// assert_eq!(contacts.row(0).collect::<Vec<_>>(), [(1, 1.0), (5, -0.25), (7, -0.75)]);
 ///
-/// let mut g = ContactJacobian::default();
-/// contact.jacobian(&mut g);
-/// assert_eq!(g.row(0).collect::<Vec<_>>(), [(7, 1.0), (3, -0.25), (5, -0.75)]);
-///
-/// u[7] = -0.3; // the node is pushed into the body
+/// u[1] = -0.3; // the node is pushed into the body
 /// let mut gap = [0.0];
-/// contact.gap(0.0, &u, &mut gap);
+/// contact.gaps(0.0, &u, &mut gap)?;
 /// assert!((gap[0] + 0.2_f64).abs() < 1e-15);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
@@ -116,8 +115,11 @@ pub struct NodeToFacet<T: Real> {
     dimension: usize,
     /// Reference coordinates, by node.
     coordinates: Vec<Point>,
-    /// Dofs of the displacement, by node; the first `dimension` count.
+    /// Dofs of the displacement in the system, by node; the first `dimension` count.
+    system_dofs: Vec<[usize; 3]>,
+    /// Their places in the list of the constraint, for nodes of the two bodies.
     dofs: Vec<[usize; 3]>,
+    list: DofList,
     /// Positions now and when the lists were built, by node.
     positions: Vec<Point>,
     built_at: Vec<Point>,
@@ -136,7 +138,6 @@ pub struct NodeToFacet<T: Real> {
     reach: f64,
     skin: Option<f64>,
     rebuilds: usize,
-    largest_dof: usize,
     /// The node that a node of the first pass stands on exactly.
     partners: Vec<Option<usize>>,
     rows: Rows<T>,
@@ -163,7 +164,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
-    /// use contact_dynamics::contact::NodeToFacet;
+    /// use contact_dynamics::contact::{Contacts, NodeToFacet};
     ///
     /// // Two sides face each other, 0.1 apart: three nodes below, two above, and a row for each.
     /// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.25, 0.1], [1.75, 0.1]];
@@ -171,7 +172,7 @@ impl<T: Real> NodeToFacet<T> {
     /// let mut contact = NodeToFacet::new(&coordinates, &dofs, [[3, 4]], [[0, 1], [1, 2]])?;
     /// contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0)?;
     /// // (Of the lower nodes only the middle one is below the upper side.)
-    /// assert_eq!((contact.max_candidates(), contact.candidates()), (5, 3));
+    /// assert_eq!(Contacts::of(&contact).len(), 3);
     /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
     ///
@@ -226,7 +227,7 @@ impl<T: Real> NodeToFacet<T> {
             return Err(Error::Empty { what, remedy: "give at least one node" });
         }
         let coordinates: Vec<_> = coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect();
-        let dofs: Vec<[usize; 3]> =
+        let system_dofs: Vec<[usize; 3]> =
             dofs.iter().map(|dofs| std::array::from_fn(|i| dofs.get(i).copied().unwrap_or(0))).collect();
         let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &coordinates)?;
         let reach = surface.typical();
@@ -244,7 +245,9 @@ impl<T: Real> NodeToFacet<T> {
             listed: 0.0,
             ends: [coordinates.clone(), coordinates.clone()],
             coordinates,
-            dofs,
+            dofs: vec![[0; 3]; system_dofs.len()],
+            system_dofs,
+            list: DofList::default(),
             surface,
             own_surface: None,
             passes: vec![Pass::new(bodies[0].clone())],
@@ -253,7 +256,6 @@ impl<T: Real> NodeToFacet<T> {
             reach,
             skin: None,
             rebuilds: 0,
-            largest_dof: 0,
             partners: Vec::new(),
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
@@ -331,9 +333,14 @@ impl<T: Real> NodeToFacet<T> {
             let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it belongs to both surfaces" });
         }
-        let dofs = self.bodies.iter().flatten().flat_map(|&node| &self.dofs[node][..self.dimension]);
-        self.largest_dof = dofs.copied().max().unwrap_or(0);
-        let (rows, entries) = (self.max_candidates(), self.max_entries());
+        let Self { list, dofs, system_dofs, bodies, dimension, .. } = self;
+        *list = DofList::default();
+        for &node in bodies.iter().flatten() {
+            for (place, &dof) in dofs[node].iter_mut().zip(&system_dofs[node][..*dimension]) {
+                *place = list.place(dof);
+            }
+        }
+        let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
         self.partners = vec![None; if self.passes.len() > 1 { self.coordinates.len() } else { 0 }];
@@ -341,12 +348,23 @@ impl<T: Real> NodeToFacet<T> {
         Ok(())
     }
 
+    /// The largest numbers of rows and of their entries.
+    fn most(&self) -> (usize, usize) {
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        let entries = |(pass, surface): (&Pass, &Surface)| {
+            let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
+            pass.nodes.len() * self.dimension * (1 + vertices)
+        };
+        let rows = self.passes.iter().map(|pass| pass.nodes.len()).sum();
+        (rows, self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum())
+    }
+
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
     fn rounding() -> f64 {
         T::epsilon().value().sqrt()
     }
 
-    /// The entries of a vector of the system that belong to a node.
+    /// The entries of a vector of the constraint that belong to a node.
     fn vector(&self, node: usize, x: &[T]) -> Point {
         let mut vector = [0.0; 3];
         for (component, &dof) in vector.iter_mut().zip(&self.dofs[node][..self.dimension]) {
@@ -371,28 +389,25 @@ fn component<T: Real>(x: &[T], i: usize) -> f64 {
 }
 
 impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
-    fn max_candidates(&self) -> usize {
-        self.passes.iter().map(|pass| pass.nodes.len()).sum()
+    fn dofs(&self) -> &[usize] {
+        self.list.as_slice()
     }
 
-    fn max_entries(&self) -> usize {
-        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
-        let entries = |(pass, surface): (&Pass, &Surface)| {
-            let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
-            pass.nodes.len() * self.dimension * (1 + vertices)
-        };
-        self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum()
-    }
-
-    fn check(&self, dofs: usize) -> Result<()> {
-        match self.largest_dof {
-            dof if dof >= dofs => Err(Error::MissingDof { what: "a contact surface", dof, dofs }),
-            _ => Ok(()),
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        let Rows { identities, stands, jacobian, .. } = &self.rows;
+        for (row, (&(node, pass), stand)) in identities.iter().zip(stands).enumerate() {
+            let position = self.positions[node];
+            let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
+            contacts
+                .push_row((node, pass), self.law, (jacobian, row))
+                .magnitude(size)
+                .position(position.map(T::of))
+                .normal(stand.normal.map(T::of));
         }
     }
 
     fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
-        self.check(u.len())?;
+        check_local(u.len(), self.list.as_slice().len())?;
         let (boxes, motions) = self.move_nodes(u)?;
         let speeds = self.speeds(v);
         self.found.clear();
@@ -416,7 +431,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        self.check(u.len())?;
+        check_local(u.len(), self.list.as_slice().len())?;
         // A trial state that is not finite: the gaps say so.
         let Ok((_, motions)) = self.move_nodes(u) else { return Ok(Candidates::Unchanged) };
         self.found.clear();
@@ -430,36 +445,16 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         self.look_at(step)
     }
 
-    fn candidates(&self) -> usize {
-        self.rows.stands.len()
-    }
-
-    fn identity(&self, row: usize) -> (usize, usize) {
-        self.rows.identities[row]
-    }
-
-    fn law(&self, _row: usize) -> ContactLaw {
-        self.law
-    }
-
-    fn magnitude(&self, row: usize) -> T {
-        let (node, _) = self.rows.identities[row];
-        T::of(self.positions[node].iter().fold(0.0, |most, x| most.max(x.abs())))
-    }
-
-    fn jacobian(&self, out: &mut ContactJacobian<T>) {
-        out.append(&self.rows.jacobian);
-    }
-
-    fn gap(&mut self, _t: f64, u: &[T], out: &mut [T]) {
-        for (row, out) in out.iter_mut().enumerate().take(self.rows.stands.len()) {
-            *out = self.rows.gap(row, u);
+    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
+            *gap = self.rows.gap(row, u);
         }
+        Ok(())
     }
 
-    fn rates(&mut self, _t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+    fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let Rows { identities, stands, .. } = &self.rows;
-        for ((out, &(node, pass)), stand) in out.iter_mut().zip(identities).zip(stands) {
+        for ((out, &(node, pass)), stand) in rates.iter_mut().zip(identities).zip(stands) {
             let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
             let facet = &surface.facets()[stand.facet];
             let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
@@ -468,10 +463,6 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let acceleration = stand.acceleration(x, speed, &shape, &velocity);
             *out = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
         }
-    }
-
-    fn dofs(&self, out: &mut Vec<usize>) {
-        let nodes = self.bodies.iter().flatten();
-        out.extend(nodes.flat_map(|&node| &self.dofs[node][..self.dimension]));
+        Ok(Rates::Given)
     }
 }

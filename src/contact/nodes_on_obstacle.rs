@@ -1,9 +1,10 @@
 //! Nodes of a deformable body against a rigid obstacle, which may move.
 
+use super::dofs::DofList;
 use super::obstacle::{dot, minus};
 use super::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, LARGEST_MISS, LARGEST_TURN,
-    Obstacle, STEEP, Stride, check_mesh, press_differently,
+    Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, LARGEST_MISS, LARGEST_TURN, Obstacle,
+    Rates, STEEP, Stride, Variation, check_local, check_mesh, press_differently,
 };
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -11,7 +12,7 @@ use crate::real::Real;
 /// Translation of an obstacle at t, its velocity and its acceleration.
 type Motion<'a, T, const D: usize> = Box<dyn FnMut(f64) -> [[T; D]; 3] + Send + 'a>;
 
-/// A node: its number, where it is at u = 0, and the dofs of its displacement.
+/// A node: its number, where it is at u = 0, and the places of the dofs of its displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node<T, const D: usize> {
     number: usize,
@@ -25,14 +26,14 @@ impl<T: Real, const D: usize> Node<T, D> {
         std::array::from_fn(|axis| self.place[axis] + u[self.dofs[axis]])
     }
 
-    /// The entries of a vector of the system.
+    /// The entries of a vector of the constraint.
     fn of(&self, x: &[T]) -> [T; D] {
         self.dofs.map(|dof| x[dof])
     }
 }
 
 /// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
-/// identified by the number of the node.
+/// identified by (number of the node, 0).
 ///
 /// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end;
 /// schemes that impose contact on velocities see the tangent plane of the start of the step instead (which moves with
@@ -55,12 +56,13 @@ impl<T: Real, const D: usize> Node<T, D> {
 ///     .moving(|t| [[0.0, -0.1 * t], [0.0, -0.1], [0.0, 0.0]]); // sinks with speed 0.1
 /// let mut gaps = [0.0; 2];
 /// contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0)?;
-/// contact.gap(0.5, &[0.0; 4], &mut gaps);
+/// contact.gaps(0.5, &[0.0; 4], &mut gaps)?;
 /// assert!((gaps[0] - 0.64_f64).abs() < 1e-15 && (gaps[1] - 0.44).abs() < 1e-15);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     obstacle: Box<dyn Obstacle<T, D> + 'a>,
+    dofs: DofList,
     nodes: Vec<Node<T, D>>,
     law: ContactLaw,
     reach: T,
@@ -80,6 +82,8 @@ struct Row<T, const D: usize> {
     normal: [T; D],
     /// The largest coordinate of the node, of which that place is what the obstacle's motion leaves.
     size: T,
+    /// Coordinates of the node where it was looked at last.
+    at: [T; D],
     /// Gap and normal at the search.
     start: (T, [T; D]),
 }
@@ -111,12 +115,16 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         nodes: &[usize],
     ) -> Result<Self> {
         check_mesh(coordinates, dofs, nodes)?;
-        let node = |&number: &usize| Node { number, place: coordinates[number], dofs: dofs[number] };
-        let nodes: Vec<_> = nodes.iter().map(node).collect();
+        let mut list = DofList::default();
+        let mut node = |&number: &usize| {
+            let dofs = dofs[number].map(|dof| list.place(dof));
+            Node { number, place: coordinates[number], dofs }
+        };
+        let nodes: Vec<_> = nodes.iter().map(&mut node).collect();
         let capacity = nodes.len();
         let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
-        Ok(Self { obstacle, nodes, law, reach: T::infinity(), motion: None, rows, before })
+        Ok(Self { obstacle, dofs: list, nodes, law, reach: T::infinity(), motion: None, rows, before })
     }
 
     /// The law of all rows; [`ContactLaw::Rigid`] by default.
@@ -215,30 +223,40 @@ fn look_at<T: Real, const D: usize>(
 }
 
 impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D> {
-    fn max_candidates(&self) -> usize {
-        self.nodes.len()
+    fn dofs(&self) -> &[usize] {
+        self.dofs.as_slice()
     }
 
-    fn max_entries(&self) -> usize {
-        D * self.nodes.len()
+    /// Across an axis-aligned normal that is fixed nodes do not act.
+    fn only_reads(&self, place: usize) -> bool {
+        let acts = |normal: [T; D], node: &Node<T, D>| {
+            node.dofs.iter().zip(normal).any(|(&dof, weight)| dof == place && weight != T::zero())
+        };
+        self.obstacle.fixed_normal().is_some_and(|normal| !self.nodes.iter().any(|node| acts(normal, node)))
     }
 
-    fn check(&self, dofs: usize) -> Result<()> {
-        match self.nodes.iter().flat_map(|node| node.dofs).find(|&dof| dof >= dofs) {
-            Some(dof) => Err(Error::MissingDof { what: "a contact node", dof, dofs }),
-            None => Ok(()),
-        }
-    }
-
-    fn dofs(&self, out: &mut Vec<usize>) {
-        let normal = self.obstacle.fixed_normal();
-        let acts = |axis: usize| normal.is_none_or(|normal| normal[axis] != T::zero());
-        for node in &self.nodes {
-            out.extend((0..D).filter(|&axis| acts(axis)).map(|axis| node.dofs[axis]));
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        for row in &self.rows {
+            let node = &self.nodes[row.node];
+            let mut entries = [(0, T::zero()); D];
+            let mut count = 0;
+            for (&place, weight) in node.dofs.iter().zip(row.normal) {
+                if weight != T::zero() {
+                    entries[count] = (place, weight);
+                    count += 1;
+                }
+            }
+            let size = row.place.iter().fold(row.size, |most, x| most.max(x.abs()));
+            contacts
+                .push((node.number, 0), self.law, &entries[..count])
+                .magnitude(size)
+                .position(in_space(row.at))
+                .normal(in_space(row.normal));
         }
     }
 
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        check_local(u.len(), self.dofs.as_slice().len())?;
         std::mem::swap(&mut self.rows, &mut self.before);
         self.rows.clear();
         let [shift, ..] = self.motion(t);
@@ -258,15 +276,21 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                 };
                 // NaN stays, to be reported as a gap.
                 if distance <= self.reach || distance.is_nan() || near() {
-                    self.rows.push(Row { node: index, place, distance, normal, size, start: (distance, normal) });
+                    self.rows.push(Row {
+                        node: index,
+                        place,
+                        distance,
+                        normal,
+                        size,
+                        at: x,
+                        start: (distance, normal),
+                    });
                 }
             }
         }
         let same = |(new, old): (&Row<T, D>, &Row<T, D>)| new.node == old.node && new.normal == old.normal;
-        match self.rows.len() == self.before.len() && self.rows.iter().zip(&self.before).all(same) {
-            true => Ok(Candidates::Unchanged),
-            false => Ok(Candidates::Changed),
-        }
+        let kept = self.rows.len() == self.before.len() && self.rows.iter().zip(&self.before).all(same);
+        Ok(Candidates::changed_if(!kept))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
@@ -279,7 +303,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             let x = self.nodes[row.node].at(u);
             (row.place, row.size) = (minus(x, shift), x.iter().fold(T::zero(), |size, x| size.max(x.abs())));
             let (distance, normal) = self.obstacle.distance(row.place);
-            row.distance = distance;
+            (row.distance, row.at) = (distance, x);
             if let Some(x) = normal.iter().find(|x| !x.is_finite()) {
                 let contact = ContactId { constraint: 0, feature: self.nodes[row.node].number, candidate: 0 };
                 return Err(Error::ContactNotFinite { t, what: "the normal", contact, value: x.value() });
@@ -293,6 +317,9 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        for row in &mut self.rows {
+            row.at = self.nodes[row.node].at(step.u[1]);
+        }
         // Through a plane a row lets nothing pass.
         if self.reach.is_infinite() && self.obstacle.fixed_normal().is_some() {
             return Ok(());
@@ -317,57 +344,36 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         Ok(())
     }
 
-    fn is_affine(&self) -> bool {
-        self.obstacle.fixed_normal().is_some()
-    }
-
-    fn candidates(&self) -> usize {
-        self.rows.len()
-    }
-
-    fn identity(&self, row: usize) -> (usize, usize) {
-        (self.nodes[self.rows[row].node].number, 0)
-    }
-
-    fn law(&self, _: usize) -> ContactLaw {
-        self.law
-    }
-
-    fn magnitude(&self, row: usize) -> T {
-        let Row { place, size, .. } = &self.rows[row];
-        place.iter().fold(*size, |most, x| most.max(x.abs()))
-    }
-
-    fn jacobian(&self, out: &mut ContactJacobian<T>) {
-        for row in &self.rows {
-            let mut entries = [(0, T::zero()); D];
-            let mut count = 0;
-            for (&dof, weight) in self.nodes[row.node].dofs.iter().zip(row.normal) {
-                // Across an axis-aligned normal a node does not act, and its dof need not be on the interface.
-                if weight != T::zero() {
-                    entries[count] = (dof, weight);
-                    count += 1;
-                }
-            }
-            out.push(&entries[..count]);
-        }
-    }
-
-    fn gap(&mut self, t: f64, u: &[T], out: &mut [T]) {
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         let [shift, ..] = self.motion(t);
-        for (row, gap) in self.rows.iter().zip(out) {
+        for (row, gap) in self.rows.iter().zip(gaps) {
             let place = minus(self.nodes[row.node].at(u), shift);
             *gap = row.distance + dot(row.normal, minus(place, row.place));
         }
+        Ok(())
     }
 
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) {
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let [shift, velocity, acceleration] = self.motion(t);
-        for (row, rates) in self.rows.iter().zip(out) {
+        for (row, rates) in self.rows.iter().zip(rates) {
             let node = &self.nodes[row.node];
             let curvature = self.obstacle.curvature(minus(node.at(u), shift), minus(node.of(v), velocity));
             *rates =
                 GapRates { rate: -dot(row.normal, velocity), acceleration: curvature - dot(row.normal, acceleration) };
         }
+        Ok(Rates::Given)
     }
+
+    fn variation(&self) -> Variation {
+        match self.obstacle.fixed_normal() {
+            Some(_) if self.reach.is_infinite() => Variation::Never,
+            Some(_) => Variation::BySearch,
+            None => Variation::Follows,
+        }
+    }
+}
+
+/// A vector with the axes that it does not have.
+fn in_space<T: Real, const D: usize>(x: [T; D]) -> [T; 3] {
+    std::array::from_fn(|axis| x.get(axis).copied().unwrap_or(T::zero()))
 }

@@ -37,19 +37,26 @@ impl<T> Default for ContactJacobian<T> {
     }
 }
 
+impl<T> ContactJacobian<T> {
+    pub(crate) fn clear(&mut self) {
+        self.pointers.truncate(1);
+        self.dofs.clear();
+        self.weights.clear();
+        self.places.clear();
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.pointers.len() - 1
+    }
+}
+
 impl<T: Real> ContactJacobian<T> {
     pub(crate) fn with_capacity(rows: usize, entries: usize) -> Self {
         let mut pointers = Vec::with_capacity(rows + 1);
         pointers.push(0);
         let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
         Self { pointers, dofs, weights: Vec::with_capacity(entries), places }
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.pointers.truncate(1);
-        self.dofs.clear();
-        self.weights.clear();
-        self.places.clear();
     }
 
     /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
@@ -60,7 +67,11 @@ impl<T: Real> ContactJacobian<T> {
 
     /// Appends a row of (dof, weight) pairs.
     pub fn push(&mut self, entries: &[(usize, T)]) {
-        for &(dof, weight) in entries {
+        self.push_entries(entries.iter().copied());
+    }
+
+    pub(crate) fn push_entries(&mut self, entries: impl Iterator<Item = (usize, T)>) {
+        for (dof, weight) in entries {
             self.dofs.push(dof);
             self.weights.push(weight);
         }
@@ -75,17 +86,25 @@ impl<T: Real> ContactJacobian<T> {
         self.places.clone_from(&other.places);
     }
 
-    /// Appends the rows of another one.
-    pub(crate) fn append(&mut self, other: &Self) {
+    /// Appends a row of another one.
+    pub(crate) fn push_row(&mut self, other: &Self, row: usize) {
+        let range = other.pointers[row]..other.pointers[row + 1];
+        self.dofs.extend_from_slice(&other.dofs[range.clone()]);
+        self.weights.extend_from_slice(&other.weights[range]);
+        self.pointers.push(self.dofs.len());
+    }
+
+    /// Appends the rows of another one, in which dofs are named by their place in a list.
+    pub(crate) fn append(&mut self, other: &Self, list: &[usize]) {
         let before = self.dofs.len();
-        self.dofs.extend_from_slice(&other.dofs);
+        self.dofs.extend(other.dofs.iter().map(|&place| list[place]));
         self.weights.extend_from_slice(&other.weights);
         self.pointers.extend(other.pointers[1..].iter().map(|end| before + end));
     }
 
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.pointers.len() - 1
+    /// Number of weights of all rows.
+    pub(crate) fn entries(&self) -> usize {
+        self.dofs.len()
     }
 
     /// The (dof, weight) pairs of a row.

@@ -15,10 +15,7 @@ pub enum Bound {
 
 impl From<ContactLaw> for Bound {
     fn from(law: ContactLaw) -> Self {
-        match law {
-            ContactLaw::Equality => Self::Free,
-            _ => Self::NonNegative,
-        }
+        if law.is_equality() { Self::Free } else { Self::NonNegative }
     }
 }
 

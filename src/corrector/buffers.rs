@@ -66,6 +66,20 @@ impl<T: Real> Buffers<T> {
         }
     }
 
+    /// Room for so many contacts.
+    pub(crate) fn make_room(&mut self, rows: usize) {
+        self.rates.resize(rows, GapRates::default());
+        self.gaps.resize(rows, T::zero());
+        let Self { closed, engaged, opened, released, reported, bounds, jump, tolerance, impulses, forces, .. } = self;
+        for list in [closed, engaged, opened, released] {
+            list.reserve(rows.saturating_sub(list.len()));
+        }
+        for values in [reported, jump, tolerance, impulses, forces] {
+            values.reserve(rows.saturating_sub(values.len()));
+        }
+        bounds.reserve(rows.saturating_sub(bounds.len()));
+    }
+
     /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
     pub(crate) fn report(&mut self, contacts: &ContactState<T>, first: bool) {
         if first {

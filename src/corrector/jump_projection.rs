@@ -309,6 +309,8 @@ impl<T: Real> JumpProjection<T> {
     pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         let Self { inverse, slots, columns, computed, dofs, .. } = self;
         if let InverseMass::Consistent { .. } = inverse {
+            let count = rows.iter().max().map_or(0, |last| last + 1);
+            slots.resize(count.max(slots.len()), NONE);
             for &row in rows {
                 if slots[row] == NONE {
                     if columns.len() == *computed {

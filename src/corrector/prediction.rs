@@ -3,7 +3,7 @@
 
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ContactLaw, ErasedGaps, rounding};
+use crate::contact::{ContactId, ContactJacobian, ErasedGaps, rounding};
 use crate::contact_solver::{Bound, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
@@ -61,9 +61,7 @@ impl<T: Real> Prediction<'_, T> {
     /// [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
     pub fn project(&mut self, extent: Extent) -> Result<()> {
         let count = self.ids.len();
-        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| {
-            matches!(constraints.0.law(row), ContactLaw::Rigid | ContactLaw::Equality)
-        };
+        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| constraints.0.law(row).is_plain();
         let mut rows = std::mem::take(&mut self.buffers.closed);
         let mut mu = std::mem::take(&mut self.buffers.impulses);
         rows.clear();

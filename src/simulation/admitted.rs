@@ -1,6 +1,6 @@
 //! Which contact laws a scheme can serve, and why not the others.
 
-use crate::contact::ContactLaw;
+use crate::contact::{ContactLaw, Measure};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::tableau::{ContactLevel, Tableau};
@@ -23,14 +23,14 @@ pub(crate) struct Admitted {
 impl Admitted {
     /// Refuses a law that the scheme cannot serve.
     pub(super) fn check(&self, law: ContactLaw) -> Result<()> {
-        let own = match law {
-            ContactLaw::Restitution { coefficient } if coefficient > 0.0 => self.no_restitution,
-            ContactLaw::RateCondition => self.no_start,
-            ContactLaw::PersistencySwitch => self.no_start.or(self.no_switch),
-            ContactLaw::StabilizedBipenalty { .. } => self.no_prediction,
-            _ => None,
-        };
-        match self.no_rigid.or(own).filter(|_| !law.is_compliant() || law.is_predictive()) {
+        let reasons = [
+            self.no_rigid.filter(|_| law.needs_multiplier()),
+            self.no_restitution.filter(|_| law.rebounds()),
+            self.no_start.filter(|_| law.reads_start()),
+            self.no_switch.filter(|_| law.measure(true) == Measure::Rate),
+            self.no_prediction.filter(|_| law.is_predictive()),
+        ];
+        match reasons.into_iter().flatten().next() {
             None => Ok(()),
             Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
         }

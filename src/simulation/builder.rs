@@ -20,7 +20,7 @@ use super::stability::{self, StepLimit};
 use super::start::{self, Begun, InitialOverclosure, Start, Violation};
 use super::supports::put_initial_supports;
 use super::tangent::{At, TangentOf};
-use super::workspace::Workspace;
+use super::workspace::{ContactSize, Workspace};
 #[cfg(doc)]
 use crate::analysis;
 use crate::contact::ContactConstraint;
@@ -342,14 +342,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             (t, &u[..], &v[..])
         };
         let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), admitted)?;
-        let rows = constraints.capacity();
         if self.stability == Stability::Checked {
             stability::check_scheme(&scheme.integrator.name(), &scheme.tableau)?;
         }
-        if rows > 0 {
+        if constraints.may_press() {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
-        let mut projection = start::projection(&*system, dofs, rows)?;
+        let mut projection = start::projection(&*system, dofs, constraints.room())?;
         let begun = if let Some((state, history)) = resumed {
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
@@ -365,6 +364,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
         let Begun { state, history, adjustment } = begun;
+        let rows = constraints.room();
         contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
@@ -384,8 +384,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
-        let contact = ([rows, constraints.entries()], constraints.interface().len());
-        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, contact, slots);
+        let (entries, interface) = (g.entries(), constraints.interface().len());
+        let size = ContactSize { rows, entries, interface, may_press: constraints.may_press() };
+        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
         if follows {
             let (name, interface) = (scheme.integrator.name(), constraints.interface());
             work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, interface)?);
@@ -396,7 +397,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.shown = scheme.shown(&state.motion);
         let is_balanced = self.balance == EnergyBalance::On;
         let ledger = is_balanced.then(|| Ledger::new(&mut *system, &state, (&constraints, &g))).transpose()?;
-        let judge = self.control.map(|control| judge(control, &scheme, rows, dofs)).transpose()?;
+        let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
         Ok(Simulation {
             system,
             constraints,
@@ -457,8 +458,8 @@ fn newton<T: Real>(
 }
 
 /// The judge of the steps of a run that controls them.
-fn judge<T: Real>(control: StepControl, scheme: &Scheme<'_>, rows: usize, dofs: usize) -> Result<Judge<T>> {
-    let local = control.estimates().then(|| local_error(scheme, rows)).transpose()?;
+fn judge<T: Real>(control: StepControl, scheme: &Scheme<'_>, may_press: bool, dofs: usize) -> Result<Judge<T>> {
+    let local = control.estimates().then(|| local_error(scheme, may_press)).transpose()?;
     Ok(Judge::new(control, local, dofs))
 }
 

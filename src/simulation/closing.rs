@@ -63,7 +63,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
             // Compliant contacts, and those on dofs without mass, leave no jump to correct.
-            if !law.is_compliant() && (massless.is_empty() || !g.acts_on(row, massless)) {
+            if law.leaves_jumps() && (massless.is_empty() || !g.acts_on(row, massless)) {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),
                     (false, true) => buffers.opened.push(row),

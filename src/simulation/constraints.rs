@@ -2,24 +2,26 @@
 
 use super::admitted::Admitted;
 use super::overclosures::Overclosures;
+use super::rate_differences::RateDifferences;
 use crate::contact::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, GapRates, NO_RESPONSE, Stride,
+    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, Contacts, GapRates, NO_RESPONSE, Rates,
+    Stride, Variation,
 };
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
-use crate::memory;
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
 
 /// The constraints in the order given, their rows one after the other.
 pub(crate) struct Constraints<'a, T: Real> {
-    parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+    parts: Vec<Part<'a, T>>,
     pub(crate) ids: Vec<ContactId>,
     laws: Vec<ContactLaw>,
     magnitudes: Vec<T>,
     /// Rows and rates of a constraint that is evaluated at another motion.
-    scratch: ContactJacobian<T>,
+    scratch: Contacts<T>,
     rates: Vec<GapRates<T>>,
+    local: Local<T>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
     /// For each dof of the system its place on the interface.
@@ -29,9 +31,78 @@ pub(crate) struct Constraints<'a, T: Real> {
     stale: bool,
     /// Counts how often the rows have been read.
     version: u64,
+    /// The number of rows that there is to be memory for.
+    room: usize,
+    /// How far the last search looks ahead.
+    ahead: f64,
+    differences: RateDifferences<T>,
     /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
     overclosures: Option<Overclosures<T>>,
     added: Vec<T>,
+}
+
+/// A constraint with what it has said.
+struct Part<'a, T: Real> {
+    constraint: Box<dyn ContactConstraint<T> + 'a>,
+    dofs: Vec<usize>,
+    contacts: Contacts<T>,
+    variation: Variation,
+    /// Where its rows are linearized: time and displacements.
+    place: (f64, Vec<T>),
+    /// Whether its rows may have changed since they were read.
+    stale: bool,
+    /// Whether it has left its rates to differences.
+    differenced: bool,
+}
+
+impl<T: Real> Part<'_, T> {
+    /// Moves the linearization to its own u.
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        if self.variation != Variation::Follows {
+            return Ok(Candidates::Unchanged);
+        }
+        self.settle(t, u);
+        self.constraint.follow(t, u)
+    }
+
+    /// Notes where the rows are linearized.
+    fn settle(&mut self, t: f64, u: &[T]) {
+        if self.variation == Variation::Follows {
+            self.place.0 = t;
+            self.place.1.clear();
+            self.place.1.extend_from_slice(u);
+        }
+    }
+}
+
+/// Vectors of a constraint.
+#[derive(Default)]
+struct Local<T> {
+    u: Vec<T>,
+    v: Vec<T>,
+    other: Vec<T>,
+}
+
+/// The entries of a vector of the system that belong to a constraint.
+fn gather<'l, T: Real>(dofs: &[usize], x: &[T], local: &'l mut Vec<T>) -> &'l [T] {
+    local.clear();
+    local.extend(dofs.iter().map(|&dof| x[dof]));
+    local
+}
+
+/// The error of a constraint, with its number in the names of contacts.
+fn of(constraint: usize, error: Error) -> Error {
+    match error {
+        Error::PassedThrough { t, h, contact, what, way, gap } => {
+            let contact = ContactId { constraint, ..contact };
+            Error::PassedThrough { t, h, contact, what, way, gap }
+        }
+        Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
+        Error::ContactNotFinite { t, what, contact, value } => {
+            Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }
+        }
+        other => other,
+    }
 }
 
 /// The place of a dof that no constraint has listed among those it may act on.
@@ -47,27 +118,40 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// The constraints after a search at (t, u, v), and room for the rows of their G (kept apart: corrections read G
     /// while they evaluate gaps), which the next search reads.
     pub(crate) fn new(
-        mut parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+        parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
         (t, u, v): (f64, &[T], &[T]),
         prescribed: &[usize],
         admitted: Admitted,
     ) -> Result<(Self, ContactJacobian<T>)> {
         let dofs = u.len();
-        for part in &mut parts {
-            part.check(dofs)?;
-            // Before its first search a constraint may have no rows.
-            part.search(t, u, v, 0.0)?;
-        }
-        let mut interface = Vec::new();
-        for part in &parts {
-            part.dofs(&mut interface);
-        }
-        if let Some(&dof) = interface.iter().find(|&&dof| dof >= dofs) {
-            return Err(Error::MissingDof { what: "a contact constraint", dof, dofs });
+        let mut places = vec![UNKNOWN; dofs];
+        let (mut seen, mut local) = (vec![usize::MAX; dofs], Local::default());
+        let (mut own, mut interface, mut room) = (Vec::with_capacity(parts.len()), Vec::new(), 0);
+        let mut scratch = Contacts::new();
+        for (number, mut constraint) in parts.into_iter().enumerate() {
+            let list = constraint.dofs().to_vec();
+            for &dof in &list {
+                match seen.get(dof) {
+                    None => return Err(Error::MissingContactDof { constraint: number, dof, dofs }),
+                    Some(&other) if other == number => {
+                        return Err(Error::RepeatedContactDof { constraint: number, dof });
+                    }
+                    Some(_) => seen[dof] = number,
+                }
+            }
+            let (u, v) = (gather(&list, u, &mut local.u), gather(&list, v, &mut local.v));
+            constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
+            interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
+            let contacts = Contacts::of(&constraint);
+            // (The memory of the largest.)
+            scratch.clear();
+            constraint.contacts(&mut scratch);
+            room += contacts.len();
+            let (variation, place) = (constraint.variation(), (t, u.to_vec()));
+            own.push(Part { constraint, dofs: list, contacts, variation, place, stale: true, differenced: false });
         }
         interface.sort_unstable();
         interface.dedup();
-        let mut places = vec![UNKNOWN; dofs];
         for &dof in &interface {
             places[dof] = NO_RESPONSE;
         }
@@ -75,42 +159,47 @@ impl<'a, T: Real> Constraints<'a, T> {
         for (place, &dof) in interface.iter().enumerate() {
             places[dof] = place;
         }
-        // (A sum that overflows is as absurd as one that does not fit into memory.)
-        let promised = |count: fn(&Box<dyn ContactConstraint<T> + 'a>) -> usize, what| {
-            parts.iter().map(count).try_fold(0_usize, usize::checked_add).ok_or(Error::OutOfMemory { what })
-        };
-        let rows = promised(ContactConstraint::max_candidates, "the contact problem")?;
-        let entries = promised(ContactConstraint::max_entries, "the contact Jacobian")?;
-        // Asked for once, so that an absurd promise is an error and not an abort: the largest block that is reserved.
-        memory::reserve::<(usize, T)>(entries.max(rows), 1, "the contact Jacobian")?;
-        let jacobian = ContactJacobian::with_capacity(rows, entries);
-        let (ids, laws, magnitudes) = (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
         let constraints = Self {
-            parts,
-            ids,
-            laws,
-            magnitudes,
-            scratch: ContactJacobian::with_capacity(rows, entries),
-            rates: vec![GapRates::default(); rows],
+            parts: own,
+            ids: Vec::with_capacity(room),
+            laws: Vec::with_capacity(room),
+            magnitudes: Vec::with_capacity(room),
+            scratch,
+            rates: vec![GapRates::default(); room],
+            local,
             interface,
             places,
             admitted,
             stale: true,
             version: 0,
+            room,
+            ahead: 0.0,
+            differences: RateDifferences::default(),
             overclosures: None,
             added: Vec::new(),
         };
-        Ok((constraints, jacobian))
+        Ok((constraints, ContactJacobian::default()))
     }
 
-    /// The largest number of rows there can be.
-    pub(crate) fn capacity(&self) -> usize {
-        self.parts.iter().map(ContactConstraint::max_candidates).sum()
+    /// The number of rows that there is to be memory for: more than there have ever been, and it grows by doubling.
+    pub(crate) fn room(&self) -> usize {
+        self.room
     }
 
-    /// The largest number of weights that all rows together can have.
-    pub(crate) fn entries(&self) -> usize {
-        self.parts.iter().map(ContactConstraint::max_entries).sum()
+    /// Whether any constraint may ever have rows.
+    pub(crate) fn may_press(&self) -> bool {
+        self.parts.iter().any(|part| !part.dofs.is_empty())
+    }
+
+    /// One of the constraints, in the order given.
+    pub(crate) fn part(&self, constraint: usize) -> Option<&dyn ContactConstraint<T>> {
+        self.parts.get(constraint).map(|part| &*part.constraint as &dyn ContactConstraint<T>)
+    }
+
+    /// The first row of a constraint, and its dofs.
+    pub(crate) fn rows_of_part(&self, constraint: usize) -> (usize, &[usize]) {
+        let first = self.parts[..constraint].iter().map(|part| part.contacts.len()).sum();
+        (first, &self.parts[constraint].dofs)
     }
 
     /// Finds the candidates of a step that imposes contact up to a time `ahead` of the motion.
@@ -120,27 +209,30 @@ impl<'a, T: Real> Constraints<'a, T> {
         ahead: f64,
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
-        for part in &mut self.parts {
+        let Self { parts, local, stale, .. } = self;
+        for (number, part) in parts.iter_mut().enumerate() {
+            let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
+            part.settle(motion.t, u);
+            let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
             // This is kept if a later part fails: the next search that succeeds reads the rows again.
-            self.stale |= part.search(motion.t, &motion.u, &motion.v, ahead)? == Candidates::Changed;
+            part.stale |= found == Candidates::Changed;
+            *stale |= part.stale;
         }
+        self.ahead = ahead;
         self.read_stale(jacobian)
     }
 
     /// Lets every constraint inspect the step that is about to be accepted.
     pub(crate) fn inspect(&mut self, [from, to]: [&Motion<T>; 2], closed: [&[bool]; 2]) -> Result<()> {
+        let Self { parts, local, .. } = self;
         let mut rest = closed;
-        for (constraint, part) in self.parts.iter_mut().enumerate() {
-            let count = part.candidates();
+        for (number, part) in parts.iter_mut().enumerate() {
+            let count = part.contacts.len();
             let (own, others) = (rest.map(|flags| &flags[..count]), rest.map(|flags| &flags[count..]));
-            let step = Stride { t: [from.t, to.t], u: [&from.u, &to.u], v: &from.v, closed: own };
-            part.inspect(&step).map_err(|error| match error {
-                Error::PassedThrough { t, h, contact, what, way, gap } => {
-                    let contact = ContactId { constraint, ..contact };
-                    Error::PassedThrough { t, h, contact, what, way, gap }
-                }
-                other => other,
-            })?;
+            let dofs = &part.dofs;
+            let u = [gather(dofs, &from.u, &mut local.u), gather(dofs, &to.u, &mut local.other)];
+            let step = Stride::new([from.t, to.t], u, gather(dofs, &from.v, &mut local.v), own);
+            part.constraint.inspect(&step).map_err(|error| of(number, error))?;
             rest = others;
         }
         Ok(())
@@ -148,31 +240,29 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Moves the linearization of the rows to u.
     pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
-        for constraint in 0..self.parts.len() {
-            let moved = self.follow_part(constraint, t, u);
+        for number in 0..self.parts.len() {
+            let moved = self.follow_part(number, t, u);
             // This is kept after an error, as in a search.
-            self.stale |= match &moved {
-                Ok(candidates) => *candidates == Candidates::Changed,
-                Err(_) => true,
-            };
+            let changed = !matches!(moved, Ok(Candidates::Unchanged));
+            self.parts[number].stale |= changed;
+            self.stale |= changed;
             moved?;
         }
         self.read_stale(jacobian)
     }
 
-    fn follow_part(&mut self, constraint: usize, t: f64, u: &[T]) -> Result<Candidates> {
-        self.parts[constraint].follow(t, u).map_err(|error| match error {
-            Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
-            Error::ContactNotFinite { t, what, contact, value } => {
-                Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }
-            }
-            other => other,
-        })
+    fn follow_part(&mut self, number: usize, t: f64, u: &[T]) -> Result<Candidates> {
+        let Self { parts, local, .. } = self;
+        let part = &mut parts[number];
+        if part.variation != Variation::Follows {
+            return Ok(Candidates::Unchanged);
+        }
+        part.follow(t, gather(&part.dofs, u, &mut local.u)).map_err(|error| of(number, error))
     }
 
     /// Whether rows never move within a step.
     pub(crate) fn is_affine(&self) -> bool {
-        self.parts.iter().all(ContactConstraint::is_affine)
+        self.parts.iter().all(|part| part.variation != Variation::Follows)
     }
 
     /// The version of the rows: what was computed from rows of another version is out of date.
@@ -189,59 +279,55 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(Candidates::Changed)
     }
 
-    /// Reads ids, laws and G of all rows, and refuses what does not fit the memory reserved or the system.
+    /// Reads names, laws and G of all rows, and refuses what does not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
         let Self { parts, ids, laws, magnitudes, places, admitted, stale, .. } = self;
-        let dofs = places.len();
         jacobian.clear();
         ids.clear();
         laws.clear();
         magnitudes.clear();
         *stale = true;
-        for (constraint, part) in parts.iter().enumerate() {
-            let candidates = part.candidates();
-            if candidates > part.max_candidates() {
-                let (expected, found) = (part.max_candidates(), candidates);
-                return Err(Error::Dimension { what: "the list of candidates (at most)", expected, found });
+        for (constraint, part) in parts.iter_mut().enumerate() {
+            let Part { contacts, dofs, .. } = part;
+            if part.stale {
+                contacts.clear();
+                part.constraint.contacts(contacts);
             }
-            let before = jacobian.rows();
-            part.jacobian(jacobian);
-            if jacobian.rows() - before != candidates {
-                let found = jacobian.rows() - before;
-                return Err(Error::Dimension { what: "the contact Jacobian", expected: candidates, found });
-            }
-            for row in 0..candidates {
-                let (feature, candidate) = part.identity(row);
-                ids.push(ContactId { constraint, feature, candidate });
-                let law = part.law(row);
+            for row in 0..contacts.len() {
+                let (feature, candidate) = contacts.name(row);
+                let contact = ContactId { constraint, feature, candidate };
+                ids.push(contact);
+                let law = contacts.law(row);
                 law.check()?;
                 law.check_scalar::<T>()?;
                 admitted.check(law)?;
                 laws.push(law);
-                let magnitude = part.magnitude(row);
+                let magnitude = contacts.magnitude(row);
                 if !magnitude.is_finite() {
                     let (what, value) = ("the magnitude of the coordinates of a contact row", magnitude.value());
-                    return Err(Error::NotFinite { what, index: before + row, value });
+                    return Err(Error::NotFinite { what, index: laws.len() - 1, value });
                 }
                 magnitudes.push(magnitude);
-                for (dof, weight) in jacobian.row(before + row) {
-                    if dof >= dofs {
-                        return Err(Error::MissingDof { what: "a contact row", dof, dofs });
-                    }
-                    if places[dof] == UNKNOWN {
-                        let contact = ContactId { constraint, feature, candidate };
-                        return Err(Error::UnannouncedDof { contact, dof });
-                    }
+                for (place, weight) in contacts.row(row) {
+                    let dof = match dofs.get(place) {
+                        Some(&dof) if places[dof] != UNKNOWN => dof,
+                        _ => return Err(Error::UnlistedPlace { contact, place }),
+                    };
                     if !weight.is_finite() {
                         let value = weight.value();
                         return Err(Error::NotFinite { what: "a weight of a contact row (by dof)", index: dof, value });
                     }
                 }
             }
+            jacobian.append(contacts.rows(), dofs);
         }
         jacobian.locate(places);
+        parts.iter_mut().for_each(|part| part.stale = false);
         *stale = false;
         self.version += 1;
+        if self.ids.len() > self.room {
+            self.room = self.ids.len().max(2 * self.room);
+        }
         self.distribute();
         Ok(())
     }
@@ -249,7 +335,6 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// Adds the depths at the start to the gaps from now on.
     pub(crate) fn adjust(&mut self, overclosures: Overclosures<T>) {
         self.overclosures = Some(overclosures);
-        self.added.reserve(self.capacity());
         self.distribute();
     }
 
@@ -293,10 +378,14 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Gaps of all rows, refusing NaN and infinity.
     pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
+        let Self { parts, local, .. } = self;
         let mut rest = &mut *out;
-        for part in &mut self.parts {
-            let (own, others) = rest.split_at_mut(part.candidates());
-            part.gap(t, u, own);
+        for (number, part) in parts.iter_mut().enumerate() {
+            let (own, others) = rest.split_at_mut(part.contacts.len());
+            if !own.is_empty() {
+                let u = gather(&part.dofs, u, &mut local.u);
+                part.constraint.gaps(t, u, own).map_err(|error| of(number, error))?;
+            }
             rest = others;
         }
         if let Some(overclosures) = &self.overclosures {
@@ -319,9 +408,9 @@ impl<'a, T: Real> Constraints<'a, T> {
     /// The parts of the gap rates of all rows that do not come from v and a, refusing NaN and infinity.
     pub(crate) fn finite_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
         let mut rest = &mut *out;
-        for part in &mut self.parts {
-            let (own, others) = rest.split_at_mut(part.candidates());
-            part.rates(t, u, v, own);
+        for number in 0..self.parts.len() {
+            let (own, others) = rest.split_at_mut(self.parts[number].contacts.len());
+            self.rates_of(number, (t, u, v), own)?;
             rest = others;
         }
         if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
@@ -339,6 +428,30 @@ impl<'a, T: Real> Constraints<'a, T> {
             }
         }
         Ok(())
+    }
+
+    /// What the gap rates of a constraint have of their own, as it says or from differences of its gaps.
+    fn rates_of(&mut self, number: usize, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) -> Result<()> {
+        if out.is_empty() {
+            return Ok(());
+        }
+        let Self { parts, local, differences, ahead, .. } = self;
+        let Part { constraint, dofs, contacts, variation, place, differenced, .. } = &mut parts[number];
+        let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
+        let found = match constraint.rates(t, u, v, out) {
+            Ok(Rates::Differences) => {
+                *differenced = true;
+                let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
+                differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out)
+            }
+            other => other.map(drop),
+        };
+        found.map_err(|error| of(number, error))
+    }
+
+    /// Whether the constraint of a row has given its rates when they were asked for.
+    pub(crate) fn gives_rates(&self, row: usize) -> bool {
+        !self.parts[self.ids[row].constraint].differenced
     }
 
     /// (contact, row) of the contacts of a state that are still candidates: a search may have changed these since.
@@ -393,30 +506,46 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
         out: &mut [T],
     ) -> Result<()> {
         let mut first = 0;
-        for constraint in 0..self.parts.len() {
-            let found = self.follow_part(constraint, t, u);
-            let Self { parts, scratch, rates, .. } = self;
-            let part = &mut parts[constraint];
-            let count = part.candidates();
-            let out = &mut out[first..first + count];
-            if field == 0 {
-                part.gap(t, u, out);
-            } else {
-                scratch.clear();
-                part.jacobian(scratch);
-                part.rates(t, u, v, &mut rates[..count]);
-                for (row, (out, own)) in out.iter_mut().zip(&*rates).enumerate() {
-                    *out = match field {
-                        1 => scratch.product(row, v) + own.rate,
-                        _ => scratch.product(row, a) + own.acceleration,
-                    };
+        for number in 0..self.parts.len() {
+            let found = self.follow_part(number, t, u).and_then(|_| {
+                let count = self.parts[number].contacts.len();
+                let out = &mut out[first..first + count];
+                if out.is_empty() {
+                    return Ok(());
                 }
-            }
+                if field == 0 {
+                    let Self { parts, local, .. } = self;
+                    let part = &mut parts[number];
+                    let u = gather(&part.dofs, u, &mut local.u);
+                    return part.constraint.gaps(t, u, out).map_err(|error| of(number, error));
+                }
+                let mut rates = std::mem::take(&mut self.rates);
+                rates.resize(count.max(rates.len()), GapRates::default());
+                let found = self.rates_of(number, (t, u, v), &mut rates[..count]);
+                let Self { parts, local, scratch, .. } = self;
+                let part = &mut parts[number];
+                let contacts = match part.variation {
+                    Variation::Follows => {
+                        scratch.clear();
+                        part.constraint.contacts(scratch);
+                        scratch
+                    }
+                    _ => &mut part.contacts,
+                };
+                let x = gather(&part.dofs, if field == 1 { v } else { a }, &mut local.other);
+                for (row, (out, own)) in out.iter_mut().zip(&rates).enumerate() {
+                    let own = if field == 1 { own.rate } else { own.acceleration };
+                    *out = contacts.rows().product(row, x) + own;
+                }
+                self.rates = rates;
+                found
+            });
             // Back to the same rows, after an error too: G need not be read again.
-            let back = self.follow_part(constraint, here.0, here.1);
+            let back = self.follow_part(number, here.0, here.1);
+            self.parts[number].stale |= back.is_err();
             self.stale |= back.is_err();
             found.and(back)?;
-            first += count;
+            first += self.parts[number].contacts.len();
         }
         if let Some(overclosures) = &self.overclosures {
             let share = T::of(overclosures.share(t)[field.min(2)]);

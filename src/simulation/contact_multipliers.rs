@@ -1,10 +1,10 @@
 //! The contact problem of a stage: which rows take part, and their multipliers.
 
-use super::contact_rows::{ContactRowsWork, Measure};
+use super::contact_rows::ContactRowsWork;
 use super::contact_step::{ContactStep, ContactWork};
 use super::interface::InterfaceWork;
 use super::operator::Operator;
-use crate::contact::ContactLaw;
+use crate::contact::{ContactLaw, Measure};
 use crate::contact_solver::{ContactFailure, ContactProblem};
 use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
@@ -64,25 +64,21 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                 let law = self.constraints.law(row);
-                match law {
-                    ContactLaw::PowerLaw { .. } => {
-                        let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
-                        let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
-                        let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
-                        let miss = (lambda - law.force(gap)).abs() * slope;
-                        if miss > tolerance[row] + rounded * depth {
-                            again = true;
-                            if miss > worst.1 {
-                                worst = (row, miss);
-                            }
-                        }
-                        (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
-                    }
-                    _ if pass < law.augmentations() => {
+                if law.is_nonlinear() {
+                    let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
+                    let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
+                    let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
+                    let miss = (lambda - law.force(gap)).abs() * slope;
+                    if miss > tolerance[row] + rounded * depth {
                         again = true;
-                        (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
+                        if miss > worst.1 {
+                            worst = (row, miss);
+                        }
                     }
-                    _ => {}
+                    (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
+                } else if pass < law.augmentations() {
+                    again = true;
+                    (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
                 }
             }
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {

@@ -3,27 +3,12 @@
 use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
 use super::program::{CompiledStage, ContactTarget};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates, Measure};
 use crate::contact_solver::{Bound, FORESEEN};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{Clock, Motion};
-
-/// What a row constrains in a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Measure {
-    /// What the scheme asks for: the gap, or h times its rate.
-    AsScheme,
-    /// The change of the gap since the start of the stage.
-    Increment,
-    /// h times the rate of the gap, by a scheme that asks for the gap.
-    Rate,
-    /// Nothing: the row is open in this stage.
-    Nothing,
-    /// Decided once the motion of the stage without contact is known.
-    Undecided,
-}
 
 /// Which rows a contact problem is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,34 +81,56 @@ impl<T: Real> ContactRowsWork<T> {
     /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of
     /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed ones.
     pub(super) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
-        let reserved = || Vec::with_capacity(rows);
-        let zero = || vec![T::zero(); rows];
-        Self {
-            rates: vec![GapRates::default(); rows],
-            y: zero(),
-            tolerance: zero(),
-            weight: zero(),
-            compliance: zero(),
-            shift: zero(),
-            balance_gap: zero(),
-            curved: CurvedRowsWork::new(rows, entries),
-            measure: vec![Measure::AsScheme; rows],
-            start_gap: zero(),
-            start_tolerance: zero(),
-            enabled: vec![true; rows],
-            in_problem: vec![false; rows],
+        let mut work = Self {
+            rates: Vec::new(),
+            y: Vec::new(),
+            tolerance: Vec::new(),
+            weight: Vec::new(),
+            compliance: Vec::new(),
+            shift: Vec::new(),
+            balance_gap: Vec::new(),
+            curved: CurvedRowsWork::new(),
+            measure: Vec::new(),
+            start_gap: Vec::new(),
+            start_tolerance: Vec::new(),
+            enabled: Vec::new(),
+            in_problem: Vec::new(),
             on_massless: Vec::new(),
-            problem: Vec::with_capacity(rows),
-            sorted: Vec::with_capacity(rows),
+            problem: Vec::new(),
+            sorted: Vec::new(),
             reserved: rows.min(FORESEEN),
             versions: 0,
-            offset: reserved(),
-            problem_tolerance: reserved(),
-            bounds: Vec::with_capacity(rows),
-            multipliers: reserved(),
+            offset: Vec::new(),
+            problem_tolerance: Vec::new(),
+            bounds: Vec::new(),
+            multipliers: Vec::new(),
             target: vec![T::zero(); target_dofs],
             forecast: vec![T::zero(); forecast_dofs],
             supports: vec![[T::zero(); 3]; supports],
+        };
+        work.make_room(rows, entries);
+        work
+    }
+
+    /// Memory for so many rows, of so many weights.
+    pub(super) fn make_room(&mut self, rows: usize, entries: usize) {
+        let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, start_gap, start_tolerance, .. } = self;
+        for values in [y, tolerance, weight, compliance, shift, balance_gap, start_gap, start_tolerance] {
+            values.resize(rows, T::zero());
+        }
+        rates.resize(rows, GapRates::default());
+        let Self { curved, measure, enabled, in_problem, on_massless, problem, bounds, .. } = self;
+        curved.make_room(rows, entries);
+        measure.resize(rows, Measure::AsScheme);
+        enabled.resize(rows, true);
+        in_problem.resize(rows, false);
+        if !on_massless.is_empty() {
+            on_massless.resize(rows, false);
+        }
+        problem.reserve(rows);
+        bounds.reserve(rows);
+        for values in [&mut self.offset, &mut self.problem_tolerance, &mut self.multipliers] {
+            values.reserve(rows);
         }
     }
 
@@ -162,12 +169,7 @@ impl<T: Real> ContactRowsWork<T> {
             // A contact at rest has a gap that is small beside the way that its force prevents: that from the gap at
             // the start to the gap of the free motion.
             let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
-            *measure = match (constraints.law(row), closed) {
-                (ContactLaw::RateCondition, true) => Measure::Increment,
-                (ContactLaw::RateCondition, false) => Measure::Nothing,
-                (ContactLaw::PersistencySwitch, true) => Measure::Rate,
-                _ => Measure::AsScheme,
-            };
+            *measure = constraints.law(row).measure(closed);
         }
     }
 

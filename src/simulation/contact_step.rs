@@ -226,14 +226,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
-        let restores = |law: ContactLaw| matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
-        let (Some(start), true) = (past.first(), constraints.laws().iter().any(|&law| restores(law))) else {
+        let (Some(start), true) = (past.first(), constraints.laws().iter().any(ContactLaw::rebounds)) else {
             return Ok(());
         };
         let h = T::of(clock.h);
         constraints.finite_rates(start.t, &start.u, &start.v, &mut rows.rates)?;
         for row in 0..constraints.len() {
-            if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
+            if let Some(coefficient) = constraints.law(row).restitution() {
                 let rate = g.product(row, &start.v) + T::of(lead) * h * g.product(row, &start.a) + rows.rates[row].rate;
                 rows.y[row] += T::of(coefficient) * h * rate;
                 rows.tolerance[row] += rounding(h * g.magnitude(row, &start.v));

@@ -73,16 +73,24 @@ pub(super) struct CurvedRowsWork<T> {
 }
 
 impl<T: Real> CurvedRowsWork<T> {
-    /// Memory for `rows` contacts with `entries` weights.
-    pub(super) fn new(rows: usize, entries: usize) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            rows: ContactJacobian::with_capacity(rows, entries),
+            rows: ContactJacobian::default(),
             version: 0,
             apart: false,
-            gaps: vec![T::zero(); rows],
-            foreseen: vec![T::zero(); rows],
+            gaps: Vec::new(),
+            foreseen: Vec::new(),
             miss: 0.0,
             worst: (0, T::zero()),
+        }
+    }
+
+    /// Memory for so many rows, of so many weights.
+    pub(super) fn make_room(&mut self, rows: usize, entries: usize) {
+        self.gaps.resize(rows, T::zero());
+        self.foreseen.resize(rows, T::zero());
+        if self.rows.rows() == 0 {
+            self.rows = ContactJacobian::with_capacity(rows, entries);
         }
     }
 

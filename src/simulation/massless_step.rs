@@ -5,7 +5,7 @@ use super::contact_step::{ContactStep, ContactWork};
 use super::massless::MasslessBlock;
 use super::stage::StageSolve;
 use super::stage_vectors::StageVectors;
-use crate::contact::{Candidates, ContactLaw};
+use crate::contact::Candidates;
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -101,8 +101,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         for (row, on_massless) in on_massless.iter_mut().enumerate().take(self.constraints.len()) {
             *on_massless = self.g.acts_on(row, &block.dofs);
             let law = self.constraints.law(row);
-            let rebounds = matches!(law, ContactLaw::Restitution { coefficient } if coefficient > 0.0);
-            if *on_massless && (rebounds || law.inertia() > 0.0) {
+            if *on_massless && (law.rebounds() || law.inertia() > 0.0) {
                 return Err(Error::Incompatible {
                     part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),
                     reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a \

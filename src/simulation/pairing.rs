@@ -70,13 +70,13 @@ pub(super) fn check_corrections<T: Real>(
 }
 
 /// What the local error of a scheme follows from; refused where contact would not show in it.
-pub(super) fn local_error(scheme: &Scheme<'_>, rows: usize) -> Result<LocalError> {
+pub(super) fn local_error(scheme: &Scheme<'_>, may_press: bool) -> Result<LocalError> {
     let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
     let refuse = |reason| {
         let part = format!("an estimate of the local error with {}", scheme.integrator.name());
         Err(Error::Incompatible { part, reason })
     };
-    if rows > 0 && ahead {
+    if may_press && ahead {
         return refuse(
             "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
         );
@@ -119,10 +119,9 @@ pub(super) fn check_lagged_damping<T: Real>(
 /// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
 /// known yet), on dofs with mass.
 pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
-    let rigid = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
-        && constraints.capacity() > 0
-        && (constraints.len() == 0 || constraints.laws().iter().any(rigid))
+        && constraints.may_press()
+        && (constraints.len() == 0 || constraints.laws().iter().any(ContactLaw::is_plain))
         && constraints.interface().iter().any(has_mass)
 }

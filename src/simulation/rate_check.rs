@@ -20,12 +20,17 @@ pub(super) struct RateCheck<T> {
 impl<T: Real> RateCheck<T> {
     /// Memory for `rows` rows.
     pub(super) fn new(rows: usize) -> Self {
-        Self {
-            before: vec![T::zero(); rows],
-            now: vec![T::zero(); rows],
-            rates: vec![GapRates::default(); rows],
-            silent: vec![false; rows],
-        }
+        let mut check = Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new() };
+        check.make_room(rows);
+        check
+    }
+
+    /// Memory for so many rows.
+    pub(super) fn make_room(&mut self, rows: usize) {
+        self.before.resize(rows, T::zero());
+        self.now.resize(rows, T::zero());
+        self.rates.resize(rows, GapRates::default());
+        self.silent.resize(rows, false);
     }
 
     /// Refuses rows whose gap, at fixed displacements, changes throughout the time h from a motion on while their rates
@@ -43,7 +48,7 @@ impl<T: Real> RateCheck<T> {
         let Self { before, now, rates, silent } = self;
         for (row, silent) in silent[..count].iter_mut().enumerate() {
             // The force of a spring does not depend on rates.
-            *silent = !(constraints.law(row).is_compliant() && constraints.law(row).inertia() == 0.0);
+            *silent = constraints.law(row).reads_rates();
         }
         let mut first = T::zero();
         let mut found = None;
@@ -58,7 +63,7 @@ impl<T: Real> RateCheck<T> {
             for row in 0..count {
                 let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
                 let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
-                silent[row] &= moves && rates[row].rate == T::zero();
+                silent[row] &= moves && rates[row].rate == T::zero() && constraints.gives_rates(row);
             }
             found = silent[..count].iter().position(|silent| *silent);
         }

@@ -8,7 +8,7 @@ use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, Start, Violation};
 use super::tangent::{At, TangentOf};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::FORESEEN;
 use crate::corrector::{Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
@@ -118,12 +118,11 @@ impl<T: Real> Simulation<'_, T> {
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        // Laws that read the gap where a stage starts may hold it at another value than zero.
-        let elsewhere = |law: ContactLaw| law.is_compliant() || law.reads_start();
-        let rigid = closed.map(|(_, row)| row).filter(|&row| !elsewhere(constraints.law(row)));
+        // Rows whose law reads the gap where a stage starts may hold it anywhere.
+        let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
-            let mut projection = start::projection(&**system, newest.u.len(), constraints.capacity())?;
+            let mut projection = start::projection(&**system, newest.u.len(), constraints.room())?;
             projection.close_rows(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
                 project(motion, constraints, g, &mut projection, &closed)?;
@@ -163,11 +162,11 @@ impl<T: Real> Simulation<'_, T> {
         let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        let mut projection = start::projection(&**system, u.len(), constraints.capacity())?;
+        let mut projection = start::projection(&**system, u.len(), constraints.room())?;
         let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
         let Begun { state: begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
-        work.contact.rows.reserved = constraints.capacity().min(FORESEEN);
+        work.contact.rows.reserved = constraints.room().min(FORESEEN);
         contact_solver.reserve(work.contact.rows.reserved);
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {

@@ -11,7 +11,7 @@ use super::results::{Energy, Statistics};
 use super::scheme::Scheme;
 use super::stability::StepLimit;
 use super::workspace::Workspace;
-use crate::contact::ContactJacobian;
+use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::ContactSolver;
 use crate::corrector::Corrector;
 use crate::error::{Error, Result};
@@ -119,6 +119,13 @@ impl<T: Real> Simulation<'_, T> {
     /// The system.
     pub fn system(&self) -> &dyn System<T> {
         &*self.system
+    }
+
+    /// A contact constraint, by its place in the order in which they were given: the first number of a
+    /// [`ContactId`](crate::contact::ContactId). (A host that wants to read its own constraint as what it is keeps it,
+    /// and gives a wrapper that shares it.)
+    pub fn constraint(&self, constraint: usize) -> Option<&dyn ContactConstraint<T>> {
+        self.constraints.part(constraint)
     }
 
     /// The iterations of Newton's method in the stage that was solved last, also if it failed; empty for linear systems

@@ -150,7 +150,7 @@ impl<T: Real> Start<'_, T> {
         constraints.check_rows(g, &prescribed, t, &motion.u)?;
         RateCheck::new(constraints.len()).check(constraints, &motion, h, g)?;
         projection.reset();
-        let mut contacts = ContactState::with_capacity(constraints.capacity());
+        let mut contacts = ContactState::with_capacity(constraints.room());
         contacts.reset(&constraints.ids);
         let mut touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
         let mut adjustment = None;
@@ -184,7 +184,7 @@ impl<T: Real> Start<'_, T> {
         // Springs in compression push from the start.
         for row in 0..constraints.len() {
             let law = constraints.law(row);
-            if law.is_compliant() && law.inertia() == 0.0 && !law.is_predictive() {
+            if law.is_spring() {
                 let force = law.force(contacts.gap[row]);
                 if force > T::zero() {
                     projection.prepare(g, &[row]);
@@ -249,8 +249,7 @@ fn touching_contacts<T: Real>(
         let rounded = T::of(INPUT) * constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
         let tolerance = rounded + T::of(1e-10 * h) * rate.abs();
         let law = constraints.law(row);
-        let may_be_inside = law.is_compliant() || law.reads_start();
-        let violated = !may_be_inside && gap < -tolerance || law.is_equality() && gap > tolerance;
+        let violated = !law.may_penetrate() && gap < -tolerance || law.is_equality() && gap > tolerance;
         match violation {
             Violation::Initial(InitialOverclosure::Refused) if violated => {
                 let contact = constraints.ids[row];

@@ -134,7 +134,7 @@ impl<T: Real> StartProblem<T> {
                 }
                 constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
                 for (row, (y, rate)) in y.iter_mut().zip(&rates).enumerate() {
-                    if let ContactLaw::Restitution { coefficient } = constraints.law(row) {
+                    if let Some(coefficient) = constraints.law(row).restitution() {
                         *y += T::of(coefficient) * (g.product(row, &motion.v) + rate.rate);
                     }
                 }
@@ -160,8 +160,7 @@ impl<T: Real> StartProblem<T> {
         }
         let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
         let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
-        let aims = |law: ContactLaw| !law.is_compliant() || law.is_predictive();
-        let aimed = |row: &usize| open[*row] && aims(constraints.law(*row));
+        let aimed = |row: &usize| open[*row] && constraints.law(*row).needs_multiplier();
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
         // (A mean gap changes by half of the response.)
         let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(T::one(), T::zero()).0;

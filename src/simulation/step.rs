@@ -20,9 +20,14 @@ use crate::tableau::impulse_weight;
 impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
     pub(super) fn attempt(&mut self) -> Result<Verdict> {
-        let Self { constraints, g, state, history, work, ledger, scheme, .. } = self;
+        let Self { constraints, g, state, history, work, ledger, scheme, contact_solver, .. } = self;
         history.clock.check()?;
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g)?;
+        if constraints.room() > work.rows {
+            work.make_room(constraints.room(), g.entries());
+            state.contacts.make_room(constraints.room());
+            contact_solver.reserve(constraints.room());
+        }
         work.contact.trial.carry_over(&state.contacts, &constraints.ids);
         if let Some(ledger) = ledger {
             ledger.begin(state);

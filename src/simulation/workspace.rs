@@ -1,4 +1,5 @@
-//! Memory of the steps: nothing in it changes a result, and nothing is allocated after it.
+//! Memory of the steps: nothing in it changes a result, and nothing is allocated after it but for more
+//! contacts than there have ever been.
 
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::ContactWork;
@@ -26,6 +27,8 @@ pub(super) struct Workspace<T: Real> {
     pub(super) block: Option<MasslessBlock<T>>,
     pub(super) correction: CorrectionWork<T>,
     pub(super) rate_check: RateCheck<T>,
+    /// The number of contacts that there is memory for.
+    pub(super) rows: usize,
     /// v and a at the time of the new state, where the scheme stores those of another time.
     pub(super) shown: [Vec<T>; 2],
     pub(super) backup: Backup<T>,
@@ -43,21 +46,32 @@ pub(super) struct CorrectionWork<T: Real> {
     pub(super) energy: T,
 }
 
+/// How much contact there is when memory is reserved.
+pub(super) struct ContactSize {
+    /// Rows that there is to be memory for, and weights of all of them.
+    pub(super) rows: usize,
+    pub(super) entries: usize,
+    /// Dofs that contact may ever act on.
+    pub(super) interface: usize,
+    /// Whether there may ever be a row.
+    pub(super) may_press: bool,
+}
+
 impl<T: Real> Workspace<T> {
-    /// Memory for the steps of a program, with `rows` contacts of `entries` weights in all, an `interface` of so many
-    /// dofs, and a history of so many `slots`.
+    /// Memory for the steps of a program, with a history of so many `slots`.
     pub(super) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
         correctors: &[Box<dyn Corrector<T> + '_>],
         projection: JumpProjection<T>,
-        ([rows, entries], interface): ([usize; 2], usize),
+        contact: &ContactSize,
         slots: usize,
     ) -> Self {
         let dofs = system.dofs();
+        let &ContactSize { rows, entries, interface, may_press } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
         let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
-        let room = |needed: bool| if needed && rows > 0 { dofs } else { 0 };
+        let room = |needed: bool| if needed && may_press { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
@@ -80,14 +94,27 @@ impl<T: Real> Workspace<T> {
             block: None,
             correction: CorrectionWork {
                 buffers: Buffers::new(rows, damped),
-                projection: (rows > 0 && !correctors.is_empty()).then_some(projection),
+                projection: (may_press && !correctors.is_empty()).then_some(projection),
                 projected_rows: 0,
                 shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
                 energy: T::zero(),
             },
             rate_check: RateCheck::new(rows),
+            rows,
             shown: [Vec::new(), Vec::new()],
             backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         }
+    }
+
+    /// Memory for so many contacts, of so many weights in all.
+    pub(super) fn make_room(&mut self, rows: usize, entries: usize) {
+        self.rows = rows;
+        self.contact.rows.make_room(rows, entries);
+        self.contact.trial.make_room(rows);
+        for flags in [&mut self.contact.closed_at_start, &mut self.contact.was_closed] {
+            flags.reserve(rows.saturating_sub(flags.len()));
+        }
+        self.correction.buffers.make_room(rows);
+        self.rate_check.make_room(rows);
     }
 }

@@ -3,6 +3,18 @@
 use crate::contact::ContactId;
 use crate::real::Real;
 
+/// What a contact does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ContactStatus {
+    /// Apart: no force.
+    Open,
+    /// Closed within rounding, and not pressed.
+    Touching,
+    /// Pressed (or, under an equality, held).
+    Closed,
+}
+
 /// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
@@ -30,6 +42,16 @@ impl<T: Real> ContactState<T> {
             lambda_v: reals(),
             lambda_a: reals(),
             dissipated: reals(),
+        }
+    }
+
+    /// Makes room for so many contacts in all.
+    pub(crate) fn make_room(&mut self, rows: usize) {
+        let Self { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated } = self;
+        ids.reserve(rows.saturating_sub(ids.len()));
+        closed.reserve(rows.saturating_sub(closed.len()));
+        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated] {
+            reals.reserve(rows.saturating_sub(reals.len()));
         }
     }
 
@@ -101,6 +123,15 @@ impl<T: Real> ContactState<T> {
     /// Whether a contact is closed: pressed (raw multiplier > 0) or touching within rounding.
     pub fn closed(&self) -> &[bool] {
         &self.closed
+    }
+
+    /// What a contact does, by its place in the lists.
+    pub fn status(&self, contact: usize) -> ContactStatus {
+        match (self.closed[contact], self.lambda_raw[contact] == T::zero()) {
+            (false, _) => ContactStatus::Open,
+            (true, true) => ContactStatus::Touching,
+            (true, false) => ContactStatus::Closed,
+        }
     }
 
     /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change

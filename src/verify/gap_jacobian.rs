@@ -1,7 +1,7 @@
 //! The rows of a constraint against differences of its gaps.
 
-use crate::contact::{Candidates, ContactConstraint, ContactJacobian, GapRates};
-use crate::error::Result;
+use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::resolution;
 
@@ -40,8 +40,7 @@ pub struct GapJacobianError {
 ///
 /// # Errors
 ///
-/// Those of the searches, and [`Error::MissingDof`](crate::Error::MissingDof) of
-/// [`check`](ContactConstraint::check).
+/// Those of the constraint, and [`Error::MissingContactDof`] for dofs that u and v do not have.
 ///
 /// ```
 /// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
@@ -62,16 +61,18 @@ pub fn gap_jacobian<T: Real>(
     v: &[T],
     step: f64,
 ) -> Result<GapJacobianError> {
-    constraint.check(u.len())?;
-    let mut watched = Watched { constraint, rows: None, unreported: 0 };
+    let dofs = constraint.dofs().to_vec();
+    if let Some(&dof) = dofs.iter().find(|&&dof| dof >= u.len()) {
+        return Err(Error::MissingContactDof { constraint: 0, dof, dofs: u.len() });
+    }
+    let [u, v]: [Vec<T>; 2] = [u, v].map(|x| dofs.iter().map(|&dof| x[dof]).collect());
+    let (u, v) = (&u[..], &v[..]);
+    let mut watched = Watched { constraint, contacts: None, unreported: 0 };
     watched.search(t, u, v)?;
-    let (ids, g) = watched.rows.clone().unwrap_or_default();
-    let rows = ids.len();
+    let found = watched.contacts.clone().unwrap_or_default();
+    let rows = found.len();
+    let ids: Vec<_> = (0..rows).map(|row| found.name(row)).collect();
     let constraint = &mut *watched.constraint;
-    let mut dofs = Vec::new();
-    constraint.dofs(&mut dofs);
-    dofs.sort_unstable();
-    dofs.dedup();
 
     let mut error = GapJacobianError {
         rows,
@@ -90,16 +91,18 @@ pub fn gap_jacobian<T: Real>(
     let delay = (t + delay.max(resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
-    constraint.rates(t, u, v, &mut rates);
-    constraint.gap(t - delay, u, &mut before);
-    constraint.gap(t + delay, u, &mut after);
-    for (rate, (&before, &after)) in rates.iter().zip(before.iter().zip(&after)) {
-        let difference = (after.value() - before.value()) / (2.0 * delay);
-        error.rate = error.rate.max((difference - rate.rate.value()).abs());
+    let given = rows > 0 && constraint.rates(t, u, v, &mut rates)? == Rates::Given;
+    if given {
+        constraint.gaps(t - delay, u, &mut before)?;
+        constraint.gaps(t + delay, u, &mut after)?;
+        for (rate, (&before, &after)) in rates.iter().zip(before.iter().zip(&after)) {
+            let difference = (after.value() - before.value()) / (2.0 * delay);
+            error.rate = error.rate.max((difference - rate.rate.value()).abs());
+        }
     }
 
     let mut displaced = u.to_vec();
-    if speed > 0.0 {
+    if speed > 0.0 && given {
         let delay = 100.0 * delay;
         let mut along = |time: f64| {
             for (x, (&u, &v)) in displaced.iter_mut().zip(u.iter().zip(v)) {
@@ -122,20 +125,20 @@ pub fn gap_jacobian<T: Real>(
         }
         displaced.copy_from_slice(u);
     }
-    for &dof in &dofs {
+    for (place, &dof) in dofs.iter().enumerate() {
         let mut gaps = [Vec::new(), Vec::new()];
-        let mut places = [0.0; 2];
-        for ((gaps, place), sign) in gaps.iter_mut().zip(&mut places).zip([-1.0, 1.0]) {
-            displaced[dof] = u[dof] + T::of(sign * step);
-            *place = displaced[dof].value();
+        let mut ends = [0.0; 2];
+        for ((gaps, at), sign) in gaps.iter_mut().zip(&mut ends).zip([-1.0, 1.0]) {
+            displaced[place] = u[place] + T::of(sign * step);
+            *at = displaced[place].value();
             *gaps = gaps_of(&mut watched, &ids, t, &displaced, v)?;
         }
-        displaced[dof] = u[dof];
+        displaced[place] = u[place];
         for row in 0..rows {
-            let entry: f64 = g.row(row).filter(|entry| entry.0 == dof).map(|entry| entry.1.value()).sum();
+            let entry: f64 = found.row(row).filter(|entry| entry.0 == place).map(|entry| entry.1.value()).sum();
             match (gaps[0][row], gaps[1][row]) {
                 (Some(before), Some(after)) => {
-                    let difference = ((after - before) / (places[1] - places[0]) - entry).abs();
+                    let difference = ((after - before) / (ends[1] - ends[0]) - entry).abs();
                     if difference > error.jacobian || !difference.is_finite() {
                         (error.jacobian, error.worst) = (difference, (ids[row], dof));
                     }
@@ -150,13 +153,10 @@ pub fn gap_jacobian<T: Real>(
     Ok(error)
 }
 
-/// Identities and G.
-type Found<T> = (Vec<(usize, usize)>, ContactJacobian<T>);
-
 /// A constraint, and what its last search has found.
 struct Watched<'c, T: Real> {
     constraint: &'c mut dyn ContactConstraint<T>,
-    rows: Option<Found<T>>,
+    contacts: Option<Contacts<T>>,
     /// Searches that changed rows and said that nothing has changed.
     unreported: usize,
 }
@@ -164,11 +164,9 @@ struct Watched<'c, T: Real> {
 impl<T: Real> Watched<'_, T> {
     fn search(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
         let said = self.constraint.search(t, u, v, 0.0)?;
-        let mut g = ContactJacobian::default();
-        self.constraint.jacobian(&mut g);
-        let ids = (0..self.constraint.candidates()).map(|row| self.constraint.identity(row)).collect();
-        let before = self.rows.replace((ids, g));
-        let changed = before.is_some() && before != self.rows;
+        let found = Contacts::of(&*self.constraint);
+        let changed = self.contacts.as_ref().is_some_and(|before| !before.has_rows_of(&found));
+        self.contacts = Some(found);
         self.unreported += usize::from(changed && said == Candidates::Unchanged);
         Ok(())
     }
@@ -183,13 +181,14 @@ fn gaps_of<T: Real>(
     v: &[T],
 ) -> Result<Vec<Option<f64>>> {
     watched.search(t, u, v)?;
-    let constraint = &mut *watched.constraint;
-    let mut found = vec![T::zero(); constraint.candidates()];
-    constraint.gap(t, u, &mut found);
+    let Watched { constraint, contacts: Some(contacts), .. } = watched else { return Ok(vec![None; ids.len()]) };
+    let mut found = vec![T::zero(); contacts.len()];
+    if !found.is_empty() {
+        constraint.gaps(t, u, &mut found)?;
+    }
     let mut gaps = vec![None; ids.len()];
     for (row, &gap) in found.iter().enumerate() {
-        let id = constraint.identity(row);
-        if let Some(at) = ids.iter().position(|other| *other == id) {
+        if let Some(at) = ids.iter().position(|other| *other == contacts.name(row)) {
             gaps[at] = Some(gap.value());
         }
     }

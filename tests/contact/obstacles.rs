@@ -1,11 +1,14 @@
 //! Nodes against rigid obstacles: geometry, motion of the obstacle, curved surfaces, bodies far away.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
-use contact_dynamics::contact::{Candidates, ContactJacobian, Cylinder, GapOffset, Obstacle, Plane, Side, Sphere};
+use contact_dynamics::contact::{
+    Candidates, ContactJacobian, Contacts, Cylinder, GapOffset, GapRates, Obstacle, Plane, Rates, Side, Sphere,
+};
 use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
     PersistencyCorrection, Result, Simulation, verify,
 };
+use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::sparse::free;
 use proptest::prelude::*;
 
@@ -65,30 +68,19 @@ fn jacobians_are_the_derivatives_of_the_gaps() {
 fn a_wrong_jacobian_is_found_with_its_worst_entry() {
     struct Wrong(LinearRows<'static, f64>);
     impl ContactConstraint<f64> for Wrong {
-        fn max_candidates(&self) -> usize {
-            self.0.max_candidates()
+        fn dofs(&self) -> &[usize] {
+            self.0.dofs()
         }
-        fn max_entries(&self) -> usize {
-            self.0.max_entries()
+        fn contacts(&self, contacts: &mut Contacts<f64>) {
+            contacts.push((0, 0), ContactLaw::Rigid, &[(0, 1.0)]);
+            contacts.push((1, 0), ContactLaw::Rigid, &[(1, -1.0), (2, 0.9)]); // the gap below says 1
         }
-        fn check(&self, dofs: usize) -> Result<()> {
-            self.0.check(dofs)
+        fn gaps(&mut self, t: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+            self.0.gaps(t, u, gaps)
         }
-        fn candidates(&self) -> usize {
-            self.0.candidates()
-        }
-        fn identity(&self, row: usize) -> (usize, usize) {
-            self.0.identity(row)
-        }
-        fn law(&self, row: usize) -> ContactLaw {
-            self.0.law(row)
-        }
-        fn jacobian(&self, out: &mut ContactJacobian<f64>) {
-            out.push(&[(0, 1.0)]);
-            out.push(&[(1, -1.0), (2, 0.9)]); // the gap below says 1
-        }
-        fn gap(&mut self, t: f64, u: &[f64], out: &mut [f64]) {
-            self.0.gap(t, u, out);
+        fn rates(&mut self, _: f64, _: &[f64], _: &[f64], rates: &mut [GapRates<f64>]) -> Result<Rates> {
+            rates.fill(GapRates::default());
+            Ok(Rates::Given)
         }
     }
     let offset = GapOffset::moving(|t| [1.0 + 3.0 * t, 0.0, 0.0]); // its rate is 3, not 0
@@ -217,12 +209,11 @@ fn bodies_far_away_are_no_candidates_and_cost_no_contact_problem() {
 fn planes_keep_their_rows() {
     let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
     let mut contact = on(floor, &[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]);
-    assert_eq!(contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Changed);
-    assert_eq!(contact.search(0.1, &[0.5; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.search_on(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search_on(0.1, &[0.5; 6], &[0.0; 6], 0.0).unwrap(), Candidates::Unchanged);
     // Only the normal dofs are eliminated last.
-    let mut dofs = Vec::new();
-    contact.dofs(&mut dofs);
-    assert_eq!(dofs, [2, 5]);
+    assert_eq!(contact.dofs(), [0, 1, 2, 3, 4, 5]);
+    assert!((0..6).all(|place| contact.only_reads(place) == (place % 3 < 2)));
 }
 
 #[test]
@@ -244,7 +235,7 @@ fn obstacles_refuse_what_is_no_geometry() {
     assert!(on(plane, &[[0.0; 2]]).reach(0.0).is_err());
     let contact = NodesOnObstacle::new(plane, &[[0.0; 2]], &[[6, 7]], &[0]).unwrap();
     let built = Simulation::builder(particles::<2>(1, 0.0), Composite, 0.1).constraint(contact).build();
-    assert!(matches!(built, Err(Error::MissingDof { .. })));
+    assert!(matches!(built, Err(Error::MissingContactDof { constraint: 0, dof: 6, dofs: 2 })));
 }
 
 /// Rows and gaps.
@@ -253,10 +244,9 @@ fn read<const D: usize>(
     t: f64,
     u: &[f64],
 ) -> (ContactJacobian<f64>, Vec<f64>) {
-    let (mut g, mut gaps) = (ContactJacobian::default(), vec![f64::INFINITY; contact.candidates()]);
-    contact.jacobian(&mut g);
+    let mut gaps = vec![f64::INFINITY; contact.candidates()];
     contact.gap(t, u, &mut gaps);
-    (g, gaps)
+    (contact.jacobian(), gaps)
 }
 
 /// Follows from one state to another, and compares with a search there.
@@ -266,16 +256,16 @@ fn check_follow<const D: usize>(
     (t, to): (f64, &[f64]),
 ) {
     let (mut contact, mut fresh) = (make(), make());
-    contact.search(0.0, from, from, 0.0).unwrap();
+    contact.search_on(0.0, from, from, 0.0).unwrap();
     let before = contact.candidates();
-    assert_eq!(contact.follow(t, to).unwrap(), Candidates::Changed);
-    fresh.search(t, to, to, 0.0).unwrap();
+    assert_eq!(contact.follow_on(t, to).unwrap(), Candidates::Changed);
+    fresh.search_on(t, to, to, 0.0).unwrap();
     assert_eq!(read(&mut contact, t, to), read(&mut fresh, t, to));
     assert!((0..before).all(|row| contact.identity(row) == (row, 0) && contact.magnitude(row) == fresh.magnitude(row)));
-    assert_eq!(contact.follow(t, to).unwrap(), Candidates::Unchanged);
-    assert_eq!(contact.search(t, to, to, 0.0).unwrap(), Candidates::Unchanged);
-    assert_eq!(contact.follow(0.0, from).unwrap(), Candidates::Changed);
-    assert_eq!(contact.search(t, to, to, 0.0).unwrap(), Candidates::Changed);
+    assert_eq!(contact.follow_on(t, to).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.search_on(t, to, to, 0.0).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.follow_on(0.0, from).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search_on(t, to, to, 0.0).unwrap(), Candidates::Changed);
 }
 
 proptest! {
@@ -306,9 +296,9 @@ fn planes_have_nothing_to_follow() {
         [[0.0, t], [0.0, 1.0], [0.0; 2]]
     });
     let u = [0.3, 0.2, 0.1, -0.4];
-    contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
+    contact.search_on(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
     let before = read(&mut contact, 0.5, &u);
-    assert_eq!(contact.follow(1.5, &u).unwrap(), Candidates::Unchanged);
+    assert_eq!(contact.follow_on(1.5, &u).unwrap(), Candidates::Unchanged);
     assert_eq!(before, read(&mut contact, 0.5, &u));
 }
 
@@ -316,12 +306,12 @@ fn planes_have_nothing_to_follow() {
 fn followed_nodes_stay_candidates_out_of_reach() {
     let ball = Sphere::new([0.0; 2], 1.0, Side::Outside).unwrap();
     let mut contact = on(ball, &[[0.0, 1.1], [3.0, 0.0], [1.2, 0.0]]).reach(0.5).unwrap();
-    contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap();
+    contact.search_on(0.0, &[0.0; 6], &[0.0; 6], 0.0).unwrap();
     let to = [0.0, 3.0, -1.8, 0.0, 0.1, 0.1];
-    contact.follow(0.0, &to).unwrap();
+    contact.follow_on(0.0, &to).unwrap();
     assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [0, 2]);
     assert!((read(&mut contact, 0.0, &to).1[0] - 3.1).abs() < 1e-14);
-    assert_eq!(contact.search(0.0, &to, &to, 0.0).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search_on(0.0, &to, &to, 0.0).unwrap(), Candidates::Changed);
     assert_eq!((0..2).map(|row| contact.identity(row).0).collect::<Vec<_>>(), [1, 2]);
 }
 
@@ -336,15 +326,15 @@ fn trial_states_without_a_distance_have_no_normal_and_are_said_to_have_none() {
         }
     }
     let mut contact = on(Half, &[[1.0, 1.0], [2.0, 1.0]]);
-    contact.search(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
+    contact.search_on(0.0, &[0.0; 4], &[0.0; 4], 0.0).unwrap();
     for (to, bad) in [([-2.0, 0.0, 0.0, 0.0], 0), ([0.0, 0.0, f64::NAN, 0.0], 1)] {
         let rows = read(&mut contact, 0.0, &[0.0; 4]).0;
-        match contact.follow(0.0, &to) {
+        match contact.follow_on(0.0, &to) {
             Err(Error::ContactNotFinite { what: "the normal", contact, .. }) => assert_eq!(contact.feature, bad),
             other => panic!("{other:?}"),
         }
         assert!(read(&mut contact, 0.0, &to).0 == rows);
-        contact.follow(0.0, &[0.0; 4]).unwrap();
+        contact.follow_on(0.0, &[0.0; 4]).unwrap();
         assert_eq!(read(&mut contact, 0.0, &[0.0; 4]).1, [1.0, 1.0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Wrong inputs: a typed error with the numbers, never a panic, and a failed step that leaves everything as it was.
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
-use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, GapOffset};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
@@ -194,7 +194,12 @@ fn empty_and_misplaced_parts_are_refused() {
     refused!(system().fix(2), Error::MissingDof { dof: 2, dofs: 2, .. }, "support");
     refused!(system().fix(1).unwrap().drive(1, |_| [0.0; 3]), Error::PrescribedTwice { dof: 1 }, "twice");
     let rows = LinearRows::new().unilateral(&[(0, 1.0)], 1.0).unilateral(&[(0, 1.0), (9, -1.0)], 1.0);
-    refused!(builder().constraint(rows).build(), Error::MissingDof { dof: 9, dofs: 2, .. }, "contact row", "dof 9");
+    refused!(
+        builder().constraint(rows).build(),
+        Error::MissingContactDof { constraint: 0, dof: 9, dofs: 2 },
+        "contact constraint 0",
+        "dof 9"
+    );
     let nowhere = LinearRows::new().unilateral(&[(0, 1.0)], 1.0).unilateral(&[], 1.0);
     refused!(builder().constraint(nowhere).build(), Error::EmptyContact { .. }, "0.1.0");
     let supported = Simulation::builder(system().fix(1).unwrap(), Composite, 0.01)
@@ -309,73 +314,44 @@ fn a_support_that_moves_to_nowhere_fails_the_step() {
 }
 
 #[test]
-fn reservations_beyond_memory_are_errors() {
-    struct Greedy;
-    impl ContactConstraint<f64> for Greedy {
-        fn max_candidates(&self) -> usize {
-            1 << 50
-        }
-        fn max_entries(&self) -> usize {
-            1
-        }
-        fn check(&self, _: usize) -> Result<()> {
-            Ok(())
-        }
-        fn candidates(&self) -> usize {
-            0
-        }
-        fn identity(&self, _: usize) -> (usize, usize) {
-            (0, 0)
-        }
-        fn law(&self, _: usize) -> ContactLaw {
-            ContactLaw::Rigid
-        }
-        fn jacobian(&self, _: &mut ContactJacobian<f64>) {}
-        fn gap(&mut self, _: f64, _: &[f64], _: &mut [f64]) {}
-    }
-    refused!(builder().constraint(Greedy).build(), Error::OutOfMemory { .. }, "memory");
-}
-
-#[test]
-fn a_constraint_that_breaks_its_promises_is_refused() {
+fn a_constraint_that_acts_where_it_has_no_dof_is_refused() {
     struct Liar {
-        candidates: usize,
-        rows: usize,
-        dof: usize,
+        dofs: Vec<usize>,
+        place: usize,
+        reads: usize,
     }
     impl ContactConstraint<f64> for Liar {
-        fn max_candidates(&self) -> usize {
-            2
+        fn dofs(&self) -> &[usize] {
+            &self.dofs
         }
-        fn max_entries(&self) -> usize {
-            2
+        fn only_reads(&self, place: usize) -> bool {
+            place == self.reads
         }
-        fn check(&self, _: usize) -> Result<()> {
+        fn contacts(&self, contacts: &mut Contacts<f64>) {
+            contacts.push((4, 0), ContactLaw::Rigid, &[(self.place, 1.0)]);
+        }
+        fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+            assert_eq!(u.len(), self.dofs.len());
+            gaps.fill(1.0);
             Ok(())
         }
-        fn candidates(&self) -> usize {
-            self.candidates
-        }
-        fn identity(&self, row: usize) -> (usize, usize) {
-            (row, 0)
-        }
-        fn law(&self, _: usize) -> ContactLaw {
-            ContactLaw::Rigid
-        }
-        fn jacobian(&self, out: &mut ContactJacobian<f64>) {
-            for _ in 0..self.rows {
-                out.push(&[(self.dof, 1.0)]);
-            }
-        }
-        fn gap(&mut self, _: f64, _: &[f64], out: &mut [f64]) {
-            out.fill(1.0);
-        }
     }
-    let build = |candidates, rows, dof| builder().constraint(Liar { candidates, rows, dof }).build();
-    refused!(build(3, 3, 0), Error::Dimension { expected: 2, found: 3, .. }, "candidates");
-    refused!(build(1, 2, 0), Error::Dimension { expected: 1, found: 2, .. }, "Jacobian");
-    refused!(build(1, 1, 7), Error::MissingDof { dof: 7, .. }, "contact constraint");
-    assert!(build(1, 1, 1).is_ok());
+    let build = |dofs: &[usize], place, reads| {
+        let first = LinearRows::new().unilateral(&[(0, 1.0)], 1.0);
+        builder().constraint(first).constraint(Liar { dofs: dofs.to_vec(), place, reads }).build()
+    };
+    refused!(build(&[1], 1, 9), Error::UnlistedPlace { place: 1, .. }, "1.4.0", "place 1");
+    refused!(build(&[0, 1], 1, 1), Error::UnlistedPlace { place: 1, .. }, "1.4.0", "only_reads");
+    refused!(
+        build(&[1, 7], 0, 9),
+        Error::MissingContactDof { constraint: 1, dof: 7, dofs: 2 },
+        "contact constraint 1",
+        "dof 7"
+    );
+    refused!(build(&[1, 0, 1], 0, 9), Error::RepeatedContactDof { constraint: 1, dof: 1 }, "constraint 1", "once");
+    // (What a constraint only reads another one may press.)
+    assert!(build(&[0, 1], 1, 0).is_ok());
+    assert!(build(&[1], 0, 9).is_ok());
 }
 
 /// A load that is NaN in some time window; the run before and after must be that of the good load.
@@ -434,7 +410,6 @@ fn a_failed_step_leaves_state_and_history_bit_for_bit() {
 fn gaps_that_are_not_finite_fail_the_step() {
     let rows = LinearRows::new()
         .unilateral(&[(0, 1.0)], GapOffset::moving(|t| [if t > 0.05 { f64::NAN } else { 1.0 }, 0.0, 0.0]));
-    assert_eq!(ContactConstraint::<f64>::max_candidates(&rows), 1);
     let mut run = builder().constraint(rows).build().unwrap();
     run.run_until(0.05, &mut ()).unwrap();
     let before = run.state().clone();

@@ -2,7 +2,7 @@
 #![allow(clippy::float_cmp)] // What is compared is untouched, or exact.
 
 use contact_dynamics::analysis;
-use contact_dynamics::contact::{ContactConstraint, ContactJacobian, ContactLaw, Cylinder, Obstacle, Side, Sphere};
+use contact_dynamics::contact::{ContactJacobian, ContactLaw, Cylinder, Obstacle, Side, Sphere};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::traits::ComplexField;
 use contact_dynamics::integrator::Newmark;
@@ -68,50 +68,6 @@ fn counts_beyond_reason_are_refused() {
     build(law(3)).unwrap().step().unwrap();
     for nodes in [1 << 33, 1 << 62, usize::MAX] {
         assert!(matches!(Frame::<f64>::new(nodes), Err(Error::OutOfMemory { .. })), "{nodes}");
-    }
-}
-
-/// Promises so many rows and entries, and has none.
-#[derive(Debug)]
-struct Promises(usize, usize);
-
-impl ContactConstraint<f64> for Promises {
-    fn max_candidates(&self) -> usize {
-        self.0
-    }
-    fn max_entries(&self) -> usize {
-        self.1
-    }
-    fn check(&self, _: usize) -> Result<()> {
-        Ok(())
-    }
-    fn dofs(&self, _: &mut Vec<usize>) {}
-    fn candidates(&self) -> usize {
-        0
-    }
-    fn identity(&self, row: usize) -> (usize, usize) {
-        (row, 0)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, _: &mut ContactJacobian<f64>) {}
-    fn gap(&mut self, _: f64, _: &[f64], _: &mut [f64]) {}
-    fn rates(&mut self, _: f64, _: &[f64], _: &[f64], _: &mut [contact_dynamics::contact::GapRates<f64>]) {}
-}
-
-#[test]
-fn promises_that_overflow_together_are_refused() {
-    // Alone, and with a second one beyond the range of numbers.
-    for (first, second) in
-        [((usize::MAX, 0), (0, 0)), ((usize::MAX, 0), (2, 0)), ((1, usize::MAX), (1, 2)), ((0, usize::MAX), (0, 0))]
-    {
-        let build = Simulation::builder(ball::<f64>(), Composite, 0.1)
-            .constraint(Promises(first.0, first.1))
-            .constraint(Promises(second.0, second.1))
-            .uncorrected()
-            .build();
-        assert!(matches!(build, Err(Error::OutOfMemory { .. })), "{first:?} {second:?}");
     }
 }
 

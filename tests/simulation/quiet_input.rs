@@ -1,12 +1,13 @@
 //! Input that could be read in two ways: refused, or read in the one way that all parts share.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
-use contact_dynamics::contact::{Candidates, ContactJacobian, GapOffset, GapRates};
+use contact_dynamics::contact::{Candidates, Contacts, GapOffset, GapRates, Rates};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Composite, ContactConstraint, ContactLaw, Error, LinearRows, Mass, Newmark, PersistencyCorrection, Result,
     Simulation, StepControl, System, TangentWeights, verify,
 };
+use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::sparse::{free, matrix};
 use std::cell::Cell;
 use std::f64::consts::TAU;
@@ -15,9 +16,7 @@ use std::f64::consts::TAU;
 fn normals_of_pairs_have_any_length() {
     let row = |normal: [f64; 2]| {
         let rows = LinearRows::new().pair(ContactLaw::Rigid, [0, 1], [2, 3], normal, 0.25)?;
-        let mut g = ContactJacobian::default();
-        rows.jacobian(&mut g);
-        Ok::<_, Error>(g)
+        Ok::<_, Error>(rows.jacobian())
     };
     let unit = row([0.6, 0.8]).unwrap();
     for length in [1e-200, 0.5, 2.0, 1e200] {
@@ -116,37 +115,22 @@ struct Sleeping {
 }
 
 impl ContactConstraint<f64> for Sleeping {
-    fn max_candidates(&self) -> usize {
-        1
-    }
-    fn max_entries(&self) -> usize {
-        1
-    }
-    fn check(&self, _: usize) -> Result<()> {
-        Ok(())
+    fn dofs(&self) -> &[usize] {
+        &[1, 0]
     }
     fn search(&mut self, _: f64, u: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         // Supports are in place.
-        assert_eq!(u[1], 0.125);
+        assert_eq!(u[0], 0.125);
         self.awake.set(true);
         Ok(Candidates::Unchanged)
     }
-    fn candidates(&self) -> usize {
-        assert!(self.awake.get());
-        1
-    }
-    fn identity(&self, _: usize) -> (usize, usize) {
-        (0, 0)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, out: &mut ContactJacobian<f64>) {
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
         assert!(self.awake.get(), "no rows before the first search");
-        out.push(&[(0, 1.0)]);
+        contacts.push((0, 0), ContactLaw::Rigid, &[(1, 1.0)]);
     }
-    fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
-        out[0] = 1.0 + u[0];
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = 1.0 + u[1];
+        Ok(())
     }
 }
 
@@ -293,14 +277,8 @@ fn searches_that_keep_a_change_for_themselves_are_found() {
         says: Candidates,
     }
     impl ContactConstraint<f64> for Turning {
-        fn max_candidates(&self) -> usize {
-            1
-        }
-        fn max_entries(&self) -> usize {
-            2
-        }
-        fn check(&self, _: usize) -> Result<()> {
-            Ok(())
+        fn dofs(&self) -> &[usize] {
+            &[0, 1]
         }
         fn search(&mut self, _: f64, u: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
             let [x, y] = [1.0 + u[0], u[1]];
@@ -308,26 +286,19 @@ fn searches_that_keep_a_change_for_themselves_are_found() {
             (self.normal, self.gap, self.place) = ([x / r, y / r], r - 0.5, [u[0], u[1]]);
             Ok(self.says)
         }
-        fn candidates(&self) -> usize {
-            1
+        fn contacts(&self, contacts: &mut Contacts<f64>) {
+            contacts.push((0, 0), ContactLaw::Rigid, &[(0, self.normal[0]), (1, self.normal[1])]);
         }
-        fn identity(&self, _: usize) -> (usize, usize) {
-            (0, 0)
+        fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+            gaps[0] = self.gap + (0..2).map(|k| self.normal[k] * (u[k] - self.place[k])).sum::<f64>();
+            Ok(())
         }
-        fn law(&self, _: usize) -> ContactLaw {
-            ContactLaw::Rigid
-        }
-        fn jacobian(&self, out: &mut ContactJacobian<f64>) {
-            out.push(&[(0, self.normal[0]), (1, self.normal[1])]);
-        }
-        fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
-            out[0] = self.gap + (0..2).map(|k| self.normal[k] * (u[k] - self.place[k])).sum::<f64>();
-        }
-        fn rates(&mut self, _: f64, u: &[f64], v: &[f64], out: &mut [GapRates<f64>]) {
+        fn rates(&mut self, _: f64, u: &[f64], v: &[f64], rates: &mut [GapRates<f64>]) -> Result<Rates> {
             let [x, y] = [1.0 + u[0], u[1]];
             let r = x.hypot(y);
             let across = (x * v[1] - y * v[0]) / r;
-            out[0] = GapRates { rate: 0.0, acceleration: across * across / r };
+            rates[0] = GapRates { rate: 0.0, acceleration: across * across / r };
+            Ok(Rates::Given)
         }
     }
     for (says, expected) in [(Candidates::Changed, false), (Candidates::Unchanged, true)] {

@@ -1,6 +1,6 @@
 //! A host's own parts behind every trait, chosen at run time, in both precisions.
 
-use contact_dynamics::contact::{Candidates, ContactConstraint, ContactJacobian, ContactLaw};
+use contact_dynamics::contact::{Candidates, ContactConstraint, ContactLaw, Contacts};
 use contact_dynamics::contact_solver::{ContactFailure, ContactProblem};
 use contact_dynamics::corrector::Correction;
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -86,46 +86,24 @@ struct Floor {
 }
 
 impl<T: Real> ContactConstraint<T> for Floor {
-    fn max_candidates(&self) -> usize {
-        1
-    }
-    fn max_entries(&self) -> usize {
-        1
-    }
-    fn check(&self, dofs: usize) -> Result<()> {
-        assert_eq!(dofs, 1);
-        Ok(())
-    }
-    fn dofs(&self, out: &mut Vec<usize>) {
-        out.extend([0]);
+    fn dofs(&self) -> &[usize] {
+        &[0]
     }
     fn search(&mut self, _: f64, u: &[T], _: &[T], _: f64) -> Result<Candidates> {
+        assert_eq!(u.len(), 1);
         let near = u[0].value() < -0.5 * self.depth;
         let changed = near != self.near;
         self.near = near;
-        Ok(match changed {
-            true => Candidates::Changed,
-            false => Candidates::Unchanged,
-        })
+        Ok(Candidates::changed_if(changed))
     }
-    fn candidates(&self) -> usize {
-        usize::from(self.near)
-    }
-    fn identity(&self, _: usize) -> (usize, usize) {
-        (7, 3)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, out: &mut ContactJacobian<T>) {
+    fn contacts(&self, contacts: &mut Contacts<T>) {
         if self.near {
-            out.push(&[(0, T::one())]);
+            contacts.push((7, 3), ContactLaw::Rigid, &[(0, T::one())]);
         }
     }
-    fn gap(&mut self, _: f64, u: &[T], out: &mut [T]) {
-        if let Some(gap) = out.first_mut() {
-            *gap = u[0] + T::of(self.depth);
-        }
+    fn gaps(&mut self, _: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        gaps[0] = u[0] + T::of(self.depth);
+        Ok(())
     }
 }
 
@@ -346,40 +324,25 @@ impl Floors {
 }
 
 impl ContactConstraint<f64> for Floors {
-    fn max_candidates(&self) -> usize {
-        2
-    }
-    fn max_entries(&self) -> usize {
-        2
-    }
-    fn check(&self, _: usize) -> Result<()> {
-        Ok(())
-    }
-    fn dofs(&self, out: &mut Vec<usize>) {
-        out.extend([0, 1]);
+    fn dofs(&self) -> &[usize] {
+        &[0, 1]
     }
     fn search(&mut self, _: f64, u: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         let near = [0, 1].map(|mass| u[mass] < 0.3 - self.depths[mass]);
-        let found = if near == self.near { Candidates::Unchanged } else { Candidates::Changed };
+        let changed = near != self.near;
         self.near = near;
-        Ok(found)
+        Ok(Candidates::changed_if(changed))
     }
-    fn candidates(&self) -> usize {
-        self.rows().count()
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        for mass in self.rows() {
+            contacts.push((mass, 0), ContactLaw::Rigid, &[(mass, 1.0)]);
+        }
     }
-    fn identity(&self, row: usize) -> (usize, usize) {
-        (self.rows().nth(row).unwrap(), 0)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, out: &mut ContactJacobian<f64>) {
-        self.rows().for_each(|mass| out.push(&[(mass, 1.0)]));
-    }
-    fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
-        for (mass, gap) in self.rows().zip(out) {
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        for (mass, gap) in self.rows().zip(gaps) {
             *gap = u[mass] + self.depths[mass];
         }
+        Ok(())
     }
 }
 
@@ -387,14 +350,8 @@ impl ContactConstraint<f64> for Floors {
 struct Moody(Arc<AtomicUsize>);
 
 impl ContactConstraint<f64> for Moody {
-    fn max_candidates(&self) -> usize {
-        0
-    }
-    fn max_entries(&self) -> usize {
-        0
-    }
-    fn check(&self, _: usize) -> Result<()> {
-        Ok(())
+    fn dofs(&self) -> &[usize] {
+        &[]
     }
     fn search(&mut self, _: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         match self.0.load(Ordering::Relaxed) {
@@ -402,17 +359,10 @@ impl ContactConstraint<f64> for Moody {
             _ => Err(Error::Host { callback: "search", source: "moody".into() }),
         }
     }
-    fn candidates(&self) -> usize {
-        0
+    fn contacts(&self, _: &mut Contacts<f64>) {}
+    fn gaps(&mut self, _: f64, _: &[f64], _: &mut [f64]) -> Result<()> {
+        Ok(())
     }
-    fn identity(&self, _: usize) -> (usize, usize) {
-        (0, 0)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, _: &mut ContactJacobian<f64>) {}
-    fn gap(&mut self, _: f64, _: &[f64], _: &mut [f64]) {}
 }
 
 #[test]
@@ -482,38 +432,19 @@ struct Relay {
 }
 
 impl ContactConstraint<f64> for Relay {
-    fn max_candidates(&self) -> usize {
-        1
-    }
-    fn max_entries(&self) -> usize {
-        1
-    }
-    fn check(&self, _: usize) -> Result<()> {
-        Ok(())
-    }
-    fn dofs(&self, out: &mut Vec<usize>) {
-        out.extend([0, 1]);
+    fn dofs(&self) -> &[usize] {
+        &[0, 1]
     }
     fn search(&mut self, t: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
         let mass = usize::from(t > 0.15);
-        let found = if mass == self.mass { Candidates::Unchanged } else { Candidates::Changed };
-        self.mass = mass;
-        Ok(found)
+        Ok(Candidates::changed_if(std::mem::replace(&mut self.mass, mass) != mass))
     }
-    fn candidates(&self) -> usize {
-        1
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        contacts.push((self.mass, 0), ContactLaw::Rigid, &[(self.mass, 1.0)]);
     }
-    fn identity(&self, _: usize) -> (usize, usize) {
-        (self.mass, 0)
-    }
-    fn law(&self, _: usize) -> ContactLaw {
-        ContactLaw::Rigid
-    }
-    fn jacobian(&self, out: &mut ContactJacobian<f64>) {
-        out.push(&[(self.mass, 1.0)]);
-    }
-    fn gap(&mut self, _: f64, u: &[f64], out: &mut [f64]) {
-        out[0] = u[self.mass] + [0.1, 0.5][self.mass];
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = u[self.mass] + [0.1, 0.5][self.mass];
+        Ok(())
     }
 }
 

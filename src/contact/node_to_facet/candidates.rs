@@ -9,16 +9,16 @@ use crate::real::Real;
 impl<T: Real> NodeToFacet<T> {
     /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
     pub(super) fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
-        let Self { dimension, coordinates, dofs, positions, built_at, bodies, .. } = self;
+        let Self { dimension, coordinates, system_dofs, dofs, positions, built_at, bodies, .. } = self;
         let (mut boxes, mut motions) = ([Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
         for ((body, bounds), motion) in bodies.iter().zip(&mut boxes).zip(&mut motions) {
             for &node in body {
                 let mut x = coordinates[node];
-                for (x, &dof) in x.iter_mut().zip(&dofs[node][..*dimension]) {
+                for (axis, (x, &dof)) in x.iter_mut().zip(&dofs[node][..*dimension]).enumerate() {
                     *x += u[dof].value();
                     if !x.is_finite() {
                         let what = "the displacement of a contact surface (by dof)";
-                        return Err(Error::NotFinite { what, index: dof, value: u[dof].value() });
+                        return Err(Error::NotFinite { what, index: system_dofs[node][axis], value: u[dof].value() });
                     }
                 }
                 positions[node] = x;

@@ -10,6 +10,7 @@ pub mod hyperelastic;
 pub mod large;
 pub mod masses;
 pub mod measure;
+pub mod on_system;
 pub mod output;
 pub mod particles;
 pub mod plot;
@@ -26,3 +27,4 @@ pub mod wall_bar;
 
 pub use bars::{Bars, MassKind};
 pub use measure::{Figures, Record, record};
+pub use on_system::OnSystem;

@@ -1,0 +1,201 @@
+//! What a constraint says of its candidates: names, laws, rows, and what is drawn of them.
+
+use super::{ContactConstraint, ContactJacobian, ContactLaw};
+use crate::real::Real;
+
+/// What a constraint says of its candidates, in their order: filled by
+/// [`ContactConstraint::contacts`], one [`push`](Self::push) a candidate.
+///
+/// Rows name dofs by their *place* in [`ContactConstraint::dofs`], not by their number in the system.
+///
+/// ```
+/// use contact_dynamics::ContactLaw;
+/// use contact_dynamics::contact::Contacts;
+///
+/// let mut contacts = Contacts::new();
+/// // A node (dofs at places 0 and 1) against a slope, and a spring between two others.
+/// contacts.push((7, 0), ContactLaw::Rigid, &[(0, 0.6), (1, 0.8)]).tangent(&[(0, 0.8), (1, -0.6)]).magnitude(2.0);
+/// contacts.push((8, 0), ContactLaw::Penalty { stiffness: 1e3 }, &[(2, -1.0), (3, 1.0)]);
+/// assert_eq!((contacts.len(), contacts.name(1)), (2, (8, 0)));
+/// assert_eq!(contacts.row(0).collect::<Vec<_>>(), [(0, 0.6), (1, 0.8)]);
+/// assert_eq!(contacts.tangents(0).len(), 1);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contacts<T> {
+    names: Vec<(usize, usize)>,
+    laws: Vec<ContactLaw>,
+    rows: ContactJacobian<T>,
+    magnitudes: Vec<T>,
+    tangents: ContactJacobian<T>,
+    /// Where the tangents of each contact begin.
+    first_tangents: Vec<usize>,
+    positions: Vec<Option<[T; 3]>>,
+    normals: Vec<Option<[T; 3]>>,
+}
+
+impl<T> Default for Contacts<T> {
+    fn default() -> Self {
+        Self {
+            names: Vec::new(),
+            laws: Vec::new(),
+            rows: ContactJacobian::default(),
+            magnitudes: Vec::new(),
+            tangents: ContactJacobian::default(),
+            first_tangents: Vec::new(),
+            positions: Vec::new(),
+            normals: Vec::new(),
+        }
+    }
+}
+
+impl<T: Real> Contacts<T> {
+    /// None yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What a constraint says now, for hosts that look at a constraint themselves.
+    pub fn of(constraint: &(impl ContactConstraint<T> + ?Sized)) -> Self {
+        let mut contacts = Self::new();
+        constraint.contacts(&mut contacts);
+        contacts
+    }
+
+    /// Forgets all, and keeps the memory.
+    pub fn clear(&mut self) {
+        let Self { names, laws, rows, magnitudes, tangents, first_tangents, positions, normals } = self;
+        names.clear();
+        laws.clear();
+        rows.clear();
+        magnitudes.clear();
+        tangents.clear();
+        first_tangents.clear();
+        positions.clear();
+        normals.clear();
+    }
+
+    /// Appends a candidate: its name (feature, candidate), which identifies it from step to step
+    /// ([`ContactId`](super::ContactId)), its law, and its row of G, the derivative of the gap, as (place, weight)
+    /// pairs.
+    pub fn push(&mut self, name: (usize, usize), law: ContactLaw, row: &[(usize, T)]) -> Contact<'_, T> {
+        self.rows.push(row);
+        self.finish(name, law)
+    }
+
+    /// The same with a row of a matrix.
+    pub(crate) fn push_row(
+        &mut self,
+        name: (usize, usize),
+        law: ContactLaw,
+        (g, row): (&ContactJacobian<T>, usize),
+    ) -> Contact<'_, T> {
+        self.rows.push_row(g, row);
+        self.finish(name, law)
+    }
+
+    fn finish(&mut self, name: (usize, usize), law: ContactLaw) -> Contact<'_, T> {
+        self.names.push(name);
+        self.laws.push(law);
+        self.magnitudes.push(T::zero());
+        self.first_tangents.push(self.tangents.rows());
+        self.positions.push(None);
+        self.normals.push(None);
+        Contact { contacts: self }
+    }
+
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether there is no candidate.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+
+    /// (feature, candidate) of a candidate.
+    pub fn name(&self, contact: usize) -> (usize, usize) {
+        self.names[contact]
+    }
+
+    /// The law of a candidate.
+    pub fn law(&self, contact: usize) -> ContactLaw {
+        self.laws[contact]
+    }
+
+    /// The (place, weight) pairs of the row of G of a candidate.
+    pub fn row(&self, contact: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        self.rows.row(contact)
+    }
+
+    /// All rows of G; the dofs that they name are places.
+    pub(crate) fn rows(&self) -> &ContactJacobian<T> {
+        &self.rows
+    }
+
+    /// Whether names and rows are those of another list.
+    pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
+        self.names == other.names && self.rows == other.rows
+    }
+
+    /// What [`Contact::magnitude`] was given; zero if nothing.
+    pub fn magnitude(&self, contact: usize) -> T {
+        self.magnitudes[contact]
+    }
+
+    /// The rows of [`Contact::tangent`], as (place, weight) pairs.
+    pub fn tangents(&self, contact: usize) -> Vec<Vec<(usize, T)>> {
+        let end = self.first_tangents.get(contact + 1).copied().unwrap_or(self.tangents.rows());
+        (self.first_tangents[contact]..end).map(|row| self.tangents.row(row).collect()).collect()
+    }
+
+    /// Where a contact is, if its constraint has said so.
+    pub fn position(&self, contact: usize) -> Option<[T; 3]> {
+        self.positions[contact]
+    }
+
+    /// The normal of a contact in space, if its constraint has said so.
+    pub fn normal(&self, contact: usize) -> Option<[T; 3]> {
+        self.normals[contact]
+    }
+}
+
+/// A candidate that was pushed last: what else there is to say of it.
+#[derive(Debug)]
+pub struct Contact<'c, T> {
+    contacts: &'c mut Contacts<T>,
+}
+
+impl<T: Real> Contact<'_, T> {
+    /// A row beside the normal one, orthogonal to it, along which bodies slide: (place, weight) pairs. One in the
+    /// plane, two in space. Kept for output; laws without friction do not read it.
+    pub fn tangent(self, row: &[(usize, T)]) -> Self {
+        self.contacts.tangents.push(row);
+        self
+    }
+
+    /// The size of what is summed to the gap besides G u and the gap itself, for instance coordinates (length): contact
+    /// takes gaps for zero within the rounding of it. Nothing if not given.
+    pub fn magnitude(self, size: T) -> Self {
+        if let Some(magnitude) = self.contacts.magnitudes.last_mut() {
+            *magnitude = size;
+        }
+        self
+    }
+
+    /// Where the contact is, for output: x, y, z (length; zero where there is no such axis).
+    pub fn position(self, position: [T; 3]) -> Self {
+        if let Some(last) = self.contacts.positions.last_mut() {
+            *last = Some(position);
+        }
+        self
+    }
+
+    /// The direction in space in which the gap opens, for output: a unit vector.
+    pub fn normal(self, normal: [T; 3]) -> Self {
+        if let Some(last) = self.contacts.normals.last_mut() {
+            *last = Some(normal);
+        }
+        self
+    }
+}
