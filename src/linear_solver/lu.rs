@@ -34,7 +34,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{Damping, LinearSystem, Lu, Newmark, Simulation, System};
+/// use contact_dynamics::{LinearSystem, Lu, Newmark, Simulation};
 ///
 /// let matrix = |entries: &[(usize, usize, f64)]| {
 ///     let entries: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
