@@ -13,7 +13,7 @@ use crate::real::Real;
 /// or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on the system
 /// is Gᵀ λ, λ > 0 in compression.
 ///
-/// The end of a bar against a wall that moves (11 lines):
+/// The end of a bar against a wall that moves (13 lines):
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts};
@@ -44,7 +44,7 @@ use crate::real::Real;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// A point on or above the parabola y = x² (17 lines):
+/// A point on or above the parabola y = x² (18 lines):
 ///
 /// ```
 /// use contact_dynamics::contact::{Candidates, ContactConstraint, ContactLaw, Contacts};

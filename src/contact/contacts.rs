@@ -169,14 +169,14 @@ pub struct Contact<'c, T> {
 impl<T: Real> Contact<'_, T> {
     /// A row beside the normal one, orthogonal to it, along which bodies slide: (place, weight) pairs. One in the
     /// plane, two in space. Kept for output; laws without friction do not read it.
-    pub fn tangent(self, row: &[(usize, T)]) -> Self {
+    pub fn tangent(&mut self, row: &[(usize, T)]) -> &mut Self {
         self.contacts.tangents.push(row);
         self
     }
 
     /// The size of what is summed to the gap besides G u and the gap itself, for instance coordinates (length): contact
     /// takes gaps for zero within the rounding of it. Nothing if not given.
-    pub fn magnitude(self, size: T) -> Self {
+    pub fn magnitude(&mut self, size: T) -> &mut Self {
         if let Some(magnitude) = self.contacts.magnitudes.last_mut() {
             *magnitude = size;
         }
@@ -184,7 +184,7 @@ impl<T: Real> Contact<'_, T> {
     }
 
     /// Where the contact is, for output: x, y, z (length; zero where there is no such axis).
-    pub fn position(self, position: [T; 3]) -> Self {
+    pub fn position(&mut self, position: [T; 3]) -> &mut Self {
         if let Some(last) = self.contacts.positions.last_mut() {
             *last = Some(position);
         }
@@ -192,7 +192,7 @@ impl<T: Real> Contact<'_, T> {
     }
 
     /// The direction in space in which the gap opens, for output: a unit vector.
-    pub fn normal(self, normal: [T; 3]) -> Self {
+    pub fn normal(&mut self, normal: [T; 3]) -> &mut Self {
         if let Some(last) = self.contacts.normals.last_mut() {
             *last = Some(normal);
         }

@@ -384,8 +384,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
-        let (entries, interface) = (g.entries(), constraints.interface().len());
-        let size = ContactSize { rows, entries, interface, may_press: constraints.may_press() };
+        let size = ContactSize::new(rows, &g, &constraints);
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
         if follows {
             let (name, interface) = (scheme.integrator.name(), constraints.interface());

@@ -322,7 +322,9 @@ impl<'a, T: Real> Constraints<'a, T> {
             jacobian.append(contacts.rows(), dofs);
         }
         jacobian.locate(places);
-        parts.iter_mut().for_each(|part| part.stale = false);
+        for part in parts {
+            part.stale = false;
+        }
         *stale = false;
         self.version += 1;
         if self.ids.len() > self.room {

@@ -55,7 +55,8 @@ impl<T: Real> Simulation<'_, T> {
     /// let contact = run.contact_forces().next().ok_or("no contact")?;
     /// let [(dof, force)] = contact.forces().collect::<Vec<_>>()[..] else { panic!("one dof") };
     /// assert!(dof == 1 && (force - 10.0_f64).abs() < 1e-12);
-    /// assert_eq!((contact.position, contact.normal), (Some([3.0, 0.0, 0.0]), Some([0.0, 1.0, 0.0])));
+    /// assert_eq!(contact.normal, Some([0.0, 1.0, 0.0]));
+    /// assert!(contact.position.is_some_and(|[x, y, _]| x == 3.0 && y.abs() < 1e-12));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn contact_forces(&self) -> impl Iterator<Item = ContactForce<T>> + '_ {

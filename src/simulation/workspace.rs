@@ -1,6 +1,7 @@
 //! Memory of the steps: nothing in it changes a result, and nothing is allocated after it but for more
 //! contacts than there have ever been.
 
+use super::constraints::Constraints;
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::ContactWork;
 use super::interface::InterfaceWork;
@@ -10,6 +11,7 @@ use super::program::Program;
 use super::rate_check::RateCheck;
 use super::stage_vectors::StageVectors;
 use super::supports::Supports;
+use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
@@ -55,6 +57,14 @@ pub(super) struct ContactSize {
     pub(super) interface: usize,
     /// Whether there may ever be a row.
     pub(super) may_press: bool,
+}
+
+impl ContactSize {
+    /// That of the constraints, with room for so many rows.
+    pub(super) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
+        let (entries, interface) = (g.entries(), constraints.interface().len());
+        Self { rows, entries, interface, may_press: constraints.may_press() }
+    }
 }
 
 impl<T: Real> Workspace<T> {

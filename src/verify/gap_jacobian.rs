@@ -13,9 +13,10 @@ pub struct GapJacobianError {
     pub rows: usize,
     /// Largest difference between an entry of G and the derivative of the gap: a number, weights being of order one.
     pub jacobian: f64,
-    /// The contact (feature, candidate) and the dof of that entry.
+    /// The contact (feature, candidate) and the dof of the system of that entry.
     pub worst: ((usize, usize), usize),
-    /// Largest difference between a rate ∂g/∂t and the derivative of the gap (length/time).
+    /// Largest difference between a rate ∂g/∂t and the derivative of the gap (length/time); zero, as the next, if the
+    /// constraint leaves its rates to differences.
     pub rate: f64,
     /// Largest difference between the part of g̈ that comes from moving with v and its difference quotient
     /// (length/time²); zero if v is.
