@@ -5,7 +5,7 @@
 //! `cargo run --release --example own_loop` runs this loop with three schemes, and compares it with `Simulation`.
 
 use contact_dynamics::contact::ContactJacobian;
-use contact_dynamics::contact_solver::{Bound, ContactProblem};
+use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::tableau::{Row, Stage};
 use contact_dynamics::{
@@ -140,8 +140,8 @@ impl Loop {
                 offset.push(self.g.product(i, &new[0]) + w[0] * self.g.product(i, &d) + ROWS[i].1);
             }
             let (delassus, offset) = (&delassus, &offset);
-            let (bounds, tolerance) = (&[Bound::NonNegative; ROWS.len()], &[ROUNDING; ROWS.len()]);
-            let problem = ContactProblem { delassus, offset, bounds, tolerance, version: 0 };
+            let (sets, tolerance) = (&[AdmissibleSet::NonNegative; ROWS.len()], &[ROUNDING; ROWS.len()]);
+            let problem = ContactProblem::new(delassus, offset, sets, tolerance).unwrap();
             // Multipliers of the iteration before are the guess.
             self.solver.solve(&problem, &mut self.raw)?;
             responses.iter().zip(&self.raw).for_each(|(response, &lambda)| add(lambda, response, &mut d));

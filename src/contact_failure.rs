@@ -4,6 +4,7 @@ use crate::real::Real;
 
 /// Why a contact problem was not solved; rows count within the problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ContactFailure<T> {
     /// No multipliers meet all conditions: rows demand opposite things of the same dofs.
     Contradictory {

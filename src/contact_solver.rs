@@ -15,7 +15,7 @@ pub use active_set::ActiveSet;
 pub(crate) use failure::{contact_error, no_response};
 pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
-pub use problem::{Bound, ContactProblem};
+pub use problem::{AdmissibleSet, ContactProblem};
 pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;
@@ -26,23 +26,23 @@ pub(crate) const FORESEEN: usize = 128;
 /// A solver of [`ContactProblem`]s.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+/// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
 ///
 /// let mut solver: Box<dyn ContactSolver<f64>> = Box::new(ActiveSet::default());
 /// solver.reserve(2);
-/// let problem = ContactProblem {
-///     delassus: &[2.0, 1.0, 1.0, 2.0],
-///     offset: &[-2.0, 1.0],
-///     bounds: &[Bound::NonNegative; 2],
-///     tolerance: &[1e-14; 2],
-///     version: 0,
-/// };
+/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &[AdmissibleSet::NonNegative; 2], &[1e-14; 2]).unwrap();
 /// let mut lambda = [0.0; 2];
 /// solver.solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] - 1.0).abs() < 1e-15 && lambda[1] == 0.0);
 /// assert!((problem.gap(1, &lambda) - 2.0).abs() < 1e-15); // the second contact is pushed open
 /// ```
 pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
+    /// Whether the solver takes blocks of a set: a simulation refuses contact laws that need another one. Default: all
+    /// sets of one row.
+    fn admits(&self, set: AdmissibleSet) -> bool {
+        set.rows() == 1
+    }
+
     /// Announces problems of up to `size` rows: a solver that allocates no memory in [`solve`](Self::solve) reserves it
     /// now. Called at build, and before the first problem with more rows than were announced; then for up to twice as
     /// many. Default: nothing is reserved.
@@ -64,6 +64,9 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
 }
 
 impl<T: Real, S: ContactSolver<T> + ?Sized> ContactSolver<T> for Box<S> {
+    fn admits(&self, set: AdmissibleSet) -> bool {
+        (**self).admits(set)
+    }
     fn reserve(&mut self, size: usize) {
         (**self).reserve(size);
     }

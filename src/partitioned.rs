@@ -1,7 +1,7 @@
 //! Contact between bodies that live in codes of their own: a frame between two sides, with localized Lagrange
 //! multipliers.
 
-use crate::contact_solver::{ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver};
+use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -131,7 +131,7 @@ pub struct Frame<T: Real> {
     version: u64,
     offset: Vec<T>,
     tolerance: Vec<T>,
-    bounds: Vec<Bound>,
+    sets: Vec<AdmissibleSet>,
     interface: Interface<T>,
 }
 
@@ -166,7 +166,7 @@ impl<T: Real> Frame<T> {
             version: 0,
             offset: Vec::with_capacity(nodes),
             tolerance: Vec::with_capacity(nodes),
-            bounds: Vec::with_capacity(nodes),
+            sets: Vec::with_capacity(nodes),
             interface: Interface {
                 forces: zero(),
                 positions: zero(),
@@ -210,7 +210,7 @@ impl<T: Real> Frame<T> {
         check_length("the list of nodes held", held.map_or(n, <[bool]>::len), n)?;
         check_finite("gaps of the frame", gaps)?;
         sides.iter().try_for_each(|side| check(side, n))?;
-        let Self { solver, nodes, multipliers, delassus, version, offset, tolerance, bounds, interface } = self;
+        let Self { solver, nodes, multipliers, delassus, version, offset, tolerance, sets, interface } = self;
         nodes.clear();
         nodes.extend((0..n).filter(|&node| held.is_none_or(|held| held[node])));
         let [first, second] = &sides;
@@ -234,11 +234,11 @@ impl<T: Real> Frame<T> {
         offset.extend(nodes.iter().map(|&node| second.free[node] - first.free[node] + gaps[node]));
         tolerance.clear();
         tolerance.extend(nodes.iter().map(|&node| rounding(node)));
-        bounds.clear();
-        bounds.resize(size, if held.is_some() { Bound::Free } else { Bound::NonNegative });
+        sets.clear();
+        sets.resize(size, if held.is_some() { AdmissibleSet::Free } else { AdmissibleSet::NonNegative });
         multipliers.clear();
         multipliers.extend(nodes.iter().map(|&node| interface.forces[node]));
-        let problem = ContactProblem { delassus, offset, bounds, tolerance, version: *version };
+        let problem = ContactProblem::of(delassus, offset, sets, tolerance, *version);
         let solved = solver.solve(&problem, multipliers);
 
         let Interface { forces, positions, values, gaps: open, closed, iterations } = interface;

@@ -6,7 +6,7 @@
 
 mod pressed;
 
-use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
 use contact_dynamics::{Composite, Factorization, LinearRows, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
@@ -165,19 +165,13 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
     for (name, known) in [("contact solver, first time", false), ("contact solver, nothing changed", true)] {
         let (w, mut solver) = (Rc::clone(&w), ActiveSet::default());
         ContactSolver::<f64>::reserve(&mut solver, candidates);
-        let (offset, bounds) = (vec![-1.0; candidates], vec![Bound::NonNegative; candidates]);
+        let (offset, sets) = (vec![-1.0; candidates], vec![AdmissibleSet::NonNegative; candidates]);
         let (tolerance, mut multipliers) = (vec![1e-14; candidates], vec![0.0; candidates]);
         table.row(format!("{name}, {candidates} rows"), move || {
             if !known {
                 multipliers.fill(0.0);
             }
-            let problem = ContactProblem {
-                delassus: &w,
-                offset: &offset,
-                bounds: &bounds,
-                tolerance: &tolerance,
-                version: u64::from(known),
-            };
+            let problem = ContactProblem::new(&w, &offset, &sets, &tolerance).unwrap().with_version(u64::from(known));
             solver.solve(&problem, &mut multipliers).expect("a definite operator");
             black_box(&multipliers);
         });

@@ -1,31 +1,10 @@
 //! When a contact problem counts as solved: the start, the acceptance rule and the failure that solvers share.
 
-use super::{Bound, ContactFailure, ContactProblem};
+use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-impl Bound {
-    /// The admissible multiplier nearest to `multiplier`.
-    pub(super) fn project<T: Real>(self, multiplier: T) -> T {
-        match self {
-            Self::Free => multiplier,
-            Self::NonNegative => multiplier.max(T::zero()),
-        }
-    }
-}
-
 impl<T: Real> ContactProblem<'_, T> {
-    /// By how much row i misses complementarity (unit of y); NaN if that is not finite.
-    fn miss(&self, i: usize, multipliers: &[T]) -> T {
-        let y = self.gap(i, multipliers);
-        match self.bounds[i] {
-            // `min` would prefer any number to NaN.
-            _ if !y.is_finite() => T::nan(),
-            Bound::Free => y.abs(),
-            Bound::NonNegative => y.min(self.delassus(i, i) * multipliers[i]).abs(),
-        }
-    }
-
     /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
     pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
         /// Rows and columns that are looked at together: what lies across the diagonal is then near in memory too.
@@ -103,13 +82,15 @@ impl<T: Real> Settings<T> {
         let coupled = (0..problem.size()).filter(|&i| problem.delassus(i, i) > T::zero());
         let reach = coupled.map(alone).fold(T::zero(), T::max);
         let accepted = self.tolerance * scale;
-        let at_rest = |(&q, &bound): (&T, &Bound)| if bound == Bound::Free { q == T::zero() } else { q >= T::zero() };
-        let open = problem.offset.iter().zip(problem.bounds).all(at_rest);
+        let at_rest = |(&q, &set): (&T, &AdmissibleSet)| {
+            if set == AdmissibleSet::Free { q == T::zero() } else { q >= T::zero() }
+        };
+        let open = problem.offset.iter().zip(problem.sets).all(at_rest);
         for (i, lambda) in multipliers.iter_mut().enumerate() {
-            let (q, bound) = (problem.offset[i], problem.bounds[i]);
+            let (q, set) = (problem.offset[i], problem.sets[i]);
             let dead = problem.delassus(i, i) <= T::zero();
-            *lambda = if dead || open || !lambda.is_finite() { T::zero() } else { bound.project(*lambda) };
-            let miss = if bound == Bound::Free { q.abs() } else { -q };
+            *lambda = if dead || open || !lambda.is_finite() { T::zero() } else { set.nearest(*lambda) };
+            let miss = if set == AdmissibleSet::Free { q.abs() } else { -q };
             if dead && miss > accepted.max(problem.tolerance[i]) {
                 return Err(ContactFailure::NotConverged { iterations: 0, row: i, residual: miss });
             }

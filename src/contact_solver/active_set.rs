@@ -2,7 +2,7 @@
 
 use super::acceptance::{Acceptance, Settings};
 use super::equations::{Equations, Solved, Symmetry};
-use super::{Bound, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
+use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
 
 /// Primal–dual active set (semismooth Newton) on the dense Delassus operator, safeguarded by Murty's least-index rule.
@@ -135,7 +135,7 @@ impl<T: Real> ActiveSet<T> {
         let Self { equations, symmetry, active, rows, solution, y, own, noise, shift, offset, .. } = self;
         let (_, symmetry) = *symmetry;
         active.clear();
-        active.extend(multipliers.iter().zip(problem.bounds).map(|(&l, &b)| b == Bound::Free || l > T::zero()));
+        active.extend(multipliers.iter().zip(problem.sets).map(|(&l, &b)| b == AdmissibleSet::Free || l > T::zero()));
         let proximal = form == Form::Proximal;
         let offset: &[T] = if proximal { offset } else { problem.offset };
         let (mut fewest, mut tries) = (usize::MAX, BLOCK_TRIES);
@@ -171,18 +171,18 @@ impl<T: Real> ActiveSet<T> {
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
             // go, one that is left violated waits for the others.
             let open = |i: usize| singular && y[i] > noise[i];
-            let violates = |i: usize, active: bool| match problem.bounds[i] {
-                Bound::Free => false,
-                Bound::NonNegative if active => problem.delassus(i, i) * multipliers[i] < -noise[i] || open(i),
-                Bound::NonNegative => y[i] < -noise[i],
+            let violates = |i: usize, active: bool| match problem.sets[i] {
+                AdmissibleSet::Free => false,
+                AdmissibleSet::NonNegative if active => problem.delassus(i, i) * multipliers[i] < -noise[i] || open(i),
+                AdmissibleSet::NonNegative => y[i] < -noise[i],
             };
             let violations = (0..size).filter(|&i| violates(i, active[i]));
             let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
             if count == 0 {
                 // What multipliers make of y as they grow beyond all bounds is no rounding.
-                let held = |i: usize| match (problem.bounds[i], active[i]) {
+                let held = |i: usize| match (problem.sets[i], active[i]) {
                     _ if active[i] && singular && y[i].abs() > noise[i] => false,
-                    (Bound::Free, _) => acceptance.bears(i, y[i].abs()),
+                    (AdmissibleSet::Free, _) => acceptance.bears(i, y[i].abs()),
                     (_, true) => acceptance.bears(i, y[i].abs().max(-problem.delassus(i, i) * multipliers[i])),
                     (_, false) => acceptance.bears(i, -y[i]),
                 };
@@ -191,7 +191,7 @@ impl<T: Real> ActiveSet<T> {
                 }
                 let mut dropped = false;
                 for (i, lambda) in multipliers.iter_mut().enumerate() {
-                    if problem.bounds[i] == Bound::NonNegative && *lambda < T::zero() {
+                    if problem.sets[i] == AdmissibleSet::NonNegative && *lambda < T::zero() {
                         dropped |= problem.delassus(i, i) * -*lambda > own[i];
                         *lambda = T::zero();
                     }

@@ -31,16 +31,10 @@ use crate::real::Real;
 /// problem without a solution costs all sweeps granted before it fails.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{Bound, ContactProblem, ContactSolver, GaussSeidel};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
 ///
 /// // The same contact twice: which of the two carries is arbitrary, their sum is not.
-/// let problem = ContactProblem {
-///     delassus: &[1.0, 1.0, 1.0, 1.0],
-///     offset: &[-3.0, -3.0],
-///     bounds: &[Bound::NonNegative; 2],
-///     tolerance: &[1e-15; 2],
-///     version: 0,
-/// };
+/// let problem = ContactProblem::new(&[1.0, 1.0, 1.0, 1.0], &[-3.0, -3.0], &[AdmissibleSet::NonNegative; 2], &[1e-15; 2]).unwrap();
 /// let mut lambda = [0.0_f64; 2];
 /// GaussSeidel::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 3.0).abs() < 1e-11);
@@ -93,7 +87,7 @@ pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, mul
         let diagonal = problem.delassus(i, i);
         if diagonal > T::zero() {
             let correction = omega * problem.gap(i, multipliers) / diagonal;
-            multipliers[i] = problem.bounds[i].project(multipliers[i] - correction);
+            multipliers[i] = problem.sets[i].nearest(multipliers[i] - correction);
         }
     }
 }

@@ -254,7 +254,7 @@ fn factorize<T: Real>(members: &[usize], entry: impl Fn(usize, usize) -> T, leas
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact_solver::Bound;
+    use crate::contact_solver::AdmissibleSet;
     use crate::dense::DenseCholesky;
 
     /// The flexibility of nodes on a square grid: falls off with their distance, as that of a body's surface.
@@ -269,8 +269,8 @@ mod tests {
         (0..n * n).map(|e| entry(e / n, e % n)).collect()
     }
 
-    fn problem<'a>(w: &'a [f64], q: &'a [f64], bounds: &'a [Bound]) -> ContactProblem<'a, f64> {
-        ContactProblem { delassus: w, offset: q, bounds, tolerance: q, version: 0 }
+    fn problem<'a>(w: &'a [f64], q: &'a [f64], sets: &'a [AdmissibleSet]) -> ContactProblem<'a, f64> {
+        ContactProblem::new(w, q, sets, q).unwrap()
     }
 
     #[test]
@@ -280,8 +280,8 @@ mod tests {
             for (side, most) in [12, 24].into_iter().zip(&mut most) {
                 let n = side * side;
                 let (w, b) = (flexibility(side, range), (0..n).map(|i| (i as f64).sin()).collect::<Vec<_>>());
-                let bounds = vec![Bound::Free; n];
-                let problem = problem(&w, &b, &bounds);
+                let sets = vec![AdmissibleSet::Free; n];
+                let problem = problem(&w, &b, &sets);
                 let rows: Vec<usize> = (0..n).filter(|i| i % 7 != 3).collect();
                 let mut many = ManyRows::default();
                 assert!(many.prepare(&problem, &rows));
@@ -311,9 +311,9 @@ mod tests {
         for j in 0..n {
             w[j * n + 20] = w[j * n + 19];
         }
-        let (q, bounds, rows) = (vec![0.0; n], vec![Bound::Free; n], (0..n).collect::<Vec<_>>());
-        assert!(!ManyRows::default().prepare(&problem(&w, &q, &bounds), &rows));
+        let (q, sets, rows) = (vec![0.0; n], vec![AdmissibleSet::Free; n], (0..n).collect::<Vec<_>>());
+        assert!(!ManyRows::default().prepare(&problem(&w, &q, &sets), &rows));
         w[5 * n + 5] = 0.0;
-        assert!(!ManyRows::default().prepare(&problem(&w, &q, &bounds), &rows));
+        assert!(!ManyRows::default().prepare(&problem(&w, &q, &sets), &rows));
     }
 }

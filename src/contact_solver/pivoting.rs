@@ -2,7 +2,7 @@
 
 use super::acceptance::Settings;
 use super::gauss_seidel::sweep_rows;
-use super::{Bound, ContactFailure, ContactProblem, ContactSolver};
+use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::dense::dot;
 use crate::real::Real;
 
@@ -35,12 +35,12 @@ use crate::real::Real;
 /// and limited); a row whose independence is rounding counts as dependent.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{Bound, ContactProblem, ContactSolver, Pivoting};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, Pivoting};
 ///
 /// // The same contact twice, and one that it repels.
 /// let w = [1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 2.0];
-/// let bounds = [Bound::NonNegative; 3];
-/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, -1.0, 0.5], bounds: &bounds, tolerance: &[1e-15; 3], version: 0 };
+/// let sets = [AdmissibleSet::NonNegative; 3];
+/// let problem = ContactProblem::new(&w, &[-1.0, -1.0, 0.5], &sets, &[1e-15; 3]).unwrap();
 /// let mut lambda = [0.0_f64; 3];
 /// Pivoting::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 1.5).abs() < 1e-15 && (lambda[2] - 0.5).abs() < 1e-15);
@@ -48,7 +48,7 @@ use crate::real::Real;
 ///
 /// // Two obstacles closer than the body is thick.
 /// let w = [1.0, -1.0, -1.0, 1.0];
-/// let problem = ContactProblem { delassus: &w, offset: &[-1.0, 0.5], bounds: &bounds[..2], tolerance: &[1e-15; 2], version: 0 };
+/// let problem = ContactProblem::new(&w, &[-1.0, 0.5], &sets[..2], &[1e-15; 2]).unwrap();
 /// assert!(Pivoting::default().solve(&problem, &mut lambda[..2]).is_err());
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -158,7 +158,7 @@ impl<T: Real> Basis<T> {
     /// The rows left out are combinations of these; whether their q agrees is for the acceptance rule to say.
     fn enter_free(&mut self, problem: &ContactProblem<'_, T>) {
         let Self { rows, factor, stride, right: rest, .. } = self;
-        let is_free = |&i: &usize| problem.bounds[i] == Bound::Free && problem.delassus(i, i) > T::zero();
+        let is_free = |&i: &usize| problem.sets[i] == AdmissibleSet::Free && problem.delassus(i, i) > T::zero();
         rows.extend((0..problem.size()).filter(is_free));
         rest.clear();
         rest.extend(rows.iter().map(|&i| problem.delassus(i, i)));
@@ -252,7 +252,7 @@ impl<T: Real> Basis<T> {
         let mut first: Option<(usize, T, T)> = None;
         for (k, (&j, &r)) in self.rows.iter().zip(&self.direction).enumerate() {
             let pivot = -r * problem.delassus(j, j).sqrt();
-            if problem.bounds[j] == Bound::NonNegative && pivot > noise {
+            if problem.sets[j] == AdmissibleSet::NonNegative && pivot > noise {
                 let step = multipliers[j].max(T::zero()) / -r;
                 // Of ties the largest pivot, for accuracy.
                 if first.is_none_or(|(_, least, largest)| step < least || (step == least && pivot > largest)) {
@@ -270,7 +270,10 @@ impl<T: Real> Pivoting<T> {
         let mut worst: Option<(usize, T)> = None;
         for i in 0..problem.size() {
             let diagonal = problem.delassus(i, i);
-            if problem.bounds[i] == Bound::NonNegative && self.status[i] == Status::Inactive && diagonal > T::zero() {
+            if problem.sets[i] == AdmissibleSet::NonNegative
+                && self.status[i] == Status::Inactive
+                && diagonal > T::zero()
+            {
                 let y = problem.gap(i, multipliers);
                 let scaled = y / diagonal.sqrt();
                 if worst.is_none_or(|(_, least)| scaled < least) && y < -problem.rounding(i, multipliers) {
@@ -360,8 +363,8 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
                 None => break,
             }
         }
-        for (lambda, bound) in multipliers.iter_mut().zip(problem.bounds) {
-            *lambda = bound.project(*lambda);
+        for (lambda, set) in multipliers.iter_mut().zip(problem.sets) {
+            *lambda = set.nearest(*lambda);
         }
         for _ in 0..POLISH {
             if acceptance.accepts(multipliers) {

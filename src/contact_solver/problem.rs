@@ -2,44 +2,167 @@
 
 use crate::contact::ContactLaw;
 use crate::dense::dot;
+use crate::error::{Error, Result};
 use crate::real::Real;
+use std::ops::Range;
 
-/// What the multiplier of a row may be.
+/// The set that the multipliers of a block of rows belong to, which says what they and the block's y are to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bound {
-    /// 0 ≤ y ⊥ λ ≥ 0.
+#[non_exhaustive]
+pub enum AdmissibleSet {
+    /// A row with 0 ≤ y ⊥ λ ≥ 0.
     NonNegative,
-    /// y = 0, λ of either sign.
+    /// A row with y = 0, and λ of either sign.
     Free,
 }
 
-impl From<ContactLaw> for Bound {
-    fn from(law: ContactLaw) -> Self {
-        if law.is_equality() { Self::Free } else { Self::NonNegative }
+impl AdmissibleSet {
+    /// All sets that there are.
+    pub(crate) const ALL: [Self; 2] = [Self::NonNegative, Self::Free];
+
+    /// The number of rows of a block.
+    pub fn rows(self) -> usize {
+        match self {
+            Self::NonNegative | Self::Free => 1,
+        }
+    }
+
+    /// Moves the multipliers of a block to the nearest ones in the set.
+    ///
+    /// ```
+    /// use contact_dynamics::contact_solver::AdmissibleSet;
+    /// let mut multipliers = [-2.0];
+    /// AdmissibleSet::Free.project(&mut multipliers);
+    /// assert_eq!(multipliers, [-2.0]);
+    /// AdmissibleSet::NonNegative.project(&mut multipliers);
+    /// assert_eq!(multipliers, [0.0]);
+    /// ```
+    pub fn project<T: Real>(self, multipliers: &mut [T]) {
+        for multiplier in multipliers {
+            *multiplier = self.nearest(*multiplier);
+        }
+    }
+
+    /// The nearest multiplier in a set of one row.
+    pub(super) fn nearest<T: Real>(self, multiplier: T) -> T {
+        match self {
+            Self::Free => multiplier,
+            Self::NonNegative => multiplier.max(T::zero()),
+        }
+    }
+
+    /// By how much the y and the multipliers of a block miss their conditions (unit of y): |min(y, W_ii λ)|, or |y| of
+    /// a free row; NaN if y is not finite. `compliance` is the diagonal of W.
+    pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
+        let rows = y.iter().zip(multipliers).zip(compliance);
+        let misses = rows.map(|((&y, &multiplier), &compliance)| match self {
+            // (`min` would prefer any number to NaN.)
+            _ if !y.is_finite() => T::nan(),
+            Self::Free => y.abs(),
+            Self::NonNegative => y.min(compliance * multiplier).abs(),
+        });
+        misses.fold(T::zero(), |worst, miss| if miss > worst || miss.is_nan() { miss } else { worst })
     }
 }
 
-/// Find λ with `y = W λ + q`, `0 ≤ y ⊥ λ ≥ 0` on unilateral rows and `y = 0` on free ones.
+impl From<ContactLaw> for AdmissibleSet {
+    fn from(law: ContactLaw) -> Self {
+        match law.is_equality() {
+            true => Self::Free,
+            false => Self::NonNegative,
+        }
+    }
+}
+
+/// Find λ with `y = W λ + q`, such that y and λ of every block meet the conditions of its [`AdmissibleSet`].
 ///
 /// W is the Delassus operator (positive semidefinite; definite on independent rows), with the compliances of the laws
 /// on its diagonal. It is as symmetric as the effective matrix A: W = G A⁻¹ Gᵀ. y has the unit of a gap, and so have
 /// the tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
+///
+/// ```
+/// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
+///
+/// let sets = [AdmissibleSet::NonNegative; 2];
+/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &sets, &[1e-14; 2])?;
+/// let mut lambda = [0.0; 2];
+/// ActiveSet::default().solve(&problem, &mut lambda)?;
+/// assert!((lambda[0] - 1.0).abs() < 1e-15 && problem.residual(&lambda).1 < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ContactProblem<'a, T> {
-    /// W row by row, size × size: entry (i, j), what λ_j adds to y_i, is at `i · size + j`.
-    pub delassus: &'a [T],
-    /// q: y at λ = 0.
-    pub offset: &'a [T],
-    /// What each multiplier may be.
-    pub bounds: &'a [Bound],
-    /// For each row, the size of y that is rounding.
-    pub tolerance: &'a [T],
-    /// A number that changes whenever W does, 0 if unknown: what a solver has computed from W serves it again while the
-    /// number is the same.
-    pub version: u64,
+    pub(crate) delassus: &'a [T],
+    pub(crate) offset: &'a [T],
+    pub(crate) sets: &'a [AdmissibleSet],
+    pub(crate) tolerance: &'a [T],
+    pub(crate) version: u64,
 }
 
 impl<'a, T: Real> ContactProblem<'a, T> {
+    /// From W row by row (entry (i, j), what λ_j adds to y_i, is at `i · size + j`), the offset q (y at λ = 0), the set
+    /// of every block, and for each row the size of y that is rounding.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the lengths do not fit each other.
+    pub fn new(delassus: &'a [T], offset: &'a [T], sets: &'a [AdmissibleSet], tolerance: &'a [T]) -> Result<Self> {
+        let size = offset.len();
+        let rows = sets.iter().map(|set| set.rows()).sum();
+        for (what, expected, found) in [
+            ("the Delassus operator", size * size, delassus.len()),
+            ("the sets of a contact problem", size, rows),
+            ("the tolerances of a contact problem", size, tolerance.len()),
+        ] {
+            if expected != found {
+                return Err(Error::Dimension { what, expected, found });
+            }
+        }
+        Ok(Self::of(delassus, offset, sets, tolerance, 0))
+    }
+
+    /// The same, of parts that fit each other.
+    pub(crate) fn of(
+        delassus: &'a [T],
+        offset: &'a [T],
+        sets: &'a [AdmissibleSet],
+        tolerance: &'a [T],
+        version: u64,
+    ) -> Self {
+        Self { delassus, offset, sets, tolerance, version }
+    }
+
+    /// With a number that changes whenever W does: what a solver has computed from W serves it again while the number
+    /// is the same. 0, the default, says nothing.
+    #[must_use]
+    pub fn with_version(self, version: u64) -> Self {
+        Self { version, ..self }
+    }
+
+    /// The number given by [`with_version`](Self::with_version).
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// q: y at λ = 0, one a row.
+    pub fn offset(&self) -> &'a [T] {
+        self.offset
+    }
+
+    /// For each row the size of y that is rounding.
+    pub fn tolerance(&self) -> &'a [T] {
+        self.tolerance
+    }
+
+    /// The blocks, one after the other: their rows, and the sets of their multipliers.
+    pub fn blocks(&self) -> impl Iterator<Item = (Range<usize>, AdmissibleSet)> + 'a {
+        self.sets.iter().scan(0, |first, &set| {
+            let rows = *first..*first + set.rows();
+            *first = rows.end;
+            Some((rows, set))
+        })
+    }
+
     /// Number of rows.
     pub fn size(&self) -> usize {
         self.offset.len()
@@ -66,16 +189,56 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         self.tolerance[i] + T::of(32.0) * T::epsilon() * (self.offset[i].abs() + terms.sum::<T>())
     }
 
-    /// The row that misses complementarity most, and by how much (unit of y): max over `|min(y_i, W_ii λ_i)|`, or
-    /// `|y_i|` for free rows.
+    /// The row, or first row of a block, that misses its conditions most, and by how much (unit of y): the largest
+    /// [`AdmissibleSet::residual`].
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
-        let miss = |i: usize| {
-            let y = self.gap(i, multipliers);
-            match self.bounds[i] {
-                Bound::Free => y.abs(),
-                Bound::NonNegative => y.min(self.delassus(i, i) * multipliers[i]).abs(),
-            }
+        let worst = |worst: (usize, T), (row, miss): (usize, T)| if miss > worst.1 { (row, miss) } else { worst };
+        (0..self.size()).map(|i| (i, self.miss(i, multipliers))).fold((0, T::zero()), worst)
+    }
+
+    /// By how much row i misses the conditions of its set, which has one row.
+    pub(super) fn miss(&self, i: usize, multipliers: &[T]) -> T {
+        self.sets[i].residual(&[self.gap(i, multipliers)], &[multipliers[i]], &[self.delassus(i, i)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        let sets = [AdmissibleSet::NonNegative, AdmissibleSet::Free];
+        let problem = |w: usize, q: usize, sets, tolerance: usize| {
+            ContactProblem::new(&[1.0; 9][..w], &[0.0; 3][..q], sets, &[0.0; 3][..tolerance])
+                .map(|problem| problem.size())
         };
-        (0..self.size()).map(|i| (i, miss(i))).fold((0, T::zero()), |worst, x| if x.1 > worst.1 { x } else { worst })
+        assert_eq!(problem(4, 2, &sets, 2).unwrap(), 2);
+        for (w, q, count, tolerance) in [(3, 2, 2, 2), (9, 3, 2, 3), (4, 2, 2, 1), (4, 2, 1, 2)] {
+            let refused = problem(w, q, &sets[..count], tolerance);
+            assert!(matches!(refused, Err(Error::Dimension { .. })), "{w} {q} {count} {tolerance}");
+        }
+        let problem = ContactProblem::new(&[1.0; 4], &[0.0; 2], &sets, &[0.0; 2]).unwrap().with_version(7);
+        assert_eq!(problem.version(), 7);
+        assert_eq!(problem.blocks().collect::<Vec<_>>(), [(0..1, sets[0]), (1..2, sets[1])]);
+    }
+
+    #[test]
+    fn residuals_are_those_of_the_sets() {
+        let [unilateral, free] = AdmissibleSet::ALL;
+        for (set, y, multiplier, expected) in [
+            (unilateral, 0.5, 0.0, 0.0),
+            (unilateral, 0.0, 3.0, 0.0),
+            (unilateral, -0.5, 3.0, 0.5),
+            (unilateral, 0.25, 3.0, 0.25),
+            (unilateral, 8.0, 3.0, 6.0),
+            (unilateral, 1.0, -1.0, 2.0),
+            (free, -0.5, -3.0, 0.5),
+            (free, 0.0, -3.0, 0.0),
+        ] {
+            let found: f64 = set.residual(&[y], &[multiplier], &[2.0]);
+            assert!((found - expected).abs() < 1e-15, "{set:?} {y} {multiplier}");
+            assert!(set.residual(&[f64::NAN], &[multiplier], &[2.0]).is_nan());
+        }
     }
 }

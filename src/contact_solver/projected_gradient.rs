@@ -28,15 +28,9 @@ use crate::real::Real;
 /// are less exact. A problem without a solution costs all iterations granted before it fails.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{Bound, ContactProblem, ContactSolver, ProjectedGradient};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, ProjectedGradient};
 ///
-/// let problem = ContactProblem {
-///     delassus: &[2.0, 1.0, 1.0, 2.0],
-///     offset: &[-4.0, -5.0],
-///     bounds: &[Bound::NonNegative; 2],
-///     tolerance: &[1e-15; 2],
-///     version: 0,
-/// };
+/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-4.0, -5.0], &[AdmissibleSet::NonNegative; 2], &[1e-15; 2]).unwrap();
 /// let mut lambda = [0.0_f64; 2];
 /// ProjectedGradient::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] - 1.0).abs() < 1e-11 && (lambda[1] - 2.0).abs() < 1e-11);
@@ -104,7 +98,7 @@ impl<T: Real> Memory<T> {
     fn step(&mut self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &mut [T]) {
         for (i, lambda) in multipliers.iter_mut().enumerate() {
             let gradient = self.ahead_gaps[i] * self.inverse[i];
-            *lambda = problem.bounds[i].project(self.ahead[i] - gradient / lipschitz);
+            *lambda = problem.sets[i].nearest(self.ahead[i] - gradient / lipschitz);
         }
         evaluate(problem, multipliers, &mut self.gaps);
     }

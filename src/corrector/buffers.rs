@@ -2,7 +2,7 @@
 
 use super::group_problem::GroupProblem;
 use crate::contact::GapRates;
-use crate::contact_solver::{Bound, FORESEEN};
+use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::real::Real;
 use crate::state::ContactState;
 
@@ -20,7 +20,7 @@ pub(crate) struct Buffers<T> {
     /// Reported forces before this stage, one a candidate.
     pub(crate) reported: Vec<T>,
     /// The contact problem of the jumps of one kind: what multipliers may be, jumps, and what of them is rounding.
-    pub(super) bounds: Vec<Bound>,
+    pub(super) sets: Vec<AdmissibleSet>,
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
     /// Impulses that remove the velocity jumps, one a closed row.
@@ -51,7 +51,7 @@ impl<T: Real> Buffers<T> {
             opened: Vec::with_capacity(rows),
             released: Vec::with_capacity(rows),
             reported: reals(rows),
-            bounds: Vec::with_capacity(rows),
+            sets: Vec::with_capacity(rows),
             jump: reals(rows),
             tolerance: reals(rows),
             impulses: reals(rows),
@@ -70,14 +70,14 @@ impl<T: Real> Buffers<T> {
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.rates.resize(rows, GapRates::default());
         self.gaps.resize(rows, T::zero());
-        let Self { closed, engaged, opened, released, reported, bounds, jump, tolerance, impulses, forces, .. } = self;
+        let Self { closed, engaged, opened, released, reported, sets, jump, tolerance, impulses, forces, .. } = self;
         for list in [closed, engaged, opened, released] {
             list.reserve(rows.saturating_sub(list.len()));
         }
         for values in [reported, jump, tolerance, impulses, forces] {
             values.reserve(rows.saturating_sub(values.len()));
         }
-        bounds.reserve(rows.saturating_sub(bounds.len()));
+        sets.reserve(rows.saturating_sub(sets.len()));
     }
 
     /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.

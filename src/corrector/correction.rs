@@ -8,7 +8,7 @@ mod past;
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
 use crate::contact::{ContactJacobian, ErasedGaps, rounding};
-use crate::contact_solver::{Bound, ContactSolver, no_response};
+use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Operator;
@@ -139,10 +139,10 @@ impl<T: Real> Correction<'_, T> {
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
         let result = self.solve_jumps(&rows, Jump::Velocity, &mut impulses);
-        let Buffers { engaged, bounds, .. } = &mut *self.buffers;
+        let Buffers { engaged, sets, .. } = &mut *self.buffers;
         engaged.clear();
-        for ((&row, &bound), &impulse) in rows.iter().zip(&*bounds).zip(&impulses) {
-            if bound == Bound::Free || impulse > T::zero() {
+        for ((&row, &set), &impulse) in rows.iter().zip(&*sets).zip(&impulses) {
+            if set == AdmissibleSet::Free || impulse > T::zero() {
                 engaged.push(row);
             }
         }
@@ -170,11 +170,11 @@ impl<T: Real> Correction<'_, T> {
 
     /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
     fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
-        let mut bounds = std::mem::take(&mut self.buffers.bounds);
-        bounds.clear();
-        bounds.extend(rows.iter().map(|&row| match self.is_pressed(row) {
-            true => Bound::Free,
-            false => Bound::NonNegative,
+        let mut sets = std::mem::take(&mut self.buffers.sets);
+        sets.clear();
+        sets.extend(rows.iter().map(|&row| match self.is_pressed(row) {
+            true => AdmissibleSet::Free,
+            false => AdmissibleSet::NonNegative,
         }));
         let Buffers { jump: jumps, tolerance, rates, .. } = &mut *self.buffers;
         let read = self.constraints.0.rates(self.t, &self.new.u, &self.new.v, rates);
@@ -190,13 +190,13 @@ impl<T: Real> Correction<'_, T> {
         }
         x.clear();
         x.resize(rows.len(), T::zero());
-        let mut result = read.and_then(|()| self.solve(rows, &bounds, x));
+        let mut result = read.and_then(|()| self.solve(rows, &sets, x));
         if matches!(result, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
             self.allow_rounding_of_gaps(rows, jump);
             x.fill(T::zero());
-            result = self.solve(rows, &bounds, x);
+            result = self.solve(rows, &sets, x);
         }
-        self.buffers.bounds = bounds;
+        self.buffers.sets = sets;
         result
     }
 
@@ -394,9 +394,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
     }
 
-    /// Solves S x + jump for the multipliers x of `rows` under their bounds.
-    fn solve(&mut self, rows: &[usize], bounds: &[Bound], x: &mut [T]) -> Result<()> {
-        if bounds.iter().all(|&bound| bound == Bound::Free) {
+    /// Solves S x + jump for the multipliers x of `rows` of their sets.
+    fn solve(&mut self, rows: &[usize], sets: &[AdmissibleSet], x: &mut [T]) -> Result<()> {
+        if sets.iter().all(|&set| set == AdmissibleSet::Free) {
             self.projection.close_rows(self.g, rows).map_err(|row| self.no_response(row))?;
             for (x, &jump) in x.iter_mut().zip(&self.buffers.jump) {
                 *x = -jump;
@@ -405,7 +405,7 @@ impl<T: Real> Correction<'_, T> {
             return Ok(());
         }
         let Buffers { group, jump, tolerance, .. } = &mut *self.buffers;
-        let jumps = Jumps { rows, bounds, jump, tolerance };
+        let jumps = Jumps { rows, sets, jump, tolerance };
         let ids = &self.contacts.ids;
         group.solve((self.g, &mut *self.projection), &mut *self.solver, jumps, x, (self.t, |row| ids[row]))
     }

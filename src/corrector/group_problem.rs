@@ -2,7 +2,7 @@
 
 use super::JumpProjection;
 use crate::contact::{ContactId, ContactJacobian};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver, FORESEEN, contact_error};
+use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, FORESEEN, contact_error};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -12,7 +12,7 @@ pub(super) struct GroupProblem<T> {
     rows: Vec<usize>,
     s: Vec<T>,
     offset: Vec<T>,
-    bounds: Vec<Bound>,
+    sets: Vec<AdmissibleSet>,
     tolerance: Vec<T>,
     multipliers: Vec<T>,
 }
@@ -21,7 +21,7 @@ pub(super) struct GroupProblem<T> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jumps<'j, T> {
     pub(super) rows: &'j [usize],
-    pub(super) bounds: &'j [Bound],
+    pub(super) sets: &'j [AdmissibleSet],
     pub(super) jump: &'j [T],
     pub(super) tolerance: &'j [T],
 }
@@ -32,11 +32,11 @@ impl<T: Real> GroupProblem<T> {
         let rows = rows.min(FORESEEN);
         let reals = |n| Vec::with_capacity(n);
         let (offset, tolerance, multipliers) = (reals(rows), reals(rows), reals(rows));
-        let bounds = Vec::with_capacity(rows);
-        Self { rows: Vec::with_capacity(rows), s: reals(rows * rows), offset, bounds, tolerance, multipliers }
+        let sets = Vec::with_capacity(rows);
+        Self { rows: Vec::with_capacity(rows), s: reals(rows * rows), offset, sets, tolerance, multipliers }
     }
 
-    /// Finds the multipliers x with S x + jump in its bounds; x holds a guess on entry. `id` names the contact of a row,
+    /// Finds the multipliers x with S x + jump in its sets; x holds a guess on entry. `id` names the contact of a row,
     /// for the error at time t.
     pub(super) fn solve(
         &mut self,
@@ -46,23 +46,23 @@ impl<T: Real> GroupProblem<T> {
         x: &mut [T],
         (t, id): (f64, impl Fn(usize) -> ContactId),
     ) -> Result<()> {
-        let Self { rows, s, offset, bounds, tolerance, multipliers } = self;
+        let Self { rows, s, offset, sets, tolerance, multipliers } = self;
         projection.sort(g, jumps.rows);
         for group in 0..projection.groups().len() {
             rows.clear();
             offset.clear();
-            bounds.clear();
+            sets.clear();
             tolerance.clear();
             multipliers.clear();
             for &position in projection.groups().group(group) {
                 rows.push(jumps.rows[position]);
                 offset.push(jumps.jump[position]);
-                bounds.push(jumps.bounds[position]);
+                sets.push(jumps.sets[position]);
                 tolerance.push(jumps.tolerance[position]);
                 multipliers.push(x[position]);
             }
             projection.assemble(g, rows, s);
-            let problem = ContactProblem { delassus: s, offset, bounds, tolerance, version: 0 };
+            let problem = ContactProblem::of(s, offset, sets, tolerance, 0);
             solver.solve(&problem, multipliers).map_err(|failure| contact_error(t, failure, |row| id(rows[row])))?;
             for (&position, &multiplier) in projection.groups().group(group).iter().zip(multipliers.iter()) {
                 x[position] = multiplier;

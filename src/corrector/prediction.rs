@@ -4,7 +4,7 @@
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
 use crate::contact::{ContactId, ContactJacobian, ErasedGaps, rounding};
-use crate::contact_solver::{Bound, ContactSolver};
+use crate::contact_solver::{AdmissibleSet, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
@@ -131,18 +131,18 @@ impl<T: Real> Prediction<'_, T> {
         self.advance(&[], &[]);
         self.read_gaps()?;
         let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
-        let Buffers { group, jump, tolerance, bounds, gaps, .. } = &mut **buffers;
+        let Buffers { group, jump, tolerance, sets, gaps, .. } = &mut **buffers;
         jump.clear();
         tolerance.clear();
-        bounds.clear();
+        sets.clear();
         for &row in rows {
             jump.push(gaps[row]);
             tolerance.push(rounding(g.magnitude(row, shifted) + gaps[row].abs()));
-            bounds.push(Bound::from(constraints.0.law(row)));
+            sets.push(AdmissibleSet::from(constraints.0.law(row)));
         }
         mu.clear();
         mu.resize(rows.len(), T::zero());
-        let (jumps, ids) = (Jumps { rows, bounds, jump, tolerance }, self.ids);
+        let (jumps, ids) = (Jumps { rows, sets, jump, tolerance }, self.ids);
         group.solve((g, &mut **projection), &mut **solver, jumps, mu, (self.t, |row| ids[row]))
     }
 }

@@ -1,11 +1,13 @@
-//! Which contact laws a scheme can serve, and why not the others.
+//! Which contact laws a scheme and a contact solver can serve, and why not the others.
 
 use crate::contact::{ContactLaw, Measure};
+use crate::contact_solver::{AdmissibleSet, ContactSolver};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
+use crate::real::Real;
 use crate::tableau::{ContactLevel, Tableau};
 
-/// Which laws a scheme can serve.
+/// Which laws a scheme and a contact solver can serve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Admitted {
     pub(crate) integrator: String,
@@ -18,11 +20,20 @@ pub(crate) struct Admitted {
     /// Why laws that read the gap at the start of a stage are refused, if they are, and why the persistency switch is.
     pub(crate) no_start: Option<&'static str>,
     pub(crate) no_switch: Option<&'static str>,
+    /// The contact solver, and the sets that it does not take.
+    pub(crate) solver: String,
+    pub(crate) no_sets: Vec<AdmissibleSet>,
 }
 
 impl Admitted {
-    /// Refuses a law that the scheme cannot serve.
+    /// Refuses a law that the scheme, or the contact solver, cannot serve.
     pub(super) fn check(&self, law: ContactLaw) -> Result<()> {
+        if self.no_sets.contains(&AdmissibleSet::from(law)) {
+            return Err(Error::Incompatible {
+                part: format!("{law:?} with {}", self.solver),
+                reason: "the contact solver does not take what this law asks of its multipliers; choose `ActiveSet`",
+            });
+        }
         let reasons = [
             self.no_rigid.filter(|_| law.needs_multiplier()),
             self.no_restitution.filter(|_| law.rebounds()),
@@ -37,9 +48,15 @@ impl Admitted {
     }
 }
 
-/// The contact laws that a scheme can serve.
-pub(super) fn admitted(integrator: &dyn TimeIntegrator, tableau: &Tableau) -> Admitted {
-    let mut admitted = Admitted { integrator: integrator.name(), ..Admitted::default() };
+/// The contact laws that a scheme and a contact solver can serve.
+pub(super) fn admitted<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    solver: &dyn ContactSolver<T>,
+) -> Admitted {
+    let no_sets = AdmissibleSet::ALL.into_iter().filter(|&set| !solver.admits(set)).collect();
+    let (integrator_name, solver) = (integrator.name(), format!("{solver:?}"));
+    let mut admitted = Admitted { integrator: integrator_name, solver, no_sets, ..Admitted::default() };
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
         admitted.no_prediction = Some(

@@ -322,7 +322,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        let admitted = admitted(&*integrator, &tableau);
+        let admitted = admitted(&*integrator, &tableau, &*contact_solver);
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {

@@ -130,8 +130,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             ..
         } = rows;
         let forces = curved.forces(g);
-        let (bounds, multipliers, problem_tolerance) =
-            (&mut rows.bounds, &mut rows.multipliers, &mut rows.problem_tolerance);
+        let (sets, multipliers, problem_tolerance) =
+            (&mut rows.sets, &mut rows.multipliers, &mut rows.problem_tolerance);
         let count = constraints.len();
         loop {
             sorted.clear();
@@ -142,13 +142,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
             for buffer in [&mut *offset, &mut *problem_tolerance, &mut *multipliers] {
                 buffer.clear();
             }
-            bounds.clear();
+            sets.clear();
             // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
             for &j in problem.iter() {
                 offset.push((y[j] + shift[j]) / weight[j]);
                 problem_tolerance.push(tolerance[j] / weight[j]);
                 multipliers.push(trial.lambda_raw[j]);
-                bounds.push(constraints.law(j).into());
+                sets.push(constraints.law(j).into());
             }
             let mut iterations = 0;
             for group in 0..operator.groups().len() {
@@ -160,9 +160,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 let own = &problem[range.clone()];
                 let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
                 let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
-                let (offset, bounds) = (&offset[range.clone()], &bounds[range.clone()]);
+                let (offset, sets) = (&offset[range.clone()], &sets[range.clone()]);
                 let tolerance = &problem_tolerance[range.clone()];
-                let data = ContactProblem { delassus, offset, bounds, tolerance, version };
+                let data = ContactProblem::of(delassus, offset, sets, tolerance, version);
                 let solved = solver.solve(&data, &mut multipliers[range]);
                 let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[own[i]]));
                 iterations = iterations.max(spent?);

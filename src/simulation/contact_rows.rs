@@ -4,7 +4,7 @@ use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
 use super::program::{CompiledStage, ContactTarget};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates, Measure};
-use crate::contact_solver::{Bound, FORESEEN};
+use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -67,7 +67,7 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) versions: u64,
     pub(super) offset: Vec<T>,
     pub(super) problem_tolerance: Vec<T>,
-    pub(super) bounds: Vec<Bound>,
+    pub(super) sets: Vec<AdmissibleSet>,
     pub(super) multipliers: Vec<T>,
     /// What contact constrains, and where the gap is forecast, one entry a dof; empty for schemes that impose contact
     /// on the displacements of the new state.
@@ -102,7 +102,7 @@ impl<T: Real> ContactRowsWork<T> {
             versions: 0,
             offset: Vec::new(),
             problem_tolerance: Vec::new(),
-            bounds: Vec::new(),
+            sets: Vec::new(),
             multipliers: Vec::new(),
             target: vec![T::zero(); target_dofs],
             forecast: vec![T::zero(); forecast_dofs],
@@ -119,7 +119,7 @@ impl<T: Real> ContactRowsWork<T> {
             values.resize(rows, T::zero());
         }
         rates.resize(rows, GapRates::default());
-        let Self { curved, measure, enabled, in_problem, on_massless, problem, bounds, .. } = self;
+        let Self { curved, measure, enabled, in_problem, on_massless, problem, sets, .. } = self;
         curved.make_room(rows, entries);
         measure.resize(rows, Measure::AsScheme);
         enabled.resize(rows, true);
@@ -128,7 +128,7 @@ impl<T: Real> ContactRowsWork<T> {
             on_massless.resize(rows, false);
         }
         problem.reserve(rows);
-        bounds.reserve(rows);
+        sets.reserve(rows);
         for values in [&mut self.offset, &mut self.problem_tolerance, &mut self.multipliers] {
             values.reserve(rows);
         }

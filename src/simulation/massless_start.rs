@@ -4,7 +4,7 @@ use super::constraints::Constraints;
 use super::massless::{Columns, Embedded, is_damped};
 use super::operator::Operator;
 use crate::contact::{Candidates, ContactJacobian};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -151,9 +151,9 @@ fn press_start<T: Real>(
         problem.sort_unstable();
         let pick = |values: &[T]| -> Vec<T> { problem.iter().map(|&row| values[row]).collect() };
         let (offset, rounded) = (pick(&free), pick(&tolerance));
-        let bounds: Vec<Bound> = problem.iter().map(|&row| constraints.law(row).into()).collect();
+        let sets: Vec<AdmissibleSet> = problem.iter().map(|&row| constraints.law(row).into()).collect();
         let (delassus, version) = operator.delassus(g, &problem, |k| laws[problem[k]][0], &mut versions)?;
-        let data = ContactProblem { delassus, offset: &offset, bounds: &bounds, tolerance: &rounded, version };
+        let data = ContactProblem::of(delassus, &offset, &sets, &rounded, version);
         let mut lambda = vec![T::zero(); problem.len()];
         solver.reserve(problem.len());
         solver

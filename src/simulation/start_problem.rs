@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::supports::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::contact_solver::{Bound, ContactProblem, ContactSolver};
+use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
 use crate::error::Result;
 use crate::real::Real;
@@ -201,12 +201,12 @@ impl<T: Real> StartProblem<T> {
                 s[k * rows.len() + k] += compliance[row];
             }
             let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
-            let bounds: Vec<Bound> = rows.iter().map(|&row| constraints.law(row).into()).collect();
+            let sets: Vec<AdmissibleSet> = rows.iter().map(|&row| constraints.law(row).into()).collect();
             let (q, rounded) = (pick(offset), pick(tolerance));
             lambda.clear();
             lambda.resize(rows.len(), T::zero());
             solver.reserve(rows.len());
-            let problem = ContactProblem { delassus: &s, offset: &q, bounds: &bounds, tolerance: &rounded, version: 0 };
+            let problem = ContactProblem::of(&s, &q, &sets, &rounded, 0);
             solver
                 .solve(&problem, lambda)
                 .map_err(|failure| contact_error(t, failure, |i| constraints.ids[rows[i]]))?;

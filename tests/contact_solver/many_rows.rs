@@ -1,7 +1,7 @@
 //! Hundreds of rows that press together: solved by iteration where they are independent, and as exactly as few.
 
 use contact_dynamics::Real;
-use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
 use contact_dynamics_scenes::random::Congruential;
 
 /// The flexibility of nodes on a square grid, in units that differ by decades: falls off with their distance.
@@ -28,20 +28,20 @@ fn check<T: Real>(side: usize, exact: f64) {
     let n = side * side;
     let w: Vec<T> = flexibility(side, 3.0).into_iter().map(T::of).collect();
     let mut random = Congruential(7);
-    let bounds: Vec<Bound> = (0..n).map(|i| if i % 11 == 0 { Bound::Free } else { Bound::NonNegative }).collect();
+    let sets: Vec<AdmissibleSet> =
+        (0..n).map(|i| if i % 11 == 0 { AdmissibleSet::Free } else { AdmissibleSet::NonNegative }).collect();
     let (mut multipliers, mut gaps) = (vec![T::zero(); n], vec![T::zero(); n]);
     for i in 0..n {
         let unit = w[i * n + i].sqrt();
-        match (bounds[i], random.within(0.0, 1.0) < 0.8) {
-            (Bound::Free, _) => multipliers[i] = T::of(random.within(-1.0, 1.0)) / unit,
+        match (sets[i], random.within(0.0, 1.0) < 0.8) {
+            (AdmissibleSet::Free, _) => multipliers[i] = T::of(random.within(-1.0, 1.0)) / unit,
             (_, true) => multipliers[i] = T::of(random.within(0.2, 1.0)) / unit,
             (_, false) => gaps[i] = T::of(random.within(0.2, 1.0)) * unit,
         }
     }
     let offset = offset(&w, &multipliers, &gaps);
     let tolerance = vec![T::zero(); n];
-    let problem =
-        |version| ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version };
+    let problem = |version| ContactProblem::new(&w, &offset, &sets, &tolerance).unwrap().with_version(version);
     let mut solver = ActiveSet::default();
     let mut cold = vec![T::zero(); n];
     solver.solve(&problem(3), &mut cold).unwrap();
@@ -73,8 +73,8 @@ fn four_hundred_supports_of_a_rigid_table() {
     let n = side * side;
     let place = |i: usize| [1.0, (i % side) as f64 - 9.5, (i / side) as f64 - 9.5];
     let w: Vec<f64> = (0..n * n).map(|e| place(e / n).iter().zip(place(e % n)).map(|(a, b)| a * b).sum()).collect();
-    let (offset, bounds, tolerance) = (vec![-1.0; n], vec![Bound::NonNegative; n], vec![1e-14; n]);
-    let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
+    let (offset, sets, tolerance) = (vec![-1.0; n], vec![AdmissibleSet::NonNegative; n], vec![1e-14; n]);
+    let problem = ContactProblem::new(&w, &offset, &sets, &tolerance).unwrap();
     let mut lambda = vec![0.0; n];
     ActiveSet::default().solve(&problem, &mut lambda).unwrap();
     for axis in 0..3 {

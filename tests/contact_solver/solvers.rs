@@ -1,16 +1,17 @@
 //! The contact solvers on their own: against each other, against closed forms, and where they must refuse.
 
-use contact_dynamics::Real;
 use contact_dynamics::contact_solver::{
-    ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
+    ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
+use contact_dynamics::{Error, LinearRows, Newmark, Real, Simulation};
 use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::sparse::free;
 
 #[derive(Clone, Debug)]
 struct Problem<T = f64> {
     delassus: Vec<T>,
     offset: Vec<T>,
-    bounds: Vec<Bound>,
+    sets: Vec<AdmissibleSet>,
     tolerance: Vec<T>,
 }
 
@@ -19,14 +20,14 @@ impl<T: Real> Problem<T> {
         Self {
             delassus: delassus.iter().map(|&x| T::of(x)).collect(),
             offset: offset.iter().map(|&x| T::of(x)).collect(),
-            bounds: vec![Bound::NonNegative; offset.len()],
+            sets: vec![AdmissibleSet::NonNegative; offset.len()],
             tolerance: vec![T::zero(); offset.len()],
         }
     }
 
     fn view(&self) -> ContactProblem<'_, T> {
-        let Self { delassus, offset, bounds, tolerance } = self;
-        ContactProblem { delassus, offset, bounds, tolerance, version: 0 }
+        let Self { delassus, offset, sets, tolerance } = self;
+        ContactProblem::new(delassus, offset, sets, tolerance).unwrap()
     }
 
     fn gaps(&self, multipliers: &[T]) -> Vec<T> {
@@ -39,7 +40,7 @@ impl<T: Real> Problem<T> {
 
     /// The residual as a fraction of the largest |q_i|.
     fn residual(&self, multipliers: &[T]) -> f64 {
-        assert!(multipliers.iter().zip(&self.bounds).all(|(&l, &b)| b == Bound::Free || l >= T::zero()));
+        assert!(multipliers.iter().zip(&self.sets).all(|(&l, &b)| b == AdmissibleSet::Free || l >= T::zero()));
         assert!(multipliers.iter().all(|l| l.is_finite()));
         (self.view().residual(multipliers).1 / self.scale().max(T::min_positive_value())).value()
     }
@@ -74,24 +75,24 @@ fn random(random: &mut Congruential, size: usize, rank: usize, columns: usize, f
         }
     }
     let delassus = gram(&rows);
-    let (mut bounds, mut multipliers, mut gaps) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut sets, mut multipliers, mut gaps) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..size {
         let diagonal: f64 = delassus[i * (size + 1)];
         let (kind, value) = (random.unit(), random.within(0.2, 1.0));
         let (bound, lambda, gap) = if kind < free {
-            (Bound::Free, if random.unit() < 0.5 { value } else { -value }, 0.0)
+            (AdmissibleSet::Free, if random.unit() < 0.5 { value } else { -value }, 0.0)
         } else if random.unit() < 0.5 {
-            (Bound::NonNegative, value, 0.0)
+            (AdmissibleSet::NonNegative, value, 0.0)
         } else {
-            (Bound::NonNegative, 0.0, value)
+            (AdmissibleSet::NonNegative, 0.0, value)
         };
-        bounds.push(bound);
+        sets.push(bound);
         multipliers.push(lambda / diagonal.sqrt());
         gaps.push(gap * diagonal.sqrt());
     }
     let product = |i: usize| (0..size).map(|j| delassus[i + j * size] * multipliers[j]).sum::<f64>();
     let offset = (0..size).map(|i| gaps[i] - product(i)).collect();
-    (Problem { delassus, offset, bounds, tolerance: vec![0.0; size] }, gaps)
+    (Problem { delassus, offset, sets, tolerance: vec![0.0; size] }, gaps)
 }
 
 fn solve<T: Real>(
@@ -197,7 +198,7 @@ fn pivoting_bears_nearly_dependent_rows() {
 fn pivoting_shares_the_load_where_the_active_rows_know_too_little() {
     for e in [1e-5, 1.3e-5, 1.7e-5, 2e-5, 3e-5, 5e-5] {
         let problem = Problem {
-            bounds: vec![Bound::Free, Bound::Free, Bound::NonNegative],
+            sets: vec![AdmissibleSet::Free, AdmissibleSet::Free, AdmissibleSet::NonNegative],
             ..Problem::<f64>::unilateral(&[1.0, 1.0, 0.0, 1.0, 1.0 + e * e, e, 0.0, e, 1.0], &[0.0, -0.7 * e, -0.7])
         };
         let (found, _) = solve(&mut Pivoting::default(), &problem, &[0.0; 3]).unwrap();
@@ -237,13 +238,13 @@ fn pivoting_solves_degenerate_problems() {
     }
 }
 
-/// W, q, bounds and λ.
-type Case = ([f64; 4], [f64; 2], [Bound; 2], [f64; 2]);
+/// W, q, sets and λ.
+type Case = ([f64; 4], [f64; 2], [AdmissibleSet; 2], [f64; 2]);
 
 #[test]
 fn closed_forms() {
-    let free = [Bound::Free, Bound::NonNegative];
-    let both = [Bound::NonNegative; 2];
+    let free = [AdmissibleSet::Free, AdmissibleSet::NonNegative];
+    let both = [AdmissibleSet::NonNegative; 2];
     let cases: [Case; 7] = [
         // Both closed; the second opened by the first; both open.
         ([2.0, 1.0, 1.0, 2.0], [-4.0, -5.0], both, [1.0, 2.0]),
@@ -258,8 +259,8 @@ fn closed_forms() {
         ([0.0, 0.0, 0.0, 4.0], [1.0, -2.0], both, [0.0, 0.5]),
     ];
     for (name, mut solver, _) in general::<f64>() {
-        for (delassus, offset, bounds, expected) in cases {
-            let problem = Problem { bounds: bounds.to_vec(), ..Problem::unilateral(&delassus, &offset) };
+        for (delassus, offset, sets, expected) in cases {
+            let problem = Problem { sets: sets.to_vec(), ..Problem::unilateral(&delassus, &offset) };
             let (found, _) = solve(&mut *solver, &problem, &[0.0; 2]).unwrap();
             for (found, expected) in found.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-11, "{name}: {found:?}, not {expected:?}");
@@ -286,7 +287,8 @@ fn closed_forms() {
 
 #[test]
 fn free_rows_twice_are_one_if_they_agree() {
-    let twice = |q: f64| Problem::<f64> { bounds: vec![Bound::Free; 2], ..Problem::unilateral(&[2.0; 4], &[4.0, q]) };
+    let twice =
+        |q: f64| Problem::<f64> { sets: vec![AdmissibleSet::Free; 2], ..Problem::unilateral(&[2.0; 4], &[4.0, q]) };
     for (name, mut solver, _) in general::<f64>() {
         let (found, _) = solve(&mut *solver, &twice(4.0), &[0.0; 2]).unwrap();
         assert!((found[0] + found[1] + 2.0).abs() < 1e-11, "{name}: {found:?}");
@@ -357,7 +359,7 @@ fn single_precision_runs() {
         for rank in [size, size.div_ceil(2)] {
             let (exact, gaps) = random(&mut numbers, size, rank, 2 * rank + 2, 0.2);
             let mut problem = Problem::<f32>::unilateral(&exact.delassus, &exact.offset);
-            problem.bounds.clone_from(&exact.bounds);
+            problem.sets.clone_from(&exact.sets);
             for (name, mut solver, _) in general::<f32>() {
                 // Redundant rows of W, rounded to f32, contradict each other by as much.
                 let (found, _) =
@@ -413,7 +415,7 @@ fn problems_without_a_solution_are_refused() {
         let stuck = Problem::unilateral(&[1.0, 0.0, 0.0, 0.0], &[-1.0, -2.0]);
         let failure = solve(&mut **solver, &stuck, &[0.0; 2]);
         assert_eq!(failure, Err(ContactFailure::NotConverged { iterations: 0, row: 1, residual: 2.0 }), "{name}");
-        let stuck = Problem { bounds: vec![Bound::Free], ..Problem::unilateral(&[0.0], &[2.0]) };
+        let stuck = Problem { sets: vec![AdmissibleSet::Free], ..Problem::unilateral(&[0.0], &[2.0]) };
         assert!(solve(&mut **solver, &stuck, &[0.0]).is_err(), "{name}");
         // Less space than the body takes.
         let stuck = Problem::unilateral(&[1.0, -1.0, -1.0, 1.0], &[-1.0, 0.9]);
@@ -536,5 +538,38 @@ fn solving_allocates_nothing() {
             solver.solve(&problem.view(), &mut multipliers).unwrap();
         });
         assert_eq!(counted.count_total, 0, "{name}");
+    }
+}
+
+/// A solver for contacts that push alone.
+#[derive(Debug)]
+struct PushOnly;
+
+impl ContactSolver<f64> for PushOnly {
+    fn admits(&self, set: AdmissibleSet) -> bool {
+        set == AdmissibleSet::NonNegative
+    }
+
+    fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, f64>,
+        multipliers: &mut [f64],
+    ) -> Result<usize, ContactFailure<f64>> {
+        Pivoting::default().solve(problem, multipliers)
+    }
+}
+
+#[test]
+fn laws_that_a_solver_does_not_take_are_refused() {
+    let build = |rows: LinearRows<'static, f64>| {
+        let solver: Box<dyn ContactSolver<f64>> = Box::new(PushOnly);
+        Simulation::builder(free(&[1.0]), Newmark::trapezoidal(), 0.1).constraint(rows).contact_solver(solver).build()
+    };
+    build(LinearRows::new().unilateral(&[(0, 1.0)], 1.0)).unwrap();
+    match build(LinearRows::new().equality(&[(0, 1.0)], 0.0)) {
+        Err(Error::Incompatible { part, .. }) => {
+            assert!(part.contains("Equality") && part.contains("PushOnly"), "{part}");
+        }
+        other => panic!("{other:?}"),
     }
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // small random numbers
 
 use contact_dynamics::contact_solver::{
-    ActiveSet, Bound, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
+    ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
@@ -772,9 +772,8 @@ fn dense_problems_that_are_not_symmetric() {
         let w: Dense = (0..m).map(|i| (0..m).map(|j| entry(i, j)).collect()).collect();
         let q: Vec<f64> = (0..m).map(|i| unit[i] * random.signed()).collect();
         let (flat, tolerance) = (w.concat(), vec![0.0; m]);
-        let bounds = vec![Bound::NonNegative; m];
-        let problem =
-            |version| ContactProblem { delassus: &flat, offset: &q, bounds: &bounds, tolerance: &tolerance, version };
+        let bounds = vec![AdmissibleSet::NonNegative; m];
+        let problem = |version| ContactProblem::new(&flat, &q, &bounds, &tolerance).unwrap().with_version(version);
         let dimensionless = |i: usize, x: f64| x * unit[i];
         // In sizes of one, for the enumeration.
         let plain: Dense = (0..m).map(|i| (0..m).map(|j| w[i][j] / unit[i] / unit[j]).collect()).collect();
@@ -806,14 +805,8 @@ fn redundant_and_contradictory_rows_of_a_problem_that_is_not_symmetric() {
     let base = [[2.0, 1.5], [-0.5, 1.0]];
     let rows = [0, 0, 1];
     let w: Vec<f64> = rows.iter().flat_map(|&i| rows.map(|j| base[i][j])).collect();
-    let bounds = [Bound::NonNegative; 3];
-    let problem = ContactProblem {
-        delassus: &w,
-        offset: &[-3.0, -3.0, -1.0],
-        bounds: &bounds,
-        tolerance: &[1e-15; 3],
-        version: 0,
-    };
+    let bounds = [AdmissibleSet::NonNegative; 3];
+    let problem = ContactProblem::new(&w, &[-3.0, -3.0, -1.0], &bounds, &[1e-15; 3]).unwrap();
     let exact = solved(vec![base[0].to_vec(), base[1].to_vec()], vec![3.0, 1.0]);
     assert!(exact.iter().all(|&x| x > 0.0));
     for guess in [0.0, 1.0] {
@@ -827,13 +820,7 @@ fn redundant_and_contradictory_rows_of_a_problem_that_is_not_symmetric() {
     let g = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]];
     let answer = |i: usize, j: usize| (0..2).map(|a| (0..2).map(|b| g[i][a] * base[a][b] * g[j][b]).sum::<f64>()).sum();
     let w: Vec<f64> = (0..9).map(|k| answer(k / 3, k % 3)).collect();
-    let problem = ContactProblem {
-        delassus: &w,
-        offset: &[-1.0, -1.0, 0.5],
-        bounds: &bounds,
-        tolerance: &[1e-15; 3],
-        version: 0,
-    };
+    let problem = ContactProblem::new(&w, &[-1.0, -1.0, 0.5], &bounds, &[1e-15; 3]).unwrap();
     let failure = ActiveSet::default().solve(&problem, &mut [0.0; 3]);
     assert!(matches!(failure, Err(ContactFailure::Contradictory { row: 0 | 1, other: 0 | 1, .. })), "{failure:?}");
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::float_cmp)] // exact zeros and unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactJacobian, ContactLaw};
-use contact_dynamics::contact_solver::{ActiveSet, Bound, ContactProblem, ContactSolver};
+use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, CentralDifference, Composite, GeneralizedAlpha, Gssss, Houbolt, JumpProjection,
@@ -392,9 +392,9 @@ proptest! {
                 (0..n).map(|l| entries[i * n + l] * entries[j * n + l]).sum::<f64>() + if i == j { 0.05 } else { 0.0 }
             })
             .collect();
-        let bounds: Vec<_> = (0..n).map(|i| if i < free { Bound::Free } else { Bound::NonNegative }).collect();
+        let bounds: Vec<_> = (0..n).map(|i| if i < free { AdmissibleSet::Free } else { AdmissibleSet::NonNegative }).collect();
         let tolerance = vec![1e-13; n];
-        let problem = ContactProblem { delassus: &w, offset: &offset, bounds: &bounds, tolerance: &tolerance, version: 0 };
+        let problem = ContactProblem::new(&w, &offset, &bounds, &tolerance).unwrap();
         let mut solver = ActiveSet::default();
         solver.reserve(n);
         let mut lambda = guess.iter().map(|&x| if x > 0.5 { x } else { 0.0 }).collect::<Vec<_>>();

@@ -2,9 +2,9 @@
 
 use super::*;
 
-fn solve(w: &[f64], q: &[f64], bounds: &[Bound], guess: &[f64]) -> Result<Vec<f64>, ContactFailure<f64>> {
+fn solve(w: &[f64], q: &[f64], sets: &[AdmissibleSet], guess: &[f64]) -> Result<Vec<f64>, ContactFailure<f64>> {
     let tolerance = vec![1e-13; q.len()];
-    let problem = ContactProblem { delassus: w, offset: q, bounds, tolerance: &tolerance, version: 0 };
+    let problem = ContactProblem::new(w, q, sets, &tolerance).unwrap();
     let mut lambda = guess.to_vec();
     let mut solver = ActiveSet::default();
     solver.solve(&problem, &mut lambda)?;
@@ -17,14 +17,16 @@ fn guess_does_not_change_the_solution() {
     // A row that repels another one: activating both is wrong.
     let w = [1.0, 0.9, 0.9, 1.0];
     for guess in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
-        let lambda = solve(&w, &[-1.0, -0.5], &[Bound::NonNegative; 2], &guess).unwrap();
+        let lambda = solve(&w, &[-1.0, -0.5], &[AdmissibleSet::NonNegative; 2], &guess).unwrap();
         assert!((lambda[0] - 1.0).abs() < 1e-15 && lambda[1] == 0.0, "{lambda:?}");
     }
 }
 
 #[test]
 fn free_rows_may_pull() {
-    let lambda = solve(&[2.0, 0.0, 0.0, 2.0], &[1.0, 1.0], &[Bound::Free, Bound::NonNegative], &[0.0; 2]).unwrap();
+    let lambda =
+        solve(&[2.0, 0.0, 0.0, 2.0], &[1.0, 1.0], &[AdmissibleSet::Free, AdmissibleSet::NonNegative], &[0.0; 2])
+            .unwrap();
     assert!((lambda[0] + 0.5).abs() < 1e-15 && lambda[1] == 0.0, "{lambda:?}");
 }
 
@@ -38,7 +40,8 @@ fn a_problem_on_which_block_exchanges_cycle_is_solved() {
         [3.0, 3.0, -3.0, 10.1, 2.0],
         [12.0, 0.0, -9.0, 2.0, 13.1],
     ];
-    let lambda = solve(&w.concat(), &[4.0, -2.0, -4.0, -2.0, 1.0], &[Bound::NonNegative; 5], &[0.0; 5]).unwrap();
+    let lambda =
+        solve(&w.concat(), &[4.0, -2.0, -4.0, -2.0, 1.0], &[AdmissibleSet::NonNegative; 5], &[0.0; 5]).unwrap();
     assert!(lambda.iter().all(|&l| l >= 0.0) && lambda.iter().any(|&l| l > 0.0), "{lambda:?}");
 }
 
@@ -58,13 +61,7 @@ fn rounding_of_a_loaded_row_does_not_exchange_rows_at_rest() {
     ];
     let offset = [-6.765_851_609_745_381e-35, 8.129_493_350_609_44e-7, -1.517_144_857_880_793_5e-5];
     let tolerance = [5.3e-37, 2.3e-20, 4.3e-19];
-    let problem = ContactProblem {
-        delassus: &w,
-        offset: &offset,
-        bounds: &[Bound::NonNegative; 3],
-        tolerance: &tolerance,
-        version: 0,
-    };
+    let problem = ContactProblem::new(&w, &offset, &[AdmissibleSet::NonNegative; 3], &tolerance).unwrap();
     let mut lambda = [0.0_f64; 3];
     let iterations = ActiveSet::default().solve(&problem, &mut lambda).unwrap();
     assert!(iterations <= 4, "{iterations}");
@@ -73,7 +70,7 @@ fn rounding_of_a_loaded_row_does_not_exchange_rows_at_rest() {
 
 #[test]
 fn redundant_rows_share_the_force() {
-    let both = [Bound::NonNegative; 2];
+    let both = [AdmissibleSet::NonNegative; 2];
     let lambda = solve(&[1.0; 4], &[-1.0, -1.0], &both, &[0.0; 2]).unwrap();
     assert!((lambda[0] - 0.5).abs() < 1e-14 && (lambda[1] - 0.5).abs() < 1e-14, "{lambda:?}");
     // The same dof at two gaps: the nearer one alone presses, whatever the guess.
@@ -82,7 +79,8 @@ fn redundant_rows_share_the_force() {
         assert!((lambda[0] - 1.0).abs() < 1e-12 && lambda[1] == 0.0, "{lambda:?}");
     }
     // A tie and a contact on the same dof.
-    let lambda = solve(&[1.0; 4], &[1.0, 1.0], &[Bound::Free, Bound::NonNegative], &[0.0, 1.0]).unwrap();
+    let lambda =
+        solve(&[1.0; 4], &[1.0, 1.0], &[AdmissibleSet::Free, AdmissibleSet::NonNegative], &[0.0, 1.0]).unwrap();
     assert!((lambda[0] + lambda[1] + 1.0).abs() < 1e-12 && lambda[1] >= 0.0, "{lambda:?}");
 }
 
@@ -91,7 +89,7 @@ fn the_same_contact_in_other_units() {
     let scale = [1.0, 1.0, 3.0, 1.0];
     let w: Vec<f64> = (0..16).map(|k| 1.6e-3 * scale[k % 4] * scale[k / 4]).collect();
     let q = scale.map(|s| -8.38e-5 * s);
-    let lambda = solve(&w, &q, &[Bound::NonNegative; 4], &[0.0; 4]).unwrap();
+    let lambda = solve(&w, &q, &[AdmissibleSet::NonNegative; 4], &[0.0; 4]).unwrap();
     for (lambda, s) in lambda.iter().zip(scale) {
         assert!((lambda - 8.38e-5 / 1.6e-3 * s / 12.0).abs() < 1e-12, "{lambda}");
     }
@@ -106,7 +104,7 @@ fn four_supports_of_a_rigid_table() {
     // A load off the center: the multipliers carry it, and no others of smaller norm do.
     for load in [[-4.0, 0.0, 0.0], [-4.0, 1.0, 0.5], [-4.0, -2.0, 1.0]] {
         let q: Vec<f64> = corners.iter().map(|c| c.iter().zip(&load).map(|(c, l)| c * l).sum()).collect();
-        let lambda = solve(&w, &q, &[Bound::NonNegative; 4], &[0.0; 4]).unwrap();
+        let lambda = solve(&w, &q, &[AdmissibleSet::NonNegative; 4], &[0.0; 4]).unwrap();
         for (axis, load) in load.iter().enumerate() {
             let carried: f64 = corners.iter().zip(&lambda).map(|(c, l)| c[axis] * l).sum();
             assert!((carried + load).abs() < 1e-12, "{lambda:?}");
@@ -122,7 +120,7 @@ fn contradictions_are_named() {
     // A dof that must be above 1 and below −1, and a third contact that has nothing to do with it.
     let w = [1.0, -1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     for guess in [[0.0; 3], [1.0; 3]] {
-        match solve(&w, &[-1.0, -1.0, -1.0], &[Bound::NonNegative; 3], &guess) {
+        match solve(&w, &[-1.0, -1.0, -1.0], &[AdmissibleSet::NonNegative; 3], &guess) {
             Err(ContactFailure::Contradictory { row, other, residual }) => {
                 assert!(row < 2 && other < 2 && row != other);
                 assert!((residual - 1.0).abs() < 0.5, "{residual}");
@@ -130,20 +128,15 @@ fn contradictions_are_named() {
             other => panic!("{other:?}"),
         }
     }
-    let tied = solve(&[1.0; 4], &[-1.0, 1.0], &[Bound::Free; 2], &[0.0; 2]);
+    let tied = solve(&[1.0; 4], &[-1.0, 1.0], &[AdmissibleSet::Free; 2], &[0.0; 2]);
     assert!(matches!(tied, Err(ContactFailure::Contradictory { .. })), "{tied:?}");
 }
 
 #[test]
 fn rounding_is_no_contradiction() {
     // The same tie twice, its offsets rounded differently, and tolerances that know nothing of it.
-    let problem = ContactProblem {
-        delassus: &[1.0; 4],
-        offset: &[-1e-2, -1e-2 - 4e-15],
-        bounds: &[Bound::Free; 2],
-        tolerance: &[1e-19; 2],
-        version: 0,
-    };
+    let problem =
+        ContactProblem::new(&[1.0; 4], &[-1e-2, -1e-2 - 4e-15], &[AdmissibleSet::Free; 2], &[1e-19; 2]).unwrap();
     let mut lambda = [0.0; 2];
     ActiveSet::default().solve(&problem, &mut lambda).unwrap();
     assert!((lambda[0] + lambda[1] - 1e-2_f64).abs() < 1e-14, "{lambda:?}");
@@ -155,9 +148,8 @@ fn large_problems_and_kept_factors() {
     let b = |i: usize, k: usize| (((i * 31 + k * 17) % 23) as f64 - 11.0) / 11.0 + if i == k { 4.0 } else { 0.0 };
     let w: Vec<f64> = (0..n * n).map(|e| (0..n).map(|k| b(e % n, k) * b(e / n, k)).sum()).collect();
     let q: Vec<f64> = (0..n).map(|i| (i as f64 * 0.9).sin() - 0.3).collect();
-    let (bounds, tolerance) = (vec![Bound::NonNegative; n], vec![1e-14; n]);
-    let problem =
-        |offset, version| ContactProblem { delassus: &w, offset, bounds: &bounds, tolerance: &tolerance, version };
+    let (sets, tolerance) = (vec![AdmissibleSet::NonNegative; n], vec![1e-14; n]);
+    let problem = |offset, version| ContactProblem::new(&w, offset, &sets, &tolerance).unwrap().with_version(version);
     let mut solver = ActiveSet::default();
     let mut cold = vec![0.0; n];
     solver.solve(&problem(&q, 7), &mut cold).unwrap();
