@@ -4,6 +4,7 @@ mod admitted;
 mod advance;
 mod builder;
 mod closing;
+mod constraint_part;
 mod constraints;
 mod contact_multipliers;
 mod contact_output;
