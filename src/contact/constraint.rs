@@ -164,6 +164,15 @@ pub trait ContactConstraint<T: Real>: Send {
     }
 }
 
+impl<T: Real> Contacts<T> {
+    /// What a constraint says now, for hosts that look at a constraint themselves.
+    pub fn of(constraint: &(impl ContactConstraint<T> + ?Sized)) -> Self {
+        let mut contacts = Self::new();
+        constraint.contacts(&mut contacts);
+        contacts
+    }
+}
+
 /// Forwards every method, defaults included: what is boxed or lent behaves as what it is.
 macro_rules! forward {
     ($($kind:tt)+) => {
