@@ -6,6 +6,7 @@ mod builder;
 #[cfg(feature = "serde")]
 mod checkpoint;
 mod closing;
+mod constraint_part;
 mod constraints;
 mod contact_multipliers;
 mod contact_output;

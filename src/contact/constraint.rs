@@ -6,11 +6,11 @@ use crate::real::Real;
 
 /// A constraint `g(t, u) ≥ 0` (or = 0) on some displacements, with as many rows as it has candidates.
 ///
-/// Like an element a constraint knows its own dofs alone: [`dofs`](Self::dofs) lists them once, and every vector that it
-/// is given has one entry for each of them, in this order. Rows name *places* in that list.
+/// Like an element a constraint knows its own dofs alone: [`dofs`](Self::dofs) lists them once, and every vector that
+/// it is given has one entry for each of them, in this order. Rows name *places* in that list.
 ///
-/// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow); gaps are evaluated anywhere, exactly
-/// or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on the system
+/// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow); gaps are evaluated anywhere,
+/// exactly or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on the system
 /// is Gᵀ λ, λ > 0 in compression.
 ///
 /// The end of a bar against a wall that moves (13 lines):
@@ -161,6 +161,15 @@ pub trait ContactConstraint<T: Real>: Send {
     /// nothing is known.
     fn variation(&self) -> Variation {
         Variation::Follows
+    }
+}
+
+impl<T: Real> Contacts<T> {
+    /// What a constraint says now, for hosts that look at a constraint themselves.
+    pub fn of(constraint: &(impl ContactConstraint<T> + ?Sized)) -> Self {
+        let mut contacts = Self::new();
+        constraint.contacts(&mut contacts);
+        contacts
     }
 }
 

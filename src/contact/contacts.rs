@@ -1,12 +1,13 @@
 //! What a constraint says of its candidates: names, laws, rows, and what is drawn of them.
 
-use super::{ContactConstraint, ContactJacobian, ContactLaw};
+use super::{ContactJacobian, ContactLaw};
 use crate::real::Real;
 
 /// What a constraint says of its candidates, in their order: filled by
-/// [`ContactConstraint::contacts`], one [`push`](Self::push) a candidate.
+/// [`ContactConstraint::contacts`](super::ContactConstraint::contacts), one [`push`](Self::push) a candidate.
 ///
-/// Rows name dofs by their *place* in [`ContactConstraint::dofs`], not by their number in the system.
+/// Rows name dofs by their *place* in [`ContactConstraint::dofs`](super::ContactConstraint::dofs), not by their number
+/// in the system.
 ///
 /// ```
 /// use contact_dynamics::ContactLaw;
@@ -52,13 +53,6 @@ impl<T: Real> Contacts<T> {
     /// None yet.
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// What a constraint says now, for hosts that look at a constraint themselves.
-    pub fn of(constraint: &(impl ContactConstraint<T> + ?Sized)) -> Self {
-        let mut contacts = Self::new();
-        constraint.contacts(&mut contacts);
-        contacts
     }
 
     /// Forgets all, and keeps the memory.

@@ -1,6 +1,7 @@
 //! All constraints of a simulation as one list of rows.
 
 use super::admitted::Admitted;
+use super::constraint_part::{Local, Part, gather, of};
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
 use crate::contact::{
@@ -39,70 +40,6 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
     overclosures: Option<Overclosures<T>>,
     added: Vec<T>,
-}
-
-/// A constraint with what it has said.
-struct Part<'a, T: Real> {
-    constraint: Box<dyn ContactConstraint<T> + 'a>,
-    dofs: Vec<usize>,
-    contacts: Contacts<T>,
-    variation: Variation,
-    /// Where its rows are linearized: time and displacements.
-    place: (f64, Vec<T>),
-    /// Whether its rows may have changed since they were read.
-    stale: bool,
-    /// Whether it has left its rates to differences.
-    differenced: bool,
-}
-
-impl<T: Real> Part<'_, T> {
-    /// Moves the linearization to its own u.
-    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        if self.variation != Variation::Follows {
-            return Ok(Candidates::Unchanged);
-        }
-        self.settle(t, u);
-        self.constraint.follow(t, u)
-    }
-
-    /// Notes where the rows are linearized.
-    fn settle(&mut self, t: f64, u: &[T]) {
-        if self.variation == Variation::Follows {
-            self.place.0 = t;
-            self.place.1.clear();
-            self.place.1.extend_from_slice(u);
-        }
-    }
-}
-
-/// Vectors of a constraint.
-#[derive(Default)]
-struct Local<T> {
-    u: Vec<T>,
-    v: Vec<T>,
-    other: Vec<T>,
-}
-
-/// The entries of a vector of the system that belong to a constraint.
-fn gather<'l, T: Real>(dofs: &[usize], x: &[T], local: &'l mut Vec<T>) -> &'l [T] {
-    local.clear();
-    local.extend(dofs.iter().map(|&dof| x[dof]));
-    local
-}
-
-/// The error of a constraint, with its number in the names of contacts.
-fn of(constraint: usize, error: Error) -> Error {
-    match error {
-        Error::PassedThrough { t, h, contact, what, way, gap } => {
-            let contact = ContactId { constraint, ..contact };
-            Error::PassedThrough { t, h, contact, what, way, gap }
-        }
-        Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
-        Error::ContactNotFinite { t, what, contact, value } => {
-            Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }
-        }
-        other => other,
-    }
 }
 
 /// The place of a dof that no constraint has listed among those it may act on.

@@ -1,0 +1,69 @@
+//! One constraint of a run: its dofs, what it has said, and its local vectors.
+
+use crate::contact::{Candidates, ContactConstraint, ContactId, Contacts, Variation};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// A constraint with what it has said.
+pub(super) struct Part<'a, T: Real> {
+    pub(super) constraint: Box<dyn ContactConstraint<T> + 'a>,
+    pub(super) dofs: Vec<usize>,
+    pub(super) contacts: Contacts<T>,
+    pub(super) variation: Variation,
+    /// Where its rows are linearized: time and displacements.
+    pub(super) place: (f64, Vec<T>),
+    /// Whether its rows may have changed since they were read.
+    pub(super) stale: bool,
+    /// Whether it has left its rates to differences.
+    pub(super) differenced: bool,
+}
+
+impl<T: Real> Part<'_, T> {
+    /// Moves the linearization to its own u.
+    pub(super) fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        if self.variation != Variation::Follows {
+            return Ok(Candidates::Unchanged);
+        }
+        self.settle(t, u);
+        self.constraint.follow(t, u)
+    }
+
+    /// Notes where the rows are linearized.
+    pub(super) fn settle(&mut self, t: f64, u: &[T]) {
+        if self.variation == Variation::Follows {
+            self.place.0 = t;
+            self.place.1.clear();
+            self.place.1.extend_from_slice(u);
+        }
+    }
+}
+
+/// Vectors of a constraint.
+#[derive(Default)]
+pub(super) struct Local<T> {
+    pub(super) u: Vec<T>,
+    pub(super) v: Vec<T>,
+    pub(super) other: Vec<T>,
+}
+
+/// The entries of a vector of the system that belong to a constraint.
+pub(super) fn gather<'l, T: Real>(dofs: &[usize], x: &[T], local: &'l mut Vec<T>) -> &'l [T] {
+    local.clear();
+    local.extend(dofs.iter().map(|&dof| x[dof]));
+    local
+}
+
+/// The error of a constraint, with its number in the names of contacts.
+pub(super) fn of(constraint: usize, error: Error) -> Error {
+    match error {
+        Error::PassedThrough { t, h, contact, what, way, gap } => {
+            let contact = ContactId { constraint, ..contact };
+            Error::PassedThrough { t, h, contact, what, way, gap }
+        }
+        Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
+        Error::ContactNotFinite { t, what, contact, value } => {
+            Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }
+        }
+        other => other,
+    }
+}
