@@ -12,6 +12,7 @@ use super::pairing::{
 use super::path::PathWork;
 use super::program::{Compiler, Program};
 use super::rate_check::RateCheck;
+use super::responses::Unit;
 use super::results::Statistics;
 use super::resumed::Resumed;
 use super::run::Simulation;
@@ -375,10 +376,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             Stability::Unchecked => StepLimit::Unchecked,
         };
 
-        let interface = constraints.interface();
+        let (interface, unit) = (constraints.interface(), Unit::of(&constraints));
         let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
         let h = history.clock.h;
-        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface };
+        let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
         let program = compiler.compile(&scheme.tableau)?;
         let is_known = history.known == scheme.depth;
         let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;

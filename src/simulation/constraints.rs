@@ -202,6 +202,11 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.parts.iter().all(|part| part.variation != Variation::Follows)
     }
 
+    /// Whether rows never change at all.
+    pub(crate) fn is_fixed(&self) -> bool {
+        self.parts.iter().all(|part| part.variation == Variation::Never)
+    }
+
     /// The version of the rows: what was computed from rows of another version is out of date.
     pub(crate) fn version(&self) -> u64 {
         self.version

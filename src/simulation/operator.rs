@@ -79,14 +79,15 @@ impl<T: Real> Delassus<T> {
 }
 
 impl<T: Real> Operator<T> {
-    /// Assembles and factorizes; contact may act on the `interface`.
+    /// Assembles and factorizes; contact may act on the `interface`. While the matrix stays responses are kept for each
+    /// `unit`.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         solver: &dyn LinearSolver<T>,
         weights: [f64; 3],
         h: f64,
         at: At<'_, T>,
-        interface: &[usize],
+        (interface, unit): (&[usize], Unit),
     ) -> Result<Self> {
         let (tangent, combination) = pattern(system, weights)?;
         let linearity = system.linearity();
@@ -98,7 +99,7 @@ impl<T: Real> Operator<T> {
             }
             _ => Vec::new(),
         };
-        let unit = if varies { Unit::Row } else { Unit::Dof };
+        let unit = if varies { Unit::Row } else { unit };
         let mut operator = Self {
             weights,
             tangent,

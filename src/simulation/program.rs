@@ -1,6 +1,7 @@
 //! A tableau compiled for one system and one step size: scaled coefficients, and which operator each stage solves with.
 
 use super::operator::Operator;
+use super::responses::Unit;
 use super::tangent::At;
 use crate::error::Result;
 use crate::linear_solver::LinearSolver;
@@ -260,6 +261,8 @@ pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) at: At<'c, T>,
     /// The free dofs that contact may ever act on.
     pub(crate) interface: &'c [usize],
+    /// What responses of a matrix that stays are kept for.
+    pub(crate) unit: Unit,
 }
 
 impl<T: Real> Compiler<'_, T> {
@@ -292,7 +295,7 @@ impl<T: Real> Compiler<'_, T> {
                     weights,
                     self.h,
                     self.at,
-                    self.interface,
+                    (self.interface, self.unit),
                 )?);
             }
             let increment = stage.increment();

@@ -3,6 +3,7 @@
 use super::constraints::Constraints;
 use super::past::taylor;
 use super::program::Compiler;
+use super::responses::Unit;
 use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
@@ -170,9 +171,9 @@ impl<T: Real> Simulation<'_, T> {
         contact_solver.reserve(work.contact.rows.reserved);
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {
-            let interface = constraints.interface();
+            let (interface, unit) = (constraints.interface(), Unit::of(constraints));
             let at = At { t, u: &begun.motion.u, v: &begun.motion.v, of: TangentOf::State };
-            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, interface };
+            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, interface, unit };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);

@@ -1,8 +1,9 @@
 //! Responses of the interface to unit forces, kept for what has been pressed.
 //!
-//! Where the matrix stays they belong to dofs: rows that turn cost products then, and no solve. Where it changes with
-//! every iteration they are solved for again anyway, and belong to rows, of which there are fewer.
+//! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where the
+//! matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
 
+use super::constraints::Constraints;
 use crate::contact::ContactJacobian;
 use crate::error::Result;
 use crate::linear_solver::COLUMNS;
@@ -16,6 +17,13 @@ pub(crate) enum Unit {
     Dof,
     /// A unit multiplier of a row.
     Row,
+}
+
+impl Unit {
+    /// What responses of a matrix that stays are kept for: rows that never change are fewer than the dofs they act on.
+    pub(super) fn of<T: Real>(constraints: &Constraints<'_, T>) -> Self {
+        if constraints.is_fixed() { Self::Row } else { Self::Dof }
+    }
 }
 
 /// Columns of displacements of the interface, filled when first needed.
