@@ -144,7 +144,7 @@ impl<T: Real> ContactJacobian<T> {
     pub(crate) fn interface_coupling(&self, i: usize, j: usize, diagonal: &[T]) -> T {
         let terms = self.located(i).flat_map(|(place, weight)| {
             let shared = self.located(j).filter(move |(other, _)| *other == place);
-            shared.map(move |(_, other)| weight * other * diagonal[place])
+            shared.map(move |(_, other)| weight * (other * diagonal[place]))
         });
         terms.sum()
     }

@@ -119,7 +119,7 @@ impl<T: Real> ContactRowsWork<T> {
             values.resize(rows, T::zero());
         }
         rates.resize(rows, GapRates::default());
-        let Self { curved, measure, enabled, in_problem, on_massless, problem, sets, .. } = self;
+        let Self { curved, measure, enabled, in_problem, on_massless, problem, sorted, sets, .. } = self;
         curved.make_room(rows, entries);
         measure.resize(rows, Measure::AsScheme);
         enabled.resize(rows, true);
@@ -128,6 +128,7 @@ impl<T: Real> ContactRowsWork<T> {
             on_massless.resize(rows, false);
         }
         problem.reserve(rows);
+        sorted.reserve(rows);
         sets.reserve(rows);
         for values in [&mut self.offset, &mut self.problem_tolerance, &mut self.multipliers] {
             values.reserve(rows);

@@ -367,8 +367,10 @@ impl<T: Real> Operator<T> {
         }
         if self.contact == ContactPath::Apart {
             response.fill(T::zero());
-            for ((response, &force), &reciprocal) in response.iter_mut().zip(&*forces).zip(&self.reciprocals) {
-                *response = force * reciprocal;
+            for (&row, &lambda) in rows.iter().zip(multipliers) {
+                for (place, weight) in g.located(row) {
+                    response[place] += lambda * (weight * self.reciprocals[place]);
+                }
             }
             return;
         }

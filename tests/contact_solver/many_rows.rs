@@ -83,5 +83,5 @@ fn four_hundred_supports_of_a_rigid_table() {
         assert!((carried - load).abs() < 1e-11, "{axis}: {carried}");
     }
     // Of the many ways to carry it one without peaks.
-    assert!(lambda.iter().all(|lambda| (lambda * n as f64 - 1.0).abs() < 0.1), "{lambda:?}");
+    assert!(lambda.iter().all(|lambda| lambda * (n as f64) < 1.5), "{lambda:?}");
 }
