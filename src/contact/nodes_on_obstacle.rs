@@ -63,6 +63,8 @@ impl<T: Real, const D: usize> Node<T, D> {
 pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     obstacle: Box<dyn Obstacle<T, D> + 'a>,
     dofs: DofList,
+    /// Which of them rows may act on.
+    acts: Vec<bool>,
     nodes: Vec<Node<T, D>>,
     law: ContactLaw,
     reach: T,
@@ -124,7 +126,14 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         let capacity = nodes.len();
         let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
-        Ok(Self { obstacle, dofs: list, nodes, law, reach: T::infinity(), motion: None, rows, before })
+        let normal = obstacle.fixed_normal();
+        let mut acts = vec![normal.is_none(); list.as_slice().len()];
+        for (node, normal) in nodes.iter().filter_map(|node: &Node<T, D>| normal.map(|normal| (node, normal))) {
+            for (&place, weight) in node.dofs.iter().zip(normal) {
+                acts[place] |= weight != T::zero();
+            }
+        }
+        Ok(Self { obstacle, dofs: list, acts, nodes, law, reach: T::infinity(), motion: None, rows, before })
     }
 
     /// The law of all rows; [`ContactLaw::Rigid`] by default.
@@ -229,13 +238,11 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
 
     /// Across an axis-aligned normal that is fixed nodes do not act.
     fn only_reads(&self, place: usize) -> bool {
-        let acts = |normal: [T; D], node: &Node<T, D>| {
-            node.dofs.iter().zip(normal).any(|(&dof, weight)| dof == place && weight != T::zero())
-        };
-        self.obstacle.fixed_normal().is_some_and(|normal| !self.nodes.iter().any(|node| acts(normal, node)))
+        !self.acts[place]
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
+        let own = self.obstacle.magnitude();
         for row in &self.rows {
             let node = &self.nodes[row.node];
             let mut entries = [(0, T::zero()); D];
@@ -246,7 +253,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                     count += 1;
                 }
             }
-            let size = row.place.iter().fold(row.size, |most, x| most.max(x.abs()));
+            let size = row.place.iter().fold(row.size.max(own), |most, x| most.max(x.abs()));
             contacts
                 .push((node.number, 0), self.law, &entries[..count])
                 .magnitude(size)

@@ -40,6 +40,12 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
         None
     }
 
+    /// The largest length from which a distance is left when it is computed (length), for instance a radius: gaps within
+    /// its rounding are zero. Default: none but the coordinates of the point.
+    fn magnitude(&self) -> T {
+        T::zero()
+    }
+
     /// Where a straight way goes into the body and turns outward again, if it does: what moves so in one step has
     /// missed a contact. Default: found by going along the way in steps that the distance allows, but no shorter than
     /// 1/16 of it; hollows and crests smaller than that may be missed.
@@ -222,6 +228,10 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Sphere<T, D> {
         round_curvature(minus(x, self.center), w, self.side)
     }
 
+    fn magnitude(&self) -> T {
+        self.center.iter().fold(self.radius, |largest, x| largest.max(x.abs()))
+    }
+
     fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
         let way = minus(to, from);
         through_round(minus(from, self.center), way, dot(way, way).sqrt(), self.radius, self.side)
@@ -270,6 +280,10 @@ impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
 
     fn curvature(&self, x: [T; 3], w: [T; 3]) -> T {
         round_curvature(self.across(minus(x, self.point)), self.across(w), self.side)
+    }
+
+    fn magnitude(&self) -> T {
+        self.point.iter().fold(self.radius, |largest, x| largest.max(x.abs()))
     }
 
     fn passage(&self, from: [T; 3], to: [T; 3]) -> Option<Passage<T>> {
@@ -333,6 +347,9 @@ impl<T: Real, const D: usize, O: Obstacle<T, D> + ?Sized> Obstacle<T, D> for Box
     }
     fn fixed_normal(&self) -> Option<[T; D]> {
         (**self).fixed_normal()
+    }
+    fn magnitude(&self) -> T {
+        (**self).magnitude()
     }
     fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
         (**self).passage(from, to)

@@ -85,7 +85,7 @@ impl From<ContactLaw> for AdmissibleSet {
 ///
 /// let sets = [AdmissibleSet::NonNegative; 2];
 /// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &sets, &[1e-14; 2])?;
-/// let mut lambda = [0.0; 2];
+/// let mut lambda = [0.0_f64; 2];
 /// ActiveSet::default().solve(&problem, &mut lambda)?;
 /// assert!((lambda[0] - 1.0).abs() < 1e-15 && problem.residual(&lambda).1 < 1e-15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
