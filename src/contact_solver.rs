@@ -30,7 +30,8 @@ pub(crate) const FORESEEN: usize = 128;
 ///
 /// let mut solver: Box<dyn ContactSolver<f64>> = Box::new(ActiveSet::default());
 /// solver.reserve(2);
-/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &[AdmissibleSet::NonNegative; 2], &[1e-14; 2]).unwrap();
+/// let sets = [AdmissibleSet::NonNegative; 2];
+/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &sets, &[1e-14; 2]).unwrap();
 /// let mut lambda = [0.0; 2];
 /// solver.solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] - 1.0).abs() < 1e-15 && lambda[1] == 0.0);

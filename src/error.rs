@@ -263,8 +263,8 @@ pub enum Error {
     },
     /// A contact row acts where its constraint has no dof that it may act on.
     #[error(
-        "contact {contact} acts on place {place} of its constraint's dofs, but `dofs` lists no such place, or `only_reads` \
-         says that no row acts there; rows name places in `dofs`, not dofs of the system"
+        "contact {contact} acts on place {place} of its constraint's dofs, but `dofs` lists no such place, or \
+         `only_reads` says that no row acts there; rows name places in `dofs`, not dofs of the system"
     )]
     UnlistedPlace {
         /// The contact.

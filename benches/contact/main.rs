@@ -1,9 +1,10 @@
 //! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the
 //! work on the interface alone: condensation, responses, the contact solver.
 //!
-//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed` for the steps with few and many
-//! pressed contacts alone.
+//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed` for the steps with few and
+//! many pressed contacts alone, `-- candidates` for a million candidates alone.
 
+mod candidates;
 mod pressed;
 
 use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
@@ -25,10 +26,18 @@ const INTERFACE: &[Ratio] = &[Ratio { heading: "/ bare solve", to: &["bare solve
 
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
-    pressed::measure(&arguments);
-    if std::env::args().any(|argument| argument == "pressed") {
+    let asked = |word: &str| std::env::args().any(|argument| argument == word);
+    if asked("pressed") || asked("candidates") {
+        if asked("pressed") {
+            pressed::measure(&arguments);
+        }
+        if asked("candidates") {
+            candidates::measure(&arguments);
+        }
         return;
     }
+    pressed::measure(&arguments);
+    candidates::measure(&arguments);
     for &n in &arguments.sizes {
         measure(n, &arguments);
     }

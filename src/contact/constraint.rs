@@ -10,8 +10,8 @@ use crate::real::Real;
 /// it is given has one entry for each of them, in this order. Rows name *places* in that list.
 ///
 /// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow); gaps are evaluated anywhere,
-/// exactly or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on the system
-/// is Gᵀ λ, λ > 0 in compression.
+/// exactly or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on
+/// the system is Gᵀ λ, λ > 0 in compression.
 ///
 /// The end of a bar against a wall that moves (13 lines):
 ///

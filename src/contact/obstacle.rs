@@ -40,8 +40,8 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
         None
     }
 
-    /// The largest length from which a distance is left when it is computed (length), for instance a radius: gaps within
-    /// its rounding are zero. Default: none but the coordinates of the point.
+    /// The largest length from which a distance is left when it is computed (length), for instance a radius: gaps
+    /// within its rounding are zero. Default: none but the coordinates of the point.
     fn magnitude(&self) -> T {
         T::zero()
     }

@@ -1,5 +1,5 @@
-//! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or of many rows by iteration. What is computed from W
-//! serves again while W and the rows stay.
+//! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or of many rows by iteration. What is computed from
+//! W serves again while W and the rows stay.
 
 use super::many_rows::ManyRows;
 use super::{ContactProblem, FORESEEN};

@@ -34,7 +34,8 @@ use crate::real::Real;
 /// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
 ///
 /// // The same contact twice: which of the two carries is arbitrary, their sum is not.
-/// let problem = ContactProblem::new(&[1.0, 1.0, 1.0, 1.0], &[-3.0, -3.0], &[AdmissibleSet::NonNegative; 2], &[1e-15; 2]).unwrap();
+/// let sets = [AdmissibleSet::NonNegative; 2];
+/// let problem = ContactProblem::new(&[1.0, 1.0, 1.0, 1.0], &[-3.0, -3.0], &sets, &[1e-15; 2]).unwrap();
 /// let mut lambda = [0.0_f64; 2];
 /// GaussSeidel::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] + lambda[1] - 3.0).abs() < 1e-11);

@@ -2,9 +2,9 @@
 //! number.
 //!
 //! The preconditioner is a factorized sparse approximate inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14,
-//! 1993): H with a few entries a row, such that H W Hᵀ is near the identity. A contact feels its neighbors most, so that
-//! a row of H needs no more than the rows of W that are largest beside its own; iterations do then not grow with the
-//! number of rows.
+//! 1993): H with a few entries a row, such that H W Hᵀ is near the identity. A contact feels its neighbors most, so
+//! that a row of H needs no more than the rows of W that are largest beside its own; iterations do then not grow with
+//! the number of rows.
 
 use super::ContactProblem;
 use crate::dense::dot;

@@ -30,7 +30,8 @@ use crate::real::Real;
 /// ```
 /// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, ProjectedGradient};
 ///
-/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-4.0, -5.0], &[AdmissibleSet::NonNegative; 2], &[1e-15; 2]).unwrap();
+/// let sets = [AdmissibleSet::NonNegative; 2];
+/// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-4.0, -5.0], &sets, &[1e-15; 2]).unwrap();
 /// let mut lambda = [0.0_f64; 2];
 /// ProjectedGradient::default().solve(&problem, &mut lambda).unwrap();
 /// assert!((lambda[0] - 1.0).abs() < 1e-11 && (lambda[1] - 2.0).abs() < 1e-11);

@@ -103,10 +103,8 @@ impl<T: Real> Corrector<T> for ContactStabilized {
     }
 
     fn check_damping(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
-        Err(
-            "it leaves the contact nodes the velocity of their approach while they stay where they are, and damping would \
-             act on that; choose PersistencyCorrection",
-        )
+        Err("it leaves the contact nodes the velocity of their approach while they stay where they are, and damping \
+             would act on that; choose PersistencyCorrection")
     }
 
     fn predicts(&self) -> bool {

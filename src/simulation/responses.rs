@@ -1,7 +1,7 @@
 //! Responses of the interface to unit forces, kept for what has been pressed.
 //!
-//! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where the
-//! matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
+//! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where
+//! the matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
 
 use super::constraints::Constraints;
 use crate::contact::ContactJacobian;

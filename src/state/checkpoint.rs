@@ -44,8 +44,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// A file names its format (1), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of
 /// schemes apart. The format changes when what is stored changes, and files of another one are refused; results, and
 /// with them the bits of a run, may change between versions of the crate without that. Stored are the vectors of the
-/// state and of the past that is read, the contacts, the clock, the place of a controlled step size in the nominal grid,
-/// and the depths of overlaps at the start.
+/// state and of the past that is read, the contacts, the clock, the place of a controlled step size in the nominal
+/// grid, and the depths of overlaps at the start.
 ///
 /// Not in it are system, constraints, correctors and settings: the host builds these again as they were. A history of
 /// the host's own (plastic strains, as [`System::commit`](crate::System::commit) moves them) is the host's to save.
