@@ -1,10 +1,12 @@
 //! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the
 //! work on the interface alone: condensation, responses, the contact solver.
 //!
-//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed` for the steps with few and
-//! many pressed contacts alone, `-- candidates` for a million candidates alone.
+//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed`, `-- nonlinear` and
+//! `-- candidates` for steps with few and many pressed contacts, for iterations with contact, and for a million
+//! candidates, alone.
 
 mod candidates;
+mod nonlinear;
 mod pressed;
 
 use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
@@ -24,20 +26,23 @@ const RATIOS: &[Ratio] = &[
 
 const INTERFACE: &[Ratio] = &[Ratio { heading: "/ bare solve", to: &["bare solve"] }];
 
+/// A part of the bench that can be asked for by name.
+type Part = (&'static str, fn(&Arguments));
+
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
+    let parts: [Part; 3] =
+        [("pressed", pressed::measure), ("nonlinear", nonlinear::measure), ("candidates", candidates::measure)];
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
-    if asked("pressed") || asked("candidates") {
-        if asked("pressed") {
-            pressed::measure(&arguments);
+    let alone = parts.iter().any(|(word, _)| asked(word));
+    for (word, measure) in parts {
+        if asked(word) || !alone {
+            measure(&arguments);
         }
-        if asked("candidates") {
-            candidates::measure(&arguments);
-        }
+    }
+    if alone {
         return;
     }
-    pressed::measure(&arguments);
-    candidates::measure(&arguments);
     for &n in &arguments.sizes {
         measure(n, &arguments);
     }
