@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod active_set;
+mod applied;
 mod equations;
 mod failure;
 mod gauss_seidel;
@@ -12,6 +13,7 @@ mod projected_gradient;
 
 pub use crate::contact_failure::ContactFailure;
 pub use active_set::ActiveSet;
+pub use applied::AppliedProblem;
 pub(crate) use failure::{contact_error, no_response};
 pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
@@ -22,6 +24,9 @@ use crate::real::Real;
 
 /// Rows for which memory is reserved at build. More are rare, and get it when they first press.
 pub(crate) const FORESEEN: usize = 128;
+
+/// Rows from which on nothing may cost their cube, nor a solve each where solves are needed again and again.
+pub(crate) const MANY: usize = 256;
 
 /// A solver of [`ContactProblem`]s.
 ///
@@ -62,9 +67,28 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>>;
+
+    /// Solves a problem whose W is known by its products alone, as [`solve`](Self::solve) does: hundreds of rows on a
+    /// body whose matrix changes with every iteration. Where this fails, or there is nothing, W is formed and
+    /// [`solve`](Self::solve) called. Default: nothing, for the solver needs entries of W.
+    fn solve_applied(
+        &mut self,
+        problem: &mut AppliedProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> Option<std::result::Result<usize, ContactFailure<T>>> {
+        let _ = (problem, multipliers);
+        None
+    }
 }
 
 impl<T: Real, S: ContactSolver<T> + ?Sized> ContactSolver<T> for Box<S> {
+    fn solve_applied(
+        &mut self,
+        problem: &mut AppliedProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> Option<std::result::Result<usize, ContactFailure<T>>> {
+        (**self).solve_applied(problem, multipliers)
+    }
     fn admits(&self, set: AdmissibleSet) -> bool {
         (**self).admits(set)
     }

@@ -2,6 +2,7 @@
 
 mod admitted;
 mod advance;
+mod applied_rows;
 mod builder;
 #[cfg(feature = "serde")]
 mod checkpoint;

@@ -1,6 +1,7 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
 use super::acceptance::{Acceptance, Settings};
+use super::applied::{AppliedProblem, AppliedSet};
 use super::equations::{Equations, Solved, Symmetry};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
@@ -28,6 +29,7 @@ use crate::real::Real;
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,
+    applied: AppliedSet<T>,
     /// Whether W is symmetric, and the version of which that is known.
     symmetry: (u64, Symmetry),
     active: Vec<bool>,
@@ -282,6 +284,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         pivoting.reserve(size.min(FORESEEN));
         *self = Self {
             equations: Equations::with_capacity(size),
+            applied: AppliedSet::default(),
             symmetry: (0, Symmetry::Symmetric),
             active: Vec::with_capacity(size),
             rows: Vec::with_capacity(size),
@@ -294,6 +297,14 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             center: reals(),
             pivoting,
         };
+    }
+
+    fn solve_applied(
+        &mut self,
+        problem: &mut AppliedProblem<'_, T>,
+        multipliers: &mut [T],
+    ) -> Option<Result<usize, ContactFailure<T>>> {
+        Some(self.applied.solve(problem, multipliers))
     }
 
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {

@@ -2,7 +2,7 @@
 //! W serves again while W and the rows stay.
 
 use super::many_rows::ManyRows;
-use super::{ContactProblem, FORESEEN};
+use super::{ContactProblem, FORESEEN, MANY};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
@@ -43,10 +43,6 @@ pub(super) enum Solved {
     /// Rows depend on one another, and W is not symmetric: none was found.
     Not,
 }
-
-/// Active rows from which on the equations are solved by iteration, if they are independent of one another: a factor
-/// costs the cube of their number.
-const MANY: usize = 256;
 
 impl<T: Real> Equations<T> {
     /// Memory for up to so many rows. Of many the factor is a last resort, and gets its memory when it is needed.

@@ -1,5 +1,6 @@
 //! The contact problem of a stage: which rows take part, and their multipliers.
 
+use super::applied_rows::AppliedRows;
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::{ContactStep, ContactWork};
 use super::interface::InterfaceWork;
@@ -124,6 +125,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             sorted,
             reserved,
             problem,
+            own,
+            scale,
             versions,
             offset,
             curved,
@@ -150,27 +153,40 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 multipliers.push(trial.lambda_raw[j]);
                 sets.push(constraints.law(j).into());
             }
-            let mut iterations = 0;
-            for group in 0..operator.groups().len() {
-                let range = operator.groups().range(group);
-                if range.len() > *reserved {
-                    *reserved = range.len().next_power_of_two();
-                    solver.reserve(*reserved);
+            let InterfaceWork { pressing, response, .. } = &mut *interface;
+            let mut solved = None;
+            if operator.applies(problem.len()) {
+                own.clear();
+                own.extend(problem.iter().map(|&row| compliance[row] / weight[row]));
+                let problem = AppliedRows { g: forces, rows: problem, own, offset, sets, tolerance: problem_tolerance };
+                solved = problem.solve(operator, &mut **solver, [pressing, response], scale, multipliers)?;
+            }
+            if let Some(iterations) = solved {
+                statistics.contact_iterations += iterations as u64;
+            } else {
+                multipliers.clear();
+                multipliers.extend(problem.iter().map(|&row| trial.lambda_raw[row]));
+                let mut iterations = 0;
+                for group in 0..operator.groups().len() {
+                    let range = operator.groups().range(group);
+                    if range.len() > *reserved {
+                        *reserved = range.len().next_power_of_two();
+                        solver.reserve(*reserved);
+                    }
+                    let own = &problem[range.clone()];
+                    let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
+                    let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
+                    let (offset, sets) = (&offset[range.clone()], &sets[range.clone()]);
+                    let tolerance = &problem_tolerance[range.clone()];
+                    let data = ContactProblem::of(delassus, offset, sets, tolerance, version);
+                    let solved = solver.solve(&data, &mut multipliers[range]);
+                    let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[own[i]]));
+                    iterations = iterations.max(spent?);
                 }
-                let own = &problem[range.clone()];
-                let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
-                let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
-                let (offset, sets) = (&offset[range.clone()], &sets[range.clone()]);
-                let tolerance = &problem_tolerance[range.clone()];
-                let data = ContactProblem::of(delassus, offset, sets, tolerance, version);
-                let solved = solver.solve(&data, &mut multipliers[range]);
-                let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[own[i]]));
-                iterations = iterations.max(spent?);
+                statistics.contact_iterations += iterations as u64;
+                operator.answer(forces, (problem, multipliers), pressing, response);
             }
             statistics.contact_solves += 1;
-            statistics.contact_iterations += iterations as u64;
-            let InterfaceWork { pressing, response, .. } = &mut *interface;
-            operator.answer(forces, (problem, multipliers), pressing, response);
             let mut grown = false;
             for row in 0..count {
                 if enabled[row] && !in_problem[row] && weight[row] > T::zero() {

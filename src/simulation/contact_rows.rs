@@ -59,6 +59,9 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) on_massless: Vec<bool>,
     /// Rows of the problem, and its data, one entry a row of the problem.
     pub(super) problem: Vec<usize>,
+    /// Compliances of these rows, and the size of the diagonal of W, where W is applied and not formed.
+    pub(super) own: Vec<T>,
+    pub(super) scale: Vec<T>,
     /// The same rows, ascending.
     pub(super) sorted: Vec<usize>,
     /// Rows for which the contact solver has memory.
@@ -97,6 +100,8 @@ impl<T: Real> ContactRowsWork<T> {
             in_problem: Vec::new(),
             on_massless: Vec::new(),
             problem: Vec::new(),
+            own: Vec::new(),
+            scale: Vec::new(),
             sorted: Vec::new(),
             reserved: rows.min(FORESEEN),
             versions: 0,

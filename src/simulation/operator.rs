@@ -3,7 +3,7 @@
 use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::contact::{ContactJacobian, Groups};
-use crate::contact_solver::FORESEEN;
+use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::mass::Mass;
@@ -375,6 +375,46 @@ impl<T: Real> Operator<T> {
             return;
         }
         self.responses.respond((rows, multipliers), forces, response);
+    }
+
+    /// Whether W of so many rows is dearer to form than to apply: the factor changes with every iteration.
+    pub(crate) fn applies(&self, rows: usize) -> bool {
+        self.varies() && rows >= MANY && self.contact != ContactPath::Apart
+    }
+
+    /// The size of the diagonal of W: that of a body that answers on each dof as if the others were held.
+    pub(crate) fn scale(&self, g: &ContactJacobian<T>, rows: &[usize], scale: &mut Vec<T>) {
+        let pattern = self.combination.pattern();
+        let diagonal = |place: usize| {
+            let dof = self.interface[place];
+            let range = pattern.col_range(dof);
+            let at = pattern.row_idx()[range.clone()].binary_search(&dof);
+            at.map_or(T::zero(), |at| self.values[range.start + at])
+        };
+        scale.clear();
+        scale.extend(
+            rows.iter().map(|&row| g.located(row).map(|(place, weight)| weight * weight / diagonal(place)).sum::<T>()),
+        );
+    }
+
+    /// W λ of some rows by one solve; the forces Gᵀ λ and their response on the interface are left in two vectors there.
+    pub(crate) fn apply(
+        &mut self,
+        g: &ContactJacobian<T>,
+        (rows, multipliers): (&[usize], &[T]),
+        [forces, response]: [&mut [T]; 2],
+        y: &mut [T],
+    ) -> Result<()> {
+        forces.fill(T::zero());
+        for (&row, &lambda) in rows.iter().zip(multipliers) {
+            g.interface_scatter(row, lambda, forces);
+        }
+        response.copy_from_slice(forces);
+        self.respond(response)?;
+        for (y, &row) in y.iter_mut().zip(rows) {
+            *y = g.interface_product(row, response);
+        }
+        Ok(())
     }
 
     /// Forgets the Delassus operator of other rows than those of this version.

@@ -1,7 +1,9 @@
 //! Many candidates and many pressed contacts: what they cost is what presses, and what is kept of them changes nothing.
 
-use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
+use contact_dynamics::contact::{NodesOnObstacle, Plane, Side, Sphere};
+use contact_dynamics::contact_solver::Pivoting;
 use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Newmark, Simulation};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::matrix;
 
@@ -70,5 +72,40 @@ fn candidates_that_stay_open_take_no_part() {
             [run.state().displacement()[dof], run.state().velocity()[dof]].map(f64::to_bits)
         };
         assert_eq!(of(&all), of(&few));
+    }
+}
+
+/// A thin neo-Hookean block that falls flat on the floor: hundreds of contacts close at once.
+fn soft() -> contact_dynamics::SimulationBuilder<'static, f64> {
+    let material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+    let solid = Solid::block([4.0, 4.0, 0.5], [16, 16, 1], material);
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
+    let floor = Plane::new([0.0, 0.0, -0.01], [0.0, 0.0, 1.0]).unwrap();
+    let contact = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+    let body = Hyperelastic::new(&solid, Law::NeoHookean).gravity([0.0, 0.0, -0.01]);
+    let v = solid.uniform([0.02, 0.0, -0.1]);
+    Simulation::builder(body, Newmark::trapezoidal(), 0.1).velocity(v).constraint(contact)
+}
+
+#[test]
+fn contact_by_products_of_w_is_that_of_its_entries() {
+    let mut applied = soft().build().unwrap();
+    let mut formed = soft().contact_solver(Pivoting::default()).build().unwrap();
+    let mut most = 0;
+    for step in 0..6 {
+        applied.step().unwrap();
+        formed.step().unwrap();
+        most = most.max(closed(&applied));
+        let scale = formed.state().velocity().iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+        for (a, b) in applied.state().velocity().iter().zip(formed.state().velocity()) {
+            assert!((a - b).abs() < 1e-8 * scale, "step {step}: {a} {b}");
+        }
+    }
+    assert!(most > 256, "{most}");
+    let mut resumed = soft().resume(applied.state().clone(), applied.history().clone()).build().unwrap();
+    for step in 0..2 {
+        applied.step().unwrap();
+        resumed.step().unwrap();
+        assert!(applied.state() == resumed.state(), "step {step}");
     }
 }
