@@ -6,7 +6,7 @@ use super::equations::{Equations, Solved, Symmetry};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
 
-/// Primal–dual active set (semismooth Newton) on the dense Delassus operator, safeguarded by Murty's least-index rule.
+/// Primal–dual active set (semismooth Newton) on the Delassus operator, safeguarded by Murty's least-index rule.
 ///
 /// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
 /// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
@@ -14,6 +14,12 @@ use crate::real::Real;
 /// again. That is finite for every positive definite W, symmetric or not (Murty's rule: for every matrix with positive
 /// principal minors). Steady contact takes one iteration, and while W and the active
 /// rows stay the same no factorization.
+///
+/// From 256 active rows on, the equations are solved by conjugate gradients with a factorized sparse approximate inverse
+/// (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), to the rounding of each, if no row depends on its
+/// neighbors; else by the factor. Problems whose W is applied and not formed
+/// ([`solve_applied`](ContactSolver::solve_applied)) take plain exchanges of blocks, and are given back where these do
+/// not end.
 ///
 /// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are
 /// then those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a
