@@ -73,7 +73,17 @@ impl<T: Real> Settings<T> {
         problem: &'a ContactProblem<'a, T>,
         multipliers: &mut [T],
     ) -> std::result::Result<Acceptance<'a, T>, ContactFailure<T>> {
-        let finite = |i: &usize| problem.offset[*i].is_finite() && T::all_finite(problem.row(*i));
+        self.begin_with(problem, false, multipliers)
+    }
+
+    /// The same; W need not be looked at again if it is `known` to be finite.
+    pub(super) fn begin_with<'a>(
+        &self,
+        problem: &'a ContactProblem<'a, T>,
+        known: bool,
+        multipliers: &mut [T],
+    ) -> std::result::Result<Acceptance<'a, T>, ContactFailure<T>> {
+        let finite = |i: &usize| problem.offset[*i].is_finite() && (known || T::all_finite(problem.row(*i)));
         if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
             return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
         }

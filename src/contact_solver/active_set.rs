@@ -36,15 +36,15 @@ use crate::real::Real;
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,
     applied: AppliedSet<T>,
-    /// Whether W is symmetric, and the version of which that is known.
+    /// Whether W, whose entries are then finite, is symmetric, and the version of which that is known.
     symmetry: (u64, Symmetry),
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
-    /// y, and what of it is rounding: in a row's own sum, and with that of the multipliers it is coupled to.
+    violating: Vec<usize>,
+    /// y, and what of it is rounding in a row's own sum.
     y: Vec<T>,
     own: Vec<T>,
-    noise: Vec<T>,
     /// A proximal problem: its diagonal shift, offset and center.
     shift: Vec<T>,
     offset: Vec<T>,
@@ -80,8 +80,8 @@ enum Form {
     Proximal,
 }
 
-/// y of all rows for the multipliers `solution` of the active `rows`, and what of it is rounding; `column` gives those
-/// of W.
+/// y of all rows for the multipliers `solution` of the active `rows`, and what is rounding in a row's own sum; `column`
+/// gives those of W.
 fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     problem: &ContactProblem<'_, T>,
     column: impl Fn(usize) -> C,
@@ -89,7 +89,6 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     (rows, solution): (&[usize], &[T]),
     y: &mut Vec<T>,
     own: &mut Vec<T>,
-    noise: &mut Vec<T>,
 ) {
     // y = W λ + q and Σ |W λ|, column by column.
     y.clear();
@@ -108,25 +107,24 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     for (own, &tolerance) in own.iter_mut().zip(problem.tolerance) {
         *own = tolerance + T::of(32.0) * T::epsilon() * *own;
     }
-    // A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a
-    // body at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up
-    // like the steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single
-    // precision.)
-    noise.clear();
-    noise.resize(own.len(), T::zero());
-    for (j, &own) in own.iter().enumerate() {
-        let carried = own / problem.delassus(j, j);
-        if carried > T::zero() && carried.is_finite() {
-            for (i, (&w, noise)) in column(j).zip(noise.iter_mut()).enumerate() {
-                if i != j {
-                    *noise = noise.max(w.abs() * carried);
-                }
-            }
-        }
-    }
-    let walk = T::of(own.len() as f64).sqrt();
-    for (noise, &own) in noise.iter_mut().zip(own.iter()) {
-        *noise = own + walk * *noise;
+}
+
+/// Whether a miss of row i is more than rounding, that of its own sum and that of the multipliers it is coupled to.
+///
+/// A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a body
+/// at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up like the
+/// steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single precision.)
+fn exceeds_rounding<T: Real>(problem: &ContactProblem<'_, T>, own: &[T], i: usize, miss: T) -> bool {
+    // (Most rows miss nothing, and need not look at the others.)
+    miss > own[i] && {
+        let carried = |j: usize| own[j] / problem.delassus(j, j);
+        let others = problem.row(i).iter().enumerate().filter(|&(j, _)| j != i);
+        let largest = others.fold(T::zero(), |largest, (j, &w)| {
+            let carried = carried(j);
+            let counts = carried > T::zero() && carried.is_finite();
+            if counts { largest.max(w.abs() * carried) } else { largest }
+        });
+        miss > own[i] + T::of(own.len() as f64).sqrt() * largest
     }
 }
 
@@ -140,7 +138,7 @@ impl<T: Real> ActiveSet<T> {
         acceptance: &mut Acceptance<'_, T>,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { equations, symmetry, active, rows, solution, y, own, noise, shift, offset, .. } = self;
+        let Self { equations, symmetry, active, rows, violating, solution, y, own, shift, offset, .. } = self;
         let (_, symmetry) = *symmetry;
         active.clear();
         active.extend(multipliers.iter().zip(problem.sets).map(|(&l, &b)| b == AdmissibleSet::Free || l > T::zero()));
@@ -171,25 +169,29 @@ impl<T: Real> ActiveSet<T> {
             let (given, solved, size) = ((offset, &shift[..], form), (&rows[..], &solution[..]), size.max(1));
             match symmetry {
                 // Rows lie side by side.
-                Symmetry::Symmetric => judge(problem, |j| problem.row(j).iter(), given, solved, y, own, noise),
+                Symmetry::Symmetric => judge(problem, |j| problem.row(j).iter(), given, solved, y, own),
                 Symmetry::General => {
-                    judge(problem, |j| problem.delassus[j..].iter().step_by(size), given, solved, y, own, noise);
+                    judge(problem, |j| problem.delassus[j..].iter().step_by(size), given, solved, y, own);
                 }
             }
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
             // go, one that is left violated waits for the others.
-            let open = |i: usize| singular && y[i] > noise[i];
-            let violates = |i: usize, active: bool| match problem.sets[i] {
+            let exceeds = |i: usize, miss: T| exceeds_rounding(problem, own, i, miss);
+            let open = |i: usize| singular && exceeds(i, y[i]);
+            let violates = |i: usize| match problem.sets[i] {
                 AdmissibleSet::Free => false,
-                AdmissibleSet::NonNegative if active => problem.delassus(i, i) * multipliers[i] < -noise[i] || open(i),
-                AdmissibleSet::NonNegative => y[i] < -noise[i],
+                AdmissibleSet::NonNegative if active[i] => {
+                    exceeds(i, -problem.delassus(i, i) * multipliers[i]) || open(i)
+                }
+                AdmissibleSet::NonNegative => exceeds(i, -y[i]),
             };
-            let violations = (0..size).filter(|&i| violates(i, active[i]));
-            let (count, last) = violations.fold((0, 0), |(count, _), i| (count + 1, i));
+            violating.clear();
+            violating.extend((0..size).filter(|&i| violates(i)));
+            let (count, last) = (violating.len(), violating.last().copied().unwrap_or(0));
             if count == 0 {
                 // What multipliers make of y as they grow beyond all bounds is no rounding.
                 let held = |i: usize| match (problem.sets[i], active[i]) {
-                    _ if active[i] && singular && y[i].abs() > noise[i] => false,
+                    _ if active[i] && singular && exceeds(i, y[i].abs()) => false,
                     (AdmissibleSet::Free, _) => acceptance.bears(i, y[i].abs()),
                     (_, true) => acceptance.bears(i, y[i].abs().max(-problem.delassus(i, i) * multipliers[i])),
                     (_, false) => acceptance.bears(i, -y[i]),
@@ -220,11 +222,7 @@ impl<T: Real> ActiveSet<T> {
             }
             match tries {
                 0 => active[last] = !active[last],
-                _ => {
-                    for (i, active) in active.iter_mut().enumerate() {
-                        *active ^= violates(i, *active);
-                    }
-                }
+                _ => violating.iter().for_each(|&i| active[i] = !active[i]),
             }
         }
         let (row, residual) = problem.residual(multipliers);
@@ -294,10 +292,10 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             symmetry: (0, Symmetry::Symmetric),
             active: Vec::with_capacity(size),
             rows: Vec::with_capacity(size),
+            violating: Vec::with_capacity(size),
             solution: reals(),
             y: reals(),
             own: reals(),
-            noise: reals(),
             shift: reals(),
             offset: reals(),
             center: reals(),
@@ -317,8 +315,9 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         if problem.size() == 0 {
             return Ok(0);
         }
-        let mut acceptance = Settings::default().begin(problem, multipliers)?;
-        if problem.version == 0 || self.symmetry.0 != problem.version {
+        let known = problem.version != 0 && self.symmetry.0 == problem.version;
+        let mut acceptance = Settings::default().begin_with(problem, known, multipliers)?;
+        if !known {
             let symmetry = match problem.asymmetry(T::of(ROUNDED) * T::epsilon()) {
                 None => Symmetry::Symmetric,
                 Some(_) => Symmetry::General,
