@@ -53,6 +53,8 @@ pub trait Kernels: Sized {
     fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
     /// Whether every entry is finite.
     fn all_finite(x: &[Self]) -> bool;
+    /// The largest |x|; NaN is passed over.
+    fn largest(x: &[Self]) -> Self;
     /// `y += c A x`, any A.
     fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
     /// `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
@@ -174,6 +176,9 @@ macro_rules! kernels {
             }
             fn all_finite(x: &[Self]) -> bool {
                 vector::all_finite(x)
+            }
+            fn largest(x: &[Self]) -> Self {
+                vector::largest(x)
             }
             fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
                 product::product(c, a, x, y);

@@ -21,6 +21,7 @@ mod energy;
 mod finite;
 mod interface;
 mod judge;
+mod laws;
 mod linear_step;
 mod massless;
 mod massless_start;

@@ -15,6 +15,7 @@ pub(crate) use backup::Backup;
 #[cfg(feature = "serde")]
 pub use checkpoint::Checkpoint;
 pub(crate) use clock::{Clock, Pace, resolution};
+pub(crate) use contacts::Names;
 pub use contacts::{ContactState, ContactStatus};
 pub use history::History;
 pub(crate) use history::Trail;

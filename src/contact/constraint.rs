@@ -157,6 +157,12 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(())
     }
 
+    /// Whether [`inspect`](Self::inspect) looks at anything, asked after the first search: one that does not saves the
+    /// copying of its vectors. Default: it does.
+    fn inspects(&self) -> bool {
+        true
+    }
+
     /// When rows may change, asked after the first search: a run in which none follows saves the looking. Default:
     /// nothing is known.
     fn variation(&self) -> Variation {
@@ -201,6 +207,9 @@ macro_rules! forward {
             fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
                 (**self).inspect(step)
             }
+            fn inspects(&self) -> bool {
+                (**self).inspects()
+            }
             fn variation(&self) -> Variation {
                 (**self).variation()
             }
@@ -233,6 +242,9 @@ impl Candidates {
 pub enum Rates {
     /// The constraint has given them all.
     Given,
+    /// They are all zero, and the slice is left as it is: gaps are G u and a constant, with rows that do not turn. Not
+    /// asked again until rows change.
+    Zero,
     /// The caller finds them, by central differences of the gaps in time around (t, u): ∂g/∂t of g(t ± δ, u), and
     /// Ġ v + ∂ġ/∂t of g(t ± δ, u ± δ v), at which the constraint [follows](ContactConstraint::follow). What the gaps do
     /// between t ± 1/16 of the time that the search looks ahead enters, also at a start; the errors are fourth and
@@ -244,7 +256,7 @@ pub enum Rates {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Variation {
-    /// Never.
+    /// Never: [`ContactConstraint::search`] is called once, and nothing moves after it.
     Never,
     /// By a search, once a step: [`ContactConstraint::follow`] never moves anything, because gaps are affine in u
     /// between two searches.

@@ -218,6 +218,9 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn rates(&mut self, t: f64, _u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        if self.offsets.iter().all(|offset| matches!(offset, GapOffset::Constant(_))) {
+            return Ok(Rates::Zero);
+        }
         for (offset, rates) in self.offsets.iter_mut().zip(rates) {
             *rates = match offset {
                 GapOffset::Constant(_) => GapRates::default(),
@@ -228,6 +231,11 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
             };
         }
         Ok(Rates::Given)
+    }
+
+    /// What passes through an obstacle is never behind it: gaps are affine.
+    fn inspects(&self) -> bool {
+        false
     }
 
     fn variation(&self) -> Variation {

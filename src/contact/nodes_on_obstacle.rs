@@ -353,14 +353,22 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         let [shift, ..] = self.motion(t);
+        let flat = self.obstacle.fixed_normal().is_some();
         for (row, gap) in self.rows.iter().zip(gaps) {
             let place = minus(self.nodes[row.node].at(u), shift);
-            *gap = row.distance + dot(row.normal, minus(place, row.place));
+            *gap = match flat {
+                // The distance itself is affine, and the same to the bit whenever the last search was.
+                true => self.obstacle.distance(place).0,
+                false => row.distance + dot(row.normal, minus(place, row.place)),
+            };
         }
         Ok(())
     }
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        if self.obstacle.fixed_normal().is_some() && self.motion.is_none() {
+            return Ok(Rates::Zero);
+        }
         let [shift, velocity, acceleration] = self.motion(t);
         for (row, rates) in self.rows.iter().zip(rates) {
             let node = &self.nodes[row.node];

@@ -26,6 +26,8 @@ pub struct ContactJacobian<T> {
     pub(super) weights: Vec<T>,
     /// For each entry the place of its dof on the interface, once it is known; `NO_RESPONSE` on prescribed dofs.
     places: Vec<usize>,
+    /// The largest Σ |weight| of a row, once places are known.
+    largest: Option<T>,
 }
 
 /// The place of dofs that are no part of the interface.
@@ -33,7 +35,8 @@ pub(crate) const NO_RESPONSE: usize = usize::MAX;
 
 impl<T> Default for ContactJacobian<T> {
     fn default() -> Self {
-        Self { pointers: vec![0], dofs: Vec::new(), weights: Vec::new(), places: Vec::new() }
+        let (dofs, weights, places) = (Vec::new(), Vec::new(), Vec::new());
+        Self { pointers: vec![0], dofs, weights, places, largest: None }
     }
 }
 
@@ -56,13 +59,20 @@ impl<T: Real> ContactJacobian<T> {
         let mut pointers = Vec::with_capacity(rows + 1);
         pointers.push(0);
         let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        Self { pointers, dofs, weights: Vec::with_capacity(entries), places }
+        Self { pointers, dofs, weights: Vec::with_capacity(entries), places, largest: None }
     }
 
     /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
     pub(crate) fn locate(&mut self, places: &[usize]) {
         self.places.clear();
         self.places.extend(self.dofs.iter().map(|&dof| places[dof]));
+        let sum = |row| self.row(row).fold(T::zero(), |sum, (_, weight)| sum + weight.abs());
+        self.largest = (0..self.rows()).map(sum).reduce(T::max);
+    }
+
+    /// The largest Σ |weight| of a row: no product of a row is larger than this times the largest |x|.
+    pub(crate) fn largest_row(&self) -> T {
+        self.largest.unwrap_or(T::zero())
     }
 
     /// Appends a row of (dof, weight) pairs.
@@ -84,6 +94,7 @@ impl<T: Real> ContactJacobian<T> {
         self.dofs.clone_from(&other.dofs);
         self.weights.clone_from(&other.weights);
         self.places.clone_from(&other.places);
+        self.largest = other.largest;
     }
 
     /// Appends a row of another one.

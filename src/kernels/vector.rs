@@ -89,6 +89,20 @@ pub(crate) fn all_finite<T: Scalar>(x: &[T]) -> bool {
     sums.into_iter().sum::<T>() + rest == T::zero()
 }
 
+/// The largest |x|; NaN is passed over.
+#[inline(always)]
+pub(crate) fn largest<T: Scalar>(x: &[T]) -> T {
+    let mut most = [T::zero(); LANES];
+    let chunks = x.chunks_exact(LANES);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for (most, &x) in most.iter_mut().zip(chunk) {
+            *most = if x.abs() > *most { x.abs() } else { *most };
+        }
+    }
+    most.iter().chain(rest).fold(T::zero(), |most, x| most.max(x.abs()))
+}
+
 /// The same for several vectors of one length, in one pass.
 #[inline(always)]
 fn all_finite_together<T: Scalar, const N: usize>(x: [&[T]; N]) -> bool {

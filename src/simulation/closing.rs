@@ -56,6 +56,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         buffers.opened.clear();
         buffers.released.clear();
         let impulse_weight = T::of(clock.h * booking.impulse_weight);
+        trial.lambda.copy_from_slice(&trial.lambda_raw);
+        trial.lambda_v.fill(T::zero());
+        trial.lambda_a.fill(T::zero());
+        if booking.is_first {
+            trial.impulse.fill(T::zero());
+        }
         for (row, &was_closed) in was_closed.iter().enumerate() {
             let raw = trial.lambda_raw[row];
             let law = constraints.law(row);
@@ -76,10 +82,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if closed && !was_closed && !closed_at_start[row] {
                 trial.dissipated[row] = T::zero();
             }
-            trial.lambda[row] = raw;
-            (trial.lambda_v[row], trial.lambda_a[row]) = (T::zero(), T::zero());
-            let before = if booking.is_first { T::zero() } else { trial.impulse[row] };
-            trial.impulse[row] = before + impulse_weight * raw;
+            if raw != T::zero() {
+                trial.impulse[row] += impulse_weight * raw;
+            }
         }
         Ok(())
     }

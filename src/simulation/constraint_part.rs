@@ -10,12 +10,15 @@ pub(super) struct Part<'a, T: Real> {
     pub(super) dofs: Vec<usize>,
     pub(super) contacts: Contacts<T>,
     pub(super) variation: Variation,
+    pub(super) inspects: bool,
     /// Where its rows are linearized: time and displacements.
     pub(super) place: (f64, Vec<T>),
     /// Whether its rows may have changed since they were read.
     pub(super) stale: bool,
     /// Whether it has left its rates to differences.
     pub(super) differenced: bool,
+    /// Whether it has said that all its rates are zero.
+    pub(super) still: bool,
 }
 
 impl<T: Real> Part<'_, T> {

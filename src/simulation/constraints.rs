@@ -2,6 +2,7 @@
 
 use super::admitted::Admitted;
 use super::constraint_part::{Local, Part, gather, of};
+use super::laws::Laws;
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
 use crate::contact::{
@@ -11,13 +12,13 @@ use crate::contact::{
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::{ContactState, Motion};
+use crate::state::{ContactState, Motion, Names};
 
 /// The constraints in the order given, their rows one after the other.
 pub(crate) struct Constraints<'a, T: Real> {
     parts: Vec<Part<'a, T>>,
     pub(crate) ids: Vec<ContactId>,
-    laws: Vec<ContactLaw>,
+    laws: Laws,
     magnitudes: Vec<T>,
     /// Rows and rates of a constraint that is evaluated at another motion.
     scratch: Contacts<T>,
@@ -30,8 +31,9 @@ pub(crate) struct Constraints<'a, T: Real> {
     admitted: Admitted,
     /// Whether candidates have changed since the rows were last read.
     stale: bool,
-    /// Counts how often the rows have been read.
+    /// Counts how often the rows have been read, and how often their names have changed by that.
     version: u64,
+    names: Names,
     /// The number of rows that there is to be memory for.
     room: usize,
     /// How far the last search looks ahead.
@@ -77,6 +79,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 }
             }
             let (u, v) = (gather(&list, u, &mut local.u), gather(&list, v, &mut local.v));
+            local.other.reserve(list.len());
             constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
             interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
             let contacts = Contacts::of(&constraint);
@@ -84,8 +87,17 @@ impl<'a, T: Real> Constraints<'a, T> {
             scratch.clear();
             constraint.contacts(&mut scratch);
             room += contacts.len();
-            let (variation, place) = (constraint.variation(), (t, u.to_vec()));
-            own.push(Part { constraint, dofs: list, contacts, variation, place, stale: true, differenced: false });
+            own.push(Part {
+                variation: constraint.variation(),
+                inspects: constraint.inspects(),
+                place: (t, u.to_vec()),
+                constraint,
+                dofs: list,
+                contacts,
+                stale: true,
+                differenced: false,
+                still: false,
+            });
         }
         interface.sort_unstable();
         interface.dedup();
@@ -99,7 +111,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         let constraints = Self {
             parts: own,
             ids: Vec::with_capacity(room),
-            laws: Vec::with_capacity(room),
+            laws: Laws::with_capacity(room),
             magnitudes: Vec::with_capacity(room),
             scratch,
             rates: vec![GapRates::default(); room],
@@ -109,6 +121,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             admitted,
             stale: true,
             version: 0,
+            names: Names::default(),
             room,
             ahead: 0.0,
             differences: RateDifferences::default(),
@@ -147,7 +160,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
         let Self { parts, local, stale, .. } = self;
-        for (number, part) in parts.iter_mut().enumerate() {
+        for (number, part) in parts.iter_mut().enumerate().filter(|(_, part)| part.variation != Variation::Never) {
             let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
             part.settle(motion.t, u);
             let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
@@ -166,11 +179,14 @@ impl<'a, T: Real> Constraints<'a, T> {
         for (number, part) in parts.iter_mut().enumerate() {
             let count = part.contacts.len();
             let (own, others) = (rest.map(|flags| &flags[..count]), rest.map(|flags| &flags[count..]));
+            rest = others;
+            if !part.inspects {
+                continue;
+            }
             let dofs = &part.dofs;
             let u = [gather(dofs, &from.u, &mut local.u), gather(dofs, &to.u, &mut local.other)];
             let step = Stride::new([from.t, to.t], u, gather(dofs, &from.v, &mut local.v), own);
             part.constraint.inspect(&step).map_err(|error| of(number, error))?;
-            rest = others;
         }
         Ok(())
     }
@@ -212,6 +228,11 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.version
     }
 
+    /// The names of all rows, and which version of them these are.
+    pub(crate) fn named(&self) -> (&[ContactId], Names) {
+        (&self.ids, self.names)
+    }
+
     /// Reads the rows if they may have changed.
     fn read_stale(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
         if !self.stale {
@@ -223,22 +244,26 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses what does not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, laws, magnitudes, places, admitted, stale, .. } = self;
+        let Self { parts, ids, names, laws, magnitudes, places, admitted, stale, .. } = self;
         jacobian.clear();
-        ids.clear();
         laws.clear();
         magnitudes.clear();
         *stale = true;
         for (constraint, part) in parts.iter_mut().enumerate() {
             let Part { contacts, dofs, .. } = part;
             if part.stale {
+                part.still = false;
                 contacts.clear();
                 part.constraint.contacts(contacts);
             }
             for row in 0..contacts.len() {
                 let (feature, candidate) = contacts.name(row);
                 let contact = ContactId { constraint, feature, candidate };
-                ids.push(contact);
+                if ids.get(laws.len()) != Some(&contact) {
+                    names.change();
+                    ids.truncate(laws.len());
+                    ids.push(contact);
+                }
                 let law = contacts.law(row);
                 law.check()?;
                 law.check_scalar::<T>()?;
@@ -262,6 +287,10 @@ impl<'a, T: Real> Constraints<'a, T> {
                 }
             }
             jacobian.append(contacts.rows(), dofs);
+        }
+        if ids.len() > laws.len() {
+            names.change();
+            ids.truncate(laws.len());
         }
         jacobian.locate(places);
         for part in parts {
@@ -301,18 +330,8 @@ impl<'a, T: Real> Constraints<'a, T> {
     }
 
     /// The laws of all rows.
-    pub(crate) fn laws(&self) -> &[ContactLaw] {
+    pub(crate) fn laws(&self) -> &Laws {
         &self.laws
-    }
-
-    /// Whether the condition of any row depends on the gap at the start of the stage.
-    pub(crate) fn reads_start(&self) -> bool {
-        self.laws.iter().any(ContactLaw::reads_start)
-    }
-
-    /// Whether any row is compliant.
-    pub(crate) fn has_compliant(&self) -> bool {
-        self.laws.iter().any(ContactLaw::is_compliant)
     }
 
     /// Number of rows.
@@ -364,6 +383,9 @@ impl<'a, T: Real> Constraints<'a, T> {
                 rates.acceleration += acceleration * added;
             }
         }
+        if self.parts.iter().all(|part| part.still) {
+            return Ok(());
+        }
         for (&contact, rates) in self.ids.iter().zip(&*out) {
             for (what, value) in [("the gap rate", rates.rate), ("the gap acceleration", rates.acceleration)] {
                 if !value.is_finite() {
@@ -380,13 +402,22 @@ impl<'a, T: Real> Constraints<'a, T> {
             return Ok(());
         }
         let Self { parts, local, differences, ahead, .. } = self;
-        let Part { constraint, dofs, contacts, variation, place, differenced, .. } = &mut parts[number];
+        let Part { constraint, dofs, contacts, variation, place, differenced, still, .. } = &mut parts[number];
+        if *still {
+            out.fill(GapRates::default());
+            return Ok(());
+        }
         let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
         let found = match constraint.rates(t, u, v, out) {
             Ok(Rates::Differences) => {
                 *differenced = true;
                 let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
                 differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out)
+            }
+            Ok(Rates::Zero) => {
+                *still = true;
+                out.fill(GapRates::default());
+                Ok(())
             }
             other => other.map(drop),
         };

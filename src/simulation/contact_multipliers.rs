@@ -5,7 +5,7 @@ use super::contact_rows::ContactRowsWork;
 use super::contact_step::{ContactStep, ContactWork};
 use super::interface::InterfaceWork;
 use super::operator::Operator;
-use crate::contact::{ContactLaw, Measure};
+use crate::contact::Measure;
 use crate::contact_solver::{ContactFailure, ContactProblem};
 use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
@@ -21,9 +21,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, clock, constraints, g, part, .. } = self;
         let ContactWork { trial, rows, .. } = contact;
         let mut needed = false;
+        let laws = constraints.laws();
         for row in 0..constraints.len() {
-            let law = constraints.law(row);
-            if law.is_compliant() {
+            let law = &laws[row];
+            let equality = laws.equality && law.is_equality();
+            let mut depth = T::zero();
+            if laws.compliant && law.is_compliant() {
                 let gap = rows.balance_gap[row];
                 rows.y[row] = match law.is_predictive() {
                     // The mean gap of the coming step, less that of the last step if this was negative.
@@ -33,18 +36,18 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     false => gap,
                 };
                 rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
-                let depth = (-rows.y[row]).max(rows.tolerance[row]);
-                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
-            } else {
-                (rows.compliance[row], rows.shift[row]) = (T::zero(), T::zero());
+                depth = (-rows.y[row]).max(rows.tolerance[row]);
+            } else if !laws.are_uniform() {
                 let own = rows.own_weight(stage, clock.h, row).filter(|_| part.takes(&rows.on_massless, row));
                 rows.weight[row] = own.unwrap_or(rows.weight[row]);
                 rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
             }
             let coupled = rows.weight[row] > T::zero();
-            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || law.is_equality();
+            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || equality;
             rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
-            if coupled && !rows.in_problem[row] {
+            if rows.in_problem[row] {
+                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
+            } else if coupled {
                 trial.lambda_raw[row] = T::zero();
             }
             needed |= coupled && violated;
@@ -54,7 +57,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
 
     /// Solves for the multipliers. Nonlinear laws are linearized again until they are met.
     pub(super) fn press(&mut self, operator: &mut Operator<T>, t: f64, contact: &mut ContactWork<T>) -> Result<()> {
-        let augmentations = self.constraints.laws().iter().map(ContactLaw::augmentations).max().unwrap_or(0);
+        let augmentations = self.constraints.laws().augmentations;
         let limit = LINEARIZATIONS + augmentations;
         for pass in 0..limit {
             self.press_linearized(operator, t, contact)?;
@@ -188,8 +191,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             statistics.contact_solves += 1;
             let mut grown = false;
+            // No row is pushed farther than this times its weight.
+            let reach = forces.largest_row() * T::largest(&interface.response);
             for row in 0..count {
-                if enabled[row] && !in_problem[row] && weight[row] > T::zero() {
+                let near = y[row] - weight[row] * reach < -tolerance[row];
+                if near && enabled[row] && !in_problem[row] && weight[row] > T::zero() {
                     let pushed = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);

@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
 use super::program::{CompiledStage, ContactTarget};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates, Measure};
+use crate::contact::{ContactJacobian, GapRates, Measure};
 use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
@@ -151,7 +151,7 @@ impl<T: Real> ContactRowsWork<T> {
         let Self { measure, start_gap, start_tolerance, rates, curved, .. } = self;
         curved.forget();
         measure.fill(Measure::AsScheme);
-        let reads = constraints.reads_start() || constraints.laws().iter().any(ContactLaw::is_predictive);
+        let reads = constraints.laws().read_start || constraints.laws().predictive;
         let (Some(start), true) = (past.first(), reads) else { return Ok(()) };
         constraints.finite_gaps(start.t, &start.u, start_gap)?;
         constraints.finite_rates(start.t, &start.u, &start.v, rates)?;
@@ -167,6 +167,9 @@ impl<T: Real> ContactRowsWork<T> {
     /// Decides what rows constrain whose law reads the gap at the start of the stage. y holds the gaps of its motion
     /// without contact.
     pub(super) fn decide(&mut self, constraints: &Constraints<'_, T>) {
+        if !constraints.laws().read_start {
+            return;
+        }
         let Self { y, measure, start_gap, start_tolerance, .. } = self;
         for (row, measure) in measure[..constraints.len()].iter_mut().enumerate() {
             if *measure != Measure::Undecided {
@@ -190,7 +193,7 @@ impl<T: Real> ContactRowsWork<T> {
         new: &Motion<T>,
         lacking: Option<&[T]>,
     ) -> Result<()> {
-        if !constraints.reads_start() {
+        if !constraints.laws().read_start {
             return Ok(());
         }
         let Self { rates, y, tolerance, measure, start_gap, .. } = self;
@@ -250,15 +253,28 @@ impl<T: Real> ContactRowsWork<T> {
         } else {
             constraints.finite_gaps(t, values, y)?;
         }
+        if approach > 0.0 {
+            constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
+        }
+        // Far rows are those whose gap is beyond any tolerance of a row: at the end of a stage nothing more is asked.
+        let ends = approach > 0.0 && constraints.laws().are_uniform() && !level.is_velocity();
+        let far = ends.then(|| {
+            let way =
+                g.largest_row() * T::largest(&new.v) + rates.iter().fold(T::zero(), |most, x| most.max(x.rate.abs()));
+            (g.largest_row() * T::largest(values), T::of(approach * h) * way)
+        });
         for row in 0..constraints.len() {
+            if let Some((size, way)) = far {
+                tolerance[row] = constraints.gap_rounding(row, size, y[row]) + way;
+                if y[row] > tolerance[row] {
+                    continue;
+                }
+            }
             tolerance[row] = match level.is_velocity() {
                 true => rounding(g.magnitude(row, values) + y[row].abs()),
                 false => constraints.gap_rounding(row, g.magnitude(row, values), y[row]),
             };
-        }
-        if approach > 0.0 {
-            constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
-            for row in 0..constraints.len() {
+            if approach > 0.0 {
                 let rate = g.product(row, &new.v) + rates[row].rate;
                 tolerance[row] += T::of(approach * h) * rate.abs();
             }

@@ -25,7 +25,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<bool> {
         let dofs = self.constraints.interface();
-        keep(dofs, &new.u, &mut contact.interface.displacement);
+        if self.moves_state() {
+            keep(dofs, &new.u, &mut contact.interface.displacement);
+        }
         if let (Some(_), Some(balance)) = (&self.stage.balance, &vectors.balance) {
             keep(dofs, &balance.u, &mut contact.interface.balance);
         }
@@ -33,7 +35,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
         self.aim(system, new, past, &vectors.supports.dofs, contact)?;
         let result = self.settle(operator, new, past, vectors, contact);
         let (dofs, interface) = (self.constraints.interface(), &contact.interface);
-        restore(dofs, &interface.displacement, &mut new.u);
+        if self.moves_state() {
+            restore(dofs, &interface.displacement, &mut new.u);
+        }
         if let (Some(_), Some(balance)) = (&self.stage.balance, &mut vectors.balance) {
             restore(dofs, &interface.balance, &mut balance.u);
         }
@@ -93,7 +97,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         self.weigh(&mut contact.rows);
         self.place(new, vectors, contact);
-        if self.constraints.has_compliant() {
+        if self.constraints.laws().compliant {
             self.balance_gaps(new, vectors, contact)?;
             self.add_inertia(new, vectors, contact)?;
             if self.press_without_coupling(operator, contact)? {

@@ -9,7 +9,7 @@ use super::program::CompiledStage;
 use super::results::Statistics;
 use super::stage_vectors::StageVectors;
 use super::supports::finite_supports;
-use crate::contact::{ContactJacobian, ContactLaw};
+use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
@@ -109,6 +109,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// Sets the weights of d in y: those of the scheme, and of compliant laws.
     pub(super) fn weigh(&self, rows: &mut ContactRowsWork<T>) {
         let [rigid, balance_u, balance_a] = self.weights();
+        if self.constraints.laws().are_uniform() && self.part == Part::All {
+            rows.weight.fill(rigid);
+            return;
+        }
         for (row, law) in self.constraints.laws().iter().enumerate() {
             let weight = match (law.is_compliant(), law.is_predictive()) {
                 (false, _) => rigid,
@@ -119,12 +123,19 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
+    /// Whether d is part of the displacements of the state: explicit schemes know these before it.
+    pub(super) fn moves_state(&self) -> bool {
+        self.stage.recovery.weights()[0] != T::zero()
+    }
+
     /// Adds d on the interface to the displacements, to those of the balance, and to what contact constrains.
     pub(super) fn place(&mut self, new: &mut Motion<T>, vectors: &mut StageVectors<T>, contact: &mut ContactWork<T>) {
         let dofs = self.constraints.interface();
         let ContactWork { interface, rows, .. } = contact;
         let InterfaceWork { increment, displacement, balance, target, .. } = interface;
-        advance(dofs, displacement, self.stage.recovery.weights()[0], increment, &mut new.u);
+        if self.moves_state() {
+            advance(dofs, displacement, self.stage.recovery.weights()[0], increment, &mut new.u);
+        }
         if let (Some(balanced), Some(motion)) = (&self.stage.balance, &mut vectors.balance) {
             advance(dofs, balance, balanced.weights()[0], increment, &mut motion.u);
         }
@@ -171,7 +182,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         vectors: &StageVectors<T>,
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
-        if self.constraints.laws().iter().all(|law| law.inertia() == 0.0) {
+        if !self.constraints.laws().inertial {
             return Ok(());
         }
         let [_, _, balance_a] = self.weights();
@@ -226,7 +237,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
-        let (Some(start), true) = (past.first(), constraints.laws().iter().any(ContactLaw::rebounds)) else {
+        let (Some(start), true) = (past.first(), constraints.laws().rebound) else {
             return Ok(());
         };
         let h = T::of(clock.h);

@@ -45,7 +45,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         interface.tried.copy_from_slice(&interface.increment);
         interface.increment.copy_from_slice(&interface.free);
         interface.forces.fill(T::zero());
-        if self.constraints.has_compliant() {
+        if self.constraints.laws().compliant {
             self.balance_gaps_from_tried(contact);
             self.add_inertia(new, vectors, contact)?;
             if self.press_without_coupling(operator, contact)? {
@@ -113,7 +113,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let elsewhere = self.stage.balance.is_some() || self.stage.contact.is_some();
         let (t, balanced) = self.balanced(new, vectors.balance.as_ref());
         let curved = &mut contact.rows.curved;
-        let compliant = self.constraints.has_compliant();
+        let compliant = self.constraints.laws().compliant;
         if elsewhere {
             self.constraints.follow(t, &balanced.u, self.g)?;
             if compliant {

@@ -68,7 +68,7 @@ impl<T: Real> StartProblem<T> {
         gaps: &[T],
     ) -> Result<()> {
         let inertia = |law: ContactLaw| T::of(law.inertia());
-        if constraints.laws().iter().all(|&law| inertia(law) == T::zero()) {
+        if !constraints.laws().inertial {
             return Ok(());
         }
         let mut rates = vec![GapRates::default(); constraints.len()];
@@ -149,7 +149,7 @@ impl<T: Real> StartProblem<T> {
         let tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
         // The stabilized bipenalty compares with the step before: the gap is taken to have been the same.
-        if constraints.laws().iter().any(ContactLaw::is_predictive) {
+        if constraints.laws().predictive {
             let mut gaps = vec![T::zero(); constraints.len()];
             constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
             for (row, (y, gap)) in y.iter_mut().zip(gaps).enumerate() {

@@ -15,10 +15,35 @@ pub enum ContactStatus {
     Closed,
 }
 
+/// Which version of the names of all rows a list holds: lists of one version are equal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Names(u64);
+
+impl Names {
+    /// To a version that there has not been.
+    pub(crate) fn change(&mut self) {
+        self.0 += 1;
+    }
+
+    /// Whether two lists are known to be equal.
+    fn are(self, other: Self) -> bool {
+        self.0 != 0 && self.0 == other.0
+    }
+}
+
+/// (States are compared by what they hold.)
+impl PartialEq for Names {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
     pub(crate) ids: Vec<ContactId>,
+    /// The version of these names, if it is known.
+    pub(crate) names: Names,
     pub(crate) lambda: Vec<T>,
     pub(crate) lambda_raw: Vec<T>,
     pub(crate) closed: Vec<bool>,
@@ -34,6 +59,7 @@ impl<T: Real> ContactState<T> {
         let reals = || Vec::with_capacity(rows);
         Self {
             ids: Vec::with_capacity(rows),
+            names: Names::default(),
             lambda: reals(),
             lambda_raw: reals(),
             closed: Vec::with_capacity(rows),
@@ -47,7 +73,7 @@ impl<T: Real> ContactState<T> {
 
     /// Makes room for so many contacts in all.
     pub(crate) fn make_room(&mut self, rows: usize) {
-        let Self { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated } = self;
+        let Self { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
         ids.reserve(rows.saturating_sub(ids.len()));
         closed.reserve(rows.saturating_sub(closed.len()));
         for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated] {
@@ -58,6 +84,7 @@ impl<T: Real> ContactState<T> {
     /// Opens every contact of `ids`.
     pub(crate) fn reset(&mut self, ids: &[ContactId]) {
         let n = ids.len();
+        self.names = Names::default();
         self.ids.clear();
         self.ids.extend_from_slice(ids);
         let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
@@ -69,9 +96,18 @@ impl<T: Real> ContactState<T> {
         self.closed.resize(n, false);
     }
 
-    /// Copies what belongs to the same contacts from another state; contacts it does not know are open.
-    pub(crate) fn carry_over(&mut self, old: &Self, ids: &[ContactId]) {
+    /// Copies what belongs to the same contacts from another state; contacts it does not know are open. What every
+    /// stage sets anew (gaps, impulses, λ_v, λ_a) is anything before.
+    pub(crate) fn carry_over(&mut self, old: &Self, (ids, names): (&[ContactId], Names)) {
+        if old.names.are(names) && self.names.are(names) {
+            self.lambda.copy_from_slice(&old.lambda);
+            self.lambda_raw.copy_from_slice(&old.lambda_raw);
+            self.closed.copy_from_slice(&old.closed);
+            self.dissipated.copy_from_slice(&old.dissipated);
+            return;
+        }
         self.reset(ids);
+        self.names = names;
         // Candidates that come and go shift the others: the place behind the last one found is tried first.
         let sorted = old.ids.is_sorted();
         let mut next = 0;

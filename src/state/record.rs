@@ -2,7 +2,7 @@
 //! [`FORMAT`].
 
 use super::clock::{Clock, Pace};
-use super::contacts::ContactState;
+use super::contacts::{ContactState, Names};
 use super::history::{History, Trail};
 use super::read::{COUNT, count, length, number, optional, vector};
 use super::{Motion, State};
@@ -180,7 +180,8 @@ impl<'r, T: Real> MotionRecord<'r, T> {
 
 impl<'r, T: Real> ContactsRecord<'r, T> {
     fn of(contacts: &'r ContactState<T>) -> Self {
-        let ContactState { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated } = contacts;
+        let ContactState { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, names: _ } =
+            contacts;
         Self {
             ids: ids.iter().map(|id| [id.constraint, id.feature, id.candidate]).collect(),
             forces: lambda.into(),
@@ -201,6 +202,7 @@ impl<'r, T: Real> ContactsRecord<'r, T> {
         length("the closed flags of a checkpoint", closed.len(), n)?;
         Ok(ContactState {
             ids: self.ids.into_iter().map(id).collect(),
+            names: Names::default(),
             lambda: vector("the contact forces of a checkpoint", self.forces, n)?,
             lambda_raw: vector("the raw multipliers of a checkpoint", self.raw_forces, n)?,
             closed,

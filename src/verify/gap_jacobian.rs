@@ -92,7 +92,7 @@ pub fn gap_jacobian<T: Real>(
     let delay = (t + delay.max(resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
-    let given = rows > 0 && constraint.rates(t, u, v, &mut rates)? == Rates::Given;
+    let given = rows > 0 && constraint.rates(t, u, v, &mut rates)? != Rates::Differences;
     if given {
         constraint.gaps(t - delay, u, &mut before)?;
         constraint.gaps(t + delay, u, &mut after)?;

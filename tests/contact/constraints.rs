@@ -55,6 +55,9 @@ impl ContactConstraint<f64> for Witness {
         self.asked.push("inspect");
         Err(Error::ContactLost { t: 1.0, contact: ContactId::default() })
     }
+    fn inspects(&self) -> bool {
+        false
+    }
     fn variation(&self) -> Variation {
         Variation::BySearch
     }
@@ -64,7 +67,7 @@ impl ContactConstraint<f64> for Witness {
 fn interrogate(mut constraint: impl ContactConstraint<f64>) {
     let (u, v) = ([0.25, 0.5], [3.0, 4.0]);
     assert_eq!((constraint.dofs(), constraint.only_reads(0), constraint.only_reads(1)), (&[3, 1][..], false, true));
-    assert_eq!(constraint.variation(), Variation::BySearch);
+    assert_eq!((constraint.variation(), constraint.inspects()), (Variation::BySearch, false));
     let found = Contacts::of(&constraint);
     assert_eq!((found.len(), found.name(0), found.law(0), found.magnitude(0)), (1, (5, 6), ContactLaw::Equality, 7.0));
     let (mut gaps, mut rates) = ([0.0], [GapRates::default()]);
