@@ -90,6 +90,10 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// use, and the step is undone. Direct factorizations do not fail here.
     fn solve(&mut self, rhs: &mut [T]) -> Result<()>;
 
+    /// Frees what only factorizations need, where the matrix stays for long: the next one allocates it again. Default:
+    /// nothing is freed.
+    fn release(&mut self) {}
+
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
 

@@ -161,7 +161,10 @@ fn kept_as_it_is(source: SymbolicSparseColMatRef<'_, usize>, pointers: &[usize],
 /// by those of the identity; entries are moved by precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {
+    /// Empty if it is [left to the first source](Self::leave_pattern).
     pattern: SymbolicSparseColMat<usize>,
+    /// Number of its entries.
+    entries: usize,
     /// For each source, the slot of each of its entries, `DROPPED` on the rows and columns left out; none where a
     /// source has this pattern itself, as a stiffness matrix without supports does.
     slots: Vec<Option<Vec<usize>>>,
@@ -234,13 +237,26 @@ impl Combination {
             })
             .collect();
         rows.shrink_to_fit();
+        let entries = rows.len();
         let pattern = SymbolicSparseColMat::new_checked(n, n, pointers, None, rows);
-        Ok(Self { pattern, slots, diagonal, identity: identity.to_vec() })
+        Ok(Self { pattern, entries, slots, diagonal, identity: identity.to_vec() })
+    }
+
+    /// Frees a pattern that is that of the first source, which is then given to [`shape`](Self::shape).
+    pub(crate) fn leave_pattern(&mut self) {
+        if let Some(None) = self.slots.first() {
+            self.pattern = SymbolicSparseColMat::new_checked(0, 0, vec![0], None, Vec::new());
+        }
+    }
+
+    /// The pattern; `first` is that of the first source, if there is one.
+    pub(crate) fn shape<'p>(&'p self, first: SymbolicSparseColMatRef<'p, usize>) -> SymbolicSparseColMatRef<'p, usize> {
+        if self.pattern.row_idx().len() < self.entries { first } else { self.pattern.as_ref() }
     }
 
     /// Number of stored entries.
     pub(crate) fn len(&self) -> usize {
-        self.pattern.row_idx().len()
+        self.entries
     }
 
     pub(crate) fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {

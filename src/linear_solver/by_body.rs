@@ -378,6 +378,10 @@ impl<T: Real> Factorization<T> for Factors<T> {
         Ok(())
     }
 
+    fn release(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.factor.release());
+    }
+
     fn stored_values(&self) -> usize {
         self.parts.iter().map(|part| part.factor.stored_values()).sum()
     }

@@ -9,7 +9,7 @@ use crate::memory;
 use crate::real::Real;
 use crate::{sparse, threads};
 use faer::Par;
-use faer::dyn_stack::MemBuffer;
+use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
@@ -81,7 +81,7 @@ struct Factor<T: Real> {
     symbolic: SymbolicCholesky<usize>,
     kind: Kind,
     values: Vec<T>,
-    memory: MemBuffer,
+    memory: Option<MemBuffer>,
     /// The parallelism that `memory` has room for.
     par: Par,
     /// Right-hand sides that `memory` has room for.
@@ -129,7 +129,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         };
         let par = threads::parallelism(values.len());
         let scratch = T::cholesky_scratch(kind, &symbolic, 1, par);
-        let memory = MemBuffer::try_new(scratch).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })?;
+        let memory = Some(buffer(scratch)?);
         let n = symbolic.nrows();
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
@@ -162,6 +162,11 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             cursor: Vec::new(),
         }))
     }
+}
+
+/// Scratch of faer's kernels.
+fn buffer(size: StackReq) -> Result<MemBuffer> {
+    MemBuffer::try_new(size).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })
 }
 
 /// The largest number of rows that a sweep over part of a supernode's columns has below it.
@@ -284,8 +289,12 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { fingerprint, symbolic, kind, values, pivots, memory, par, cursor, .. } = self;
+        let Self { fingerprint, symbolic, kind, values, pivots, memory, par, cursor, columns, .. } = self;
         fingerprint.check(a)?;
+        let memory = match memory {
+            Some(memory) => memory,
+            None => memory.insert(buffer(T::cholesky_scratch(*kind, symbolic, *columns, *par))?),
+        };
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
         T::cholesky(*kind, symbolic, a, values, pivots, *par, memory).map_err(singular)?;
@@ -303,10 +312,12 @@ impl<T: Real> Factorization<T> for Factor<T> {
         let columns = rhs.len().checked_div(size).unwrap_or(0);
         if self.kind == Kind::Llt && columns > 1 {
             if columns > self.columns {
-                self.memory = MemBuffer::new(T::cholesky_scratch(self.kind, &self.symbolic, columns, self.par));
-                self.columns = columns;
+                (self.memory, self.columns) = (None, columns);
             }
-            T::supernodal_solve(&self.symbolic, &self.values, rhs, columns, &mut self.memory);
+            let Self { kind, symbolic, values, memory, par, columns: most, .. } = self;
+            let memory =
+                memory.get_or_insert_with(|| MemBuffer::new(T::cholesky_scratch(*kind, symbolic, *most, *par)));
+            T::supernodal_solve(symbolic, values, rhs, columns, memory);
             return Ok(());
         }
         for column in rhs.chunks_exact_mut(size) {
@@ -315,6 +326,10 @@ impl<T: Real> Factorization<T> for Factor<T> {
             self.give(column);
         }
         Ok(())
+    }
+
+    fn release(&mut self) {
+        (self.memory, self.cursor) = (None, Vec::new());
     }
 
     fn stored_values(&self) -> usize {

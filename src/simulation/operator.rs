@@ -11,7 +11,7 @@ use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
 use crate::system::{Linearity, System, TangentWeights};
-use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -89,10 +89,13 @@ impl<T: Real> Operator<T> {
         at: At<'_, T>,
         (interface, unit): (&[usize], Unit),
     ) -> Result<Self> {
-        let (tangent, combination) = pattern(system, weights)?;
+        let (tangent, mut combination) = pattern(system, weights)?;
         let linearity = system.linearity();
         let varies = tangent == Tangent::Present && linearity == Linearity::Nonlinear;
         let (factor, contact) = analyze(solver, combination.pattern(), interface, varies)?;
+        if !varies && tangent == Tangent::Present {
+            combination.leave_pattern();
+        }
         let full = match contact {
             ContactPath::Full if !interface.is_empty() => {
                 memory::zeros(COLUMNS, system.dofs(), "the responses of the contact rows")?
@@ -206,13 +209,15 @@ impl<T: Real> Operator<T> {
             *part = Vec::new();
         }
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let column = combination.pattern().col_ptr().partition_point(|&p| p <= at) - 1;
-            let (row, value) = (combination.pattern().row_idx()[at], values[at].value());
+            let pattern = combination.shape(system.pattern());
+            let column = pattern.col_ptr().partition_point(|&p| p <= at) - 1;
+            let (row, value) = (pattern.row_idx()[at], values[at].value());
             return Err(Error::MatrixNotFinite { matrix: "effective", row, column, value });
         }
-        factor.factorize(combination.view(values))?;
+        factor.factorize(SparseColMatRef::new(combination.shape(system.pattern()), values))?;
         if !self.varies() {
             self.values = Vec::new();
+            self.factor.release();
         }
         self.reset();
         Ok(())
