@@ -4,7 +4,7 @@ use crate::combinations::{Combination, Correction};
 use crate::report::Results;
 use contact_dynamics_scenes::masses::Treatment;
 use contact_dynamics_scenes::plot::{
-    Axis, BLUE, Cloud, DARK, GRAY, GREEN, Mark, ORANGE, PURPLE, RGBColor, VERMILION, scatter,
+    Axis, BLUE, Cloud, DARK, GRAY, GREEN, Key, Mark, ORANGE, PURPLE, RGBColor, VERMILION, scatter,
 };
 use std::error::Error;
 
@@ -68,7 +68,8 @@ pub(crate) fn front(results: &Results, cost: &[Option<f64>]) -> Vec<usize> {
     front.into_iter().map(|(row, _)| row).collect()
 }
 
-/// The figure; the area of a mark is the cost of a step, relative to the trapezoidal rule.
+/// The figure; the area of a mark is the cost of a step, relative to the trapezoidal rule. Rows that no other one beats
+/// have numbers, and a key says which they are.
 pub(crate) fn figure(
     combinations: &[Combination],
     results: &Results,
@@ -95,5 +96,12 @@ pub(crate) fn figure(
         "Two bars of {} elements, h = {} s: force against energy; area: cost of a step",
         results.elements, results.h
     );
-    scatter(&title, &x, &y, &clouds)
+    let line = |(number, &row): (usize, &usize)| {
+        let names = combinations[row].names().map(|name| name.replace("**", ""));
+        let parts: Vec<_> = names.iter().filter(|name| *name != "–").map(String::as_str).collect();
+        format!("{number}  {}", parts.join(", "))
+    };
+    // In the empty part of the frame: errors of the force as large as the force itself, small losses.
+    let key = Key { at: (-4.2, 0.9), lines: (1..).zip(&front).map(line).collect() };
+    scatter(&title, &x, &y, &clouds, &key)
 }

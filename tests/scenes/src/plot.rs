@@ -28,6 +28,7 @@ const PAGE_SUBTITLE: i32 = 92;
 const PANEL_TITLE: i32 = 80;
 const LEGEND: i32 = 96;
 const LEGEND_LINE: i32 = 88;
+const KEY_LINE: i32 = 72;
 const Y_LABELS: i32 = 240;
 const X_LABELS: i32 = 176;
 const TICK: i32 = 16;
@@ -232,8 +233,14 @@ pub struct Cloud {
     pub marks: Vec<Mark>,
 }
 
+/// What the labels of marks stand for, line by line, to the right of and below a point of the frame.
+pub struct Key {
+    pub at: Point,
+    pub lines: Vec<String>,
+}
+
 /// One page of points in a frame, the first cloud lowest; points beyond the frame are drawn on its edge.
-pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud]) -> Result<String, Box<dyn Error>> {
+pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud], key: &Key) -> Result<String, Box<dyn Error>> {
     svg((900, 640), |canvas| {
         let inner = canvas.margin(MARGIN, MARGIN, MARGIN, MARGIN);
         let (head, rest) = inner.split_vertically(PANEL_TITLE + LEGEND);
@@ -272,6 +279,10 @@ pub fn scatter(title: &str, x: &Axis, y: &Axis, clouds: &[Cloud]) -> Result<Stri
                     rest.draw_text(label, &text(HPos::Left, VPos::Bottom), (px - left + shift, py - top - shift))?
                 }
             }
+        }
+        let (px, py) = area.map_coordinate(&key.at);
+        for (line, below) in key.lines.iter().zip(0..) {
+            rest.draw_text(line, &text(HPos::Left, VPos::Top), (px - left, py - top + KEY_LINE * below))?;
         }
         Ok(())
     })
