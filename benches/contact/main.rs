@@ -1,9 +1,10 @@
 //! Cost of a step in contact on a block of hex8 elements beside the bare solve and the step without contact, and of the
 //! work on the interface alone: condensation, responses, the contact solver.
 //!
-//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20); `-- pressed`, `-- nonlinear` and
-//! `-- candidates` for steps with few and many pressed contacts, for iterations with contact, and for a million
-//! candidates, alone.
+//! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20) takes over ten minutes for all of it; a part
+//! alone is asked for by name: `-- blocks` for the above and a plate with ten thousand candidates, `-- pressed` for
+//! steps with few and many pressed contacts, `-- nonlinear` for iterations with contact, `-- candidates` for a million
+//! candidates.
 
 mod candidates;
 mod nonlinear;
@@ -31,8 +32,12 @@ type Part = (&'static str, fn(&Arguments));
 
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
-    let parts: [Part; 3] =
-        [("pressed", pressed::measure), ("nonlinear", nonlinear::measure), ("candidates", candidates::measure)];
+    let parts: [Part; 4] = [
+        ("blocks", blocks),
+        ("pressed", pressed::measure),
+        ("nonlinear", nonlinear::measure),
+        ("candidates", candidates::measure),
+    ];
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
     let alone = parts.iter().any(|(word, _)| asked(word));
     for (word, measure) in parts {
@@ -40,13 +45,14 @@ fn main() {
             measure(&arguments);
         }
     }
-    if alone {
-        return;
-    }
+}
+
+/// Blocks with their whole bottom pressed, the work on the interface alone, and the plate.
+fn blocks(arguments: &Arguments) {
     for &n in &arguments.sizes {
-        measure(n, &arguments);
+        measure(n, arguments);
     }
-    plate(&arguments);
+    plate(arguments);
 }
 
 /// Ten thousand candidates, five hundred of them pressed: a thick plate on a floor, loaded in the middle.
