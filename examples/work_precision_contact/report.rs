@@ -69,8 +69,11 @@ impl Results {
         let [coarse, middle, fine] = forces.map(percent);
         let [loss, less] = energies.map(percent);
         let mut table = format!(
-            "### ({}) {}\n\n<!-- printed by: cargo run --release --example work_precision_contact -->\n| integrator | correction | mass | force {coarse} % | {middle} % | {fine} % | Co | solves · dofs {coarse} % | \
-             {middle} % | {fine} % | least % | RMS {} % | energy {loss} % | {less} % |\n|{}\n",
+            "### ({}) {}\n\n\
+             <!-- printed by: cargo run --release --example work_precision_contact -->\n\
+             | integrator | correction | mass | force {coarse} % | {middle} % | {fine} % | Co | \
+             solves · dofs {coarse} % | {middle} % | {fine} % | least % | RMS {} % | energy {loss} % | {less} % |\n\
+             |{}\n",
             self.letter,
             self.title,
             percent(rms),
