@@ -183,7 +183,8 @@ fn measure(n: usize) {
         let each = crossing(&model, direct.solve);
         let hundred = crossing(&model, direct.solve + (direct.factor - setup[k]) / 100.0);
         println!(
-            "{name}: an iteration is {:.3} of Cholesky's solve; as fast at Courant number {each}, 100 with a factorization at {hundred}",
+            "{name}: an iteration is {:.3} of Cholesky's solve; as fast at Courant number {each}, 100 with a \
+             factorization at {hundred}",
             iteration / direct.solve
         );
     }

@@ -27,7 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             writeln!(table, "| {} | {steps} | {force:.1e} | {duration:.1e} |", scheme().name())?;
         }
     }
-    table += "\nA quarter of an elastic ball (ν = 0.3), relative to Hertz, whose theory is that of a small contact radius a\n\n";
+    table += "\nA quarter of an elastic ball (ν = 0.3), relative to Hertz, whose theory is that of a small contact \
+              radius a\n\n";
     table += "| a/R | elements across a | dofs | candidates | largest force | duration | energy |\n";
     table += "| --- | --- | --- | --- | --- | --- | --- |\n";
     let quick = [(0.15, 3, [8, 8, 12])];

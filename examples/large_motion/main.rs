@@ -89,8 +89,8 @@ const SCENES: [(&str, Fly); 6] = [
 
 fn flights(share: f64) -> std::result::Result<String, Box<dyn std::error::Error>> {
     let mut table = String::from(
-        "| scene | scheme | steps, refused | iterations away | in contact | energy: most | end | angular momentum before \
-         impact | momentum | penetration | contact changes |\n\
+        "| scene | scheme | steps, refused | iterations away | in contact | energy: most | end \
+         | angular momentum before impact | momentum | penetration | contact changes |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (name, fly) in SCENES {
@@ -98,7 +98,8 @@ fn flights(share: f64) -> std::result::Result<String, Box<dyn std::error::Error>
             let f = fly(make(), share)?;
             writeln!(
                 table,
-                "| {name} | {} | {}, {} | {:.1}, most {} | {:.1}, most {} | {:+.0e} | {:.3} | {:.0e} | {:.0e} | {:.0e} | {} |",
+                "| {name} | {} | {}, {} | {:.1}, most {} | {:.1}, most {} | {:+.0e} | {:.3} | {:.0e} | {:.0e} \
+                 | {:.0e} | {} |",
                 make().name(),
                 f.steps,
                 f.refused,
@@ -120,8 +121,9 @@ fn flights(share: f64) -> std::result::Result<String, Box<dyn std::error::Error>
 
 fn long_runs(steps: u32) -> std::result::Result<String, Box<dyn std::error::Error>> {
     let mut table = String::from(
-        "| scheme | pendulum, EA = 1e4, h = 0.01: energy | angular momentum | square that bounces and rests: energy, most | end \
-         | iterations in contact |\n| --- | --- | --- | --- | --- | --- |\n",
+        "| scheme | pendulum, EA = 1e4, h = 0.01: energy | angular momentum \
+         | square that bounces and rests: energy, most | end | iterations in contact |\n\
+         | --- | --- | --- | --- | --- | --- |\n",
     );
     for make in [SCHEMES[0], SCHEMES[1], SCHEMES[2], SCHEMES[7], SCHEMES[8]] {
         let swing = Swing::run(make(), 1e4, 0.01, 0.01 * f64::from(steps))?;

@@ -40,7 +40,10 @@ pub(crate) fn cases(_: bool) -> Result<Vec<Row>, Anything> {
             now: force_and_speed(twice, 0.0)?,
         },
         Row {
-            case: "A floor that rises with speed 3 and gives no rates: force on a weight of 10 that it carries and its speed".into(),
+            case:
+                "A floor that rises with speed 3 and gives no rates: force on a weight of 10 that it carries and its \
+                   speed"
+                    .into(),
             before: SILENT_BEFORE,
             now: force_and_speed(silent, 3.0)?,
         },

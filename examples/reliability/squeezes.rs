@@ -45,8 +45,8 @@ pub(crate) fn cases(quick: bool) -> Result<Vec<Row>, Anything> {
     let runs = if quick { 300 } else { 5000 };
     Ok(vec![
         Row {
-            case: "Two to six masses, levers, a wall that closes: runs that go on with violated gaps, at ratios of mass and stiffness \
-                   of 1, 1e2, 1e4, 1e6, 1e8"
+            case: "Two to six masses, levers, a wall that closes: runs that go on with violated gaps, at ratios of \
+                   mass and stiffness of 1, 1e2, 1e4, 1e6, 1e8"
                 .into(),
             before: "34, 83, 317, 463, 549 of 5000",
             now: row(Walls::Close, 0, runs)?,

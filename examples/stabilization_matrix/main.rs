@@ -184,7 +184,8 @@ fn main_table(all: &[Combination], results: &Results) -> String {
 
 /// The rows that no other one beats.
 fn front(all: &[Combination], results: &Results, cost: &[Option<f64>]) -> String {
-    let head = "Rows that no other one beats in F_L1, max/F₀, loss and time together, with their numbers in the figure:\n\n\
+    let head = "Rows that no other one beats in F_L1, max/F₀, loss and time together, with their numbers in the \
+                figure:\n\n\
                 | | integrator | correction | mass | F_L1 | max/F₀ | loss % | time |\n\
                 | --- | --- | --- | --- | --- | --- | --- | --- |\n";
     let line = |(number, row): (usize, usize)| {

@@ -125,8 +125,9 @@ impl Block {
     pub(crate) fn remark(&self) -> String {
         let Self { finest, uncertainty: [mean, rms], losses, .. } = self;
         format!(
-            "Reference of the block: conservative preset, {finest} elements a side, Courant number ½. The composite scheme with \
-             λ_v/λ_a on a blend differs from it by {:.1} % in the mean, {:.1} % RMS; they lose {} and {} % of the energy.",
+            "Reference of the block: conservative preset, {finest} elements a side, Courant number ½. The composite \
+             scheme with λ_v/λ_a on a blend differs from it by {:.1} % in the mean, {:.1} % RMS; they lose {} and {} % \
+             of the energy.",
             100.0 * mean,
             100.0 * rms,
             decimal(100.0 * losses[0], 2),

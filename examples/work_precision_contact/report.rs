@@ -113,7 +113,8 @@ impl Results {
                 let Errors { force, rms, energy } = errors;
                 let _ = writeln!(
                     lines,
-                    "{},{names},{elements},{courant:.4},{dofs},{steps},{solves},{seconds:e},{force:e},{rms:e},{energy:e}",
+                    "{},{names},{elements},{courant:.4},{dofs},{steps},{solves},\
+                     {seconds:e},{force:e},{rms:e},{energy:e}",
                     self.key
                 );
             }
