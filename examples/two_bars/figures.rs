@@ -42,6 +42,29 @@ pub(crate) fn force(experiment: &Experiment, runs: &[Run]) -> Result<String, Box
     banner(&Panel { x, ..force_panel(experiment, title, curves) })
 }
 
+/// The same in characters, for pages that show no images: some steps from the impact on, a column of blocks each.
+pub(crate) fn force_in_characters(experiment: &Experiment, runs: &[Run]) -> String {
+    const BLOCKS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    // A row is half of the exact force.
+    const LABELS: [char; 6] = ['3', ' ', '2', ' ', '1', ' '];
+    let (impact, plateau) = (experiment.contact().0, experiment.plateau());
+    let mut lines = vec![String::new(); LABELS.len() + 2];
+    for run in before_and_after(runs).into_iter().flatten() {
+        let first = run.samples().position(|sample| sample.t > impact).unwrap_or(0).saturating_sub(4);
+        let forces: Vec<f64> = run.samples().skip(first).take(34).map(|sample| sample.force / plateau).collect();
+        let mut panel = vec![format!("F/F₀ {}", run.correction.title())];
+        for (label, below) in LABELS.into_iter().zip((0..LABELS.len()).rev()) {
+            let block = |force: &f64| BLOCKS[(0..8).filter(|&k| 16.0 * force > (8 * below + k) as f64 + 0.5).count()];
+            panel.push(format!("{label} │{}", forces.iter().map(block).collect::<String>()));
+        }
+        panel.push(format!("0 └{}", "─".repeat(forces.len())));
+        for (line, part) in lines.iter_mut().zip(panel) {
+            *line = if line.is_empty() { part } else { format!("{line:42}{part}") };
+        }
+    }
+    lines.iter().fold(String::new(), |text, line| text + line.trim_end() + "\n")
+}
+
 fn displacement(experiment: &Experiment, run: &Run) -> Panel {
     let curves = both_nodes(experiment, run, |side| move |sample| 1e3 * sample.u[side]);
     Panel {

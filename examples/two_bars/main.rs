@@ -68,6 +68,7 @@ fn present(options: &Options) -> Result<(), Box<dyn Error>> {
     for runs in &of_each_scheme {
         write_histories(output, &experiment, runs)?;
     }
+    write(output, "force.txt", &figures::force_in_characters(&experiment, of_each_scheme[0]))?;
     write(output, "force.svg", &figures::force(&experiment, of_each_scheme[0])?)
 }
 
