@@ -2,14 +2,15 @@
 
 use contact_dynamics::contact::{ContactLaw, GapFunction, GapOffset, NodesOnObstacle, Plane};
 use contact_dynamics::corrector::{ContactStabilized, LaursenLove, Release, TaylorPapadopoulos};
-use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use contact_dynamics::observer::EnergyRecorder;
 use contact_dynamics::tableau::{A, ContactLevel, Row, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
-    Bathe, CdLagrange, CentralDifference, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha,
-    Gssss, LinearRows, LinearSystem, Linearity, Mass, MoreauJean, Newmark, Park, PersistencyCorrection, Real, Result,
-    Simulation, SimulationBuilder, System, TangentWeights, TimeIntegrator,
+    Bathe, CdLagrange, CentralDifference, Composite, Corrector, EnergyMomentum, Error, GeneralizedAlpha, Gssss,
+    LinearRows, LinearSystem, Linearity, MoreauJean, Newmark, Park, PersistencyCorrection, Real, Simulation,
+    SimulationBuilder, TimeIntegrator,
 };
+use contact_dynamics_scenes::hosts::Hooked;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::schemes::Tabulated;
 use std::sync::Arc;
@@ -99,73 +100,10 @@ impl Fault {
     }
 }
 
-/// A chain of three masses, the first one driven.
-struct Faulty {
-    inner: LinearSystem<'static, f64>,
-    linearity: Linearity,
-    fault: Fault,
-}
-
-impl System<f64> for Faulty {
-    fn dofs(&self) -> usize {
-        self.inner.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        self.linearity
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        self.inner.mass()
-    }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.inner.force(t, u, v, out)?;
-        out[1] += self.fault.of(Part::Force);
-        Ok(())
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.inner.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-        self.inner.tangent(t, u, v, weights, out)?;
-        out[1] += self.fault.of(Part::Tangent);
-        Ok(())
-    }
-    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
-        match self.inner.damping_force().is_some() {
-            true => Some(self),
-            false => None,
-        }
-    }
-    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
-        self.inner.potential_energy(u)
-    }
-    fn external_load(&mut self, t: f64, out: &mut [f64]) -> Result<()> {
-        self.inner.external_load(t, out)?;
-        out[1] += self.fault.of(Part::Load);
-        Ok(())
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.inner.prescribed()
-    }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
-        self.inner.prescribed_motion(t, out)?;
-        for (k, x) in out[0].iter_mut().enumerate() {
-            *x += self.fault.of(Part::Support(k));
-        }
-        Ok(())
-    }
-}
-
-impl DampingForce<f64> for Faulty {
-    fn evaluate(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.inner.evaluate(u, v, out)?;
-        out[2] += self.fault.of(Part::Damping);
-        Ok(())
-    }
-}
-
 const H: f64 = 0.02;
 
-/// The mass at the end meets a wall that moves, the one in the middle a function and an obstacle.
+/// A chain of three masses, the first one driven; that at the end meets a wall that moves, the one in the middle a
+/// function and an obstacle.
 fn faulty(
     scheme: Box<dyn TimeIntegrator>,
     correctors: Vec<Box<dyn Corrector<f64>>>,
@@ -199,7 +137,22 @@ fn faulty(
                 all
             })
         });
-    Simulation::builder(Faulty { inner, linearity, fault: fault.clone() }, scheme, H)
+    let evaluated = fault.clone();
+    let host = Hooked::new(inner, move |method, _, out| {
+        let parts: &[(usize, Part)] = match method {
+            "force" => &[(1, Part::Force)],
+            "tangent" => &[(1, Part::Tangent)],
+            "external_load" => &[(1, Part::Load)],
+            "damping_force" => &[(2, Part::Damping)],
+            "prescribed_motion" => &[(0, Part::Support(0)), (1, Part::Support(1)), (2, Part::Support(2))],
+            _ => &[],
+        };
+        for &(k, part) in parts {
+            out[k] += evaluated.of(part);
+        }
+        Ok(())
+    });
+    Simulation::builder(host.linearity(linearity), scheme, H)
         .velocity(vec![-0.5, -1.0, -1.5])
         .constraint(LinearRows::new().row(law, &[(2, 1.0)], offset))
         .constraint(ball)

@@ -6,52 +6,16 @@ use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatR
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
     Bathe, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem,
-    Linearity, Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, StartUp,
-    StepControl, System, TangentWeights, TimeIntegrator,
+    Linearity, Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Result, Simulation, StartUp, StepControl,
+    System, TangentWeights, TimeIntegrator,
 };
-use contact_dynamics_scenes::hosts::Bare;
+use contact_dynamics_scenes::hosts::{self, Bare, Hooked};
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::matrix;
 use contact_dynamics_scenes::{Bars, MassKind};
 
 type Make = fn() -> Box<dyn TimeIntegrator>;
-
-/// A linear system that says that it is not.
-struct Unknowing<S>(S);
-
-impl<T: Real, S: System<T>> System<T> for Unknowing<S> {
-    fn dofs(&self) -> usize {
-        self.0.dofs()
-    }
-    fn mass(&self) -> Mass<'_, T> {
-        self.0.mass()
-    }
-    fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        self.0.force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.0.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
-        self.0.tangent(t, u, v, weights, out)
-    }
-    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
-        self.0.damping_force()
-    }
-    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
-        self.0.potential_energy(u)
-    }
-    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
-        self.0.external_load(t, out)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.0.prescribed()
-    }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
-        self.0.prescribed_motion(t, out)
-    }
-}
 
 /// A point mass on a spring to the origin of the plane, with force k (l² − L²)/(2 L²) as that of a Green–Lagrange bar,
 /// and on a dashpot whose force is c |v|² v.
@@ -62,6 +26,8 @@ struct Pendulum {
     drag: f64,
     /// Grows with t.
     load: [f64; 2],
+    /// Dofs that move with speed 1.
+    supports: &'static [usize],
     pattern: SymbolicSparseColMat<usize>,
     /// Factor of the tangent: 1 is right.
     tangent: f64,
@@ -70,7 +36,7 @@ struct Pendulum {
 impl Pendulum {
     fn new(axial: f64) -> Self {
         let pattern = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 4], None, vec![0, 1, 0, 1]);
-        Self { mass: [10.0; 2], axial, length: 3.0, drag: 0.0, load: [0.0; 2], pattern, tangent: 1.0 }
+        Self { mass: [10.0; 2], axial, length: 3.0, drag: 0.0, load: [0.0; 2], supports: &[], pattern, tangent: 1.0 }
     }
 
     fn place(&self, u: &[f64]) -> [f64; 2] {
@@ -126,6 +92,13 @@ impl System<f64> for Pendulum {
     fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
         Some(0.5 * self.axial * self.length * self.strain(self.place(u)).powi(2))
     }
+    fn prescribed(&self) -> &[usize] {
+        self.supports
+    }
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
+        out.fill([t, 1.0, 0.0]);
+        Ok(())
+    }
 }
 
 impl DampingForce<f64> for Pendulum {
@@ -170,7 +143,8 @@ fn a_linear_system_is_solved_as_by_the_direct_solve() {
             let corrector = PersistencyCorrection::with_history_projection();
             let corrector: Option<Box<dyn Corrector<f64>>> =
                 if scheme.takes_corrections() { Some(Box::new(corrector)) } else { None };
-            let system: Box<dyn System<f64>> = if nonlinear { Box::new(Unknowing(system)) } else { Box::new(system) };
+            let system: Box<dyn System<f64>> =
+                if nonlinear { Box::new(hosts::nonlinear(system)) } else { Box::new(system) };
             let builder = Simulation::builder(system, (scheme.make)(), 2e-3)
                 .velocity(bars.velocities())
                 .constraint(bars.contact())
@@ -223,7 +197,7 @@ fn compliant_laws_and_supports_are_those_of_the_direct_solve() {
                     || bars.system::<f64>().drive(last, |t| [-0.05 * t - 0.1 * t * t, -0.05 - 0.2 * t, -0.2]).unwrap();
                 let build = |nonlinear: bool| {
                     let system: Box<dyn System<f64>> =
-                        if nonlinear { Box::new(Unknowing(system())) } else { Box::new(system()) };
+                        if nonlinear { Box::new(hosts::nonlinear(system())) } else { Box::new(system()) };
                     Simulation::builder(system, (scheme.make)(), 2e-3)
                         .velocity(bars.velocities())
                         .constraint(LinearRows::new().row(law, &[(left, -1.0), (right, 1.0)], bars.gap))
@@ -264,7 +238,7 @@ fn single_precision_converges_to_its_own_rounding() {
             .build()
             .unwrap()
     };
-    let (mut direct, mut newton) = (run(Box::new(bars.system())), run(Box::new(Unknowing(bars.system()))));
+    let (mut direct, mut newton) = (run(Box::new(bars.system())), run(Box::new(hosts::nonlinear(bars.system()))));
     for _ in 0..400 {
         direct.step().unwrap();
         newton.step().unwrap();
@@ -625,40 +599,19 @@ fn the_corrected_force_is_that_of_the_balance() {
 #[test]
 fn a_failed_step_leaves_the_rows_of_the_state() {
     // The host fails after some evaluations, when the row has followed the trial.
-    struct Failing(Pendulum, std::sync::Arc<std::sync::atomic::AtomicUsize>);
-    impl System<f64> for Failing {
-        fn dofs(&self) -> usize {
-            2
-        }
-        fn mass(&self) -> Mass<'_, f64> {
-            self.0.mass()
-        }
-        fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-            use std::sync::atomic::Ordering::Relaxed;
-            if self.1.fetch_sub(1, Relaxed) == 0 {
-                self.1.store(usize::MAX, Relaxed);
-                return Err(Error::Inadmissible { callback: "force", source: "now".into() });
-            }
-            self.0.force(t, u, v, out)
-        }
-        fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-            self.0.pattern()
-        }
-        fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], w: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-            self.0.tangent(t, u, v, w, out)
-        }
-        fn prescribed(&self) -> &[usize] {
-            &[1]
-        }
-        fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
-            out[0] = [t, 1.0, 0.0];
-            Ok(())
-        }
-    }
     let counter = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(usize::MAX));
     let circle = Sphere::new([0.0, 0.0], 3.02, Side::Inside).unwrap();
     let contact = NodesOnObstacle::new(circle, &[[3.0, 0.0]], &[[0, 1]], &[0]).unwrap();
-    let host = Failing(Pendulum { drag: 0.5, ..Pendulum::new(200.0) }, counter.clone());
+    let pendulum = Pendulum { drag: 0.5, supports: &[1], ..Pendulum::new(200.0) };
+    let calls = counter.clone();
+    let host = Hooked::new(pendulum, move |method, _, _| {
+        use std::sync::atomic::Ordering::Relaxed;
+        if method == "force" && calls.fetch_sub(1, Relaxed) == 0 {
+            calls.store(usize::MAX, Relaxed);
+            return Err(Error::Inadmissible { callback: method, source: "now".into() });
+        }
+        Ok(())
+    });
     let mut run = Simulation::builder(host, Composite, 0.05)
         .velocity(vec![2.0, 0.0])
         .constraint(contact)

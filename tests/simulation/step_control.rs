@@ -1,13 +1,12 @@
 //! Step-size control: refused steps, judgement, growth, and landing on a time.
 
 use contact_dynamics::contact::{Side, Sphere};
-use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
 use contact_dynamics::{
-    CdLagrange, Composite, Control, EnergyMomentum, Error, LinearRows, LinearSystem, Linearity, Mass, Newmark,
-    NodesOnObstacle, PersistencyCorrection, Result, Simulation, StepControl, StepView, System, TangentWeights,
-    TimeIntegrator, analysis,
+    CdLagrange, Composite, Control, EnergyMomentum, Error, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
+    PersistencyCorrection, Result, Simulation, StepControl, StepView, System, TimeIntegrator, analysis,
 };
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::hosts::Hooked;
 use contact_dynamics_scenes::schemes::{Listed, all, correctable};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::matrix;
@@ -34,14 +33,6 @@ fn oscillator(omega: f64) -> LinearSystem<'static, f64> {
     LinearSystem::lumped(vec![1.0], k).unwrap()
 }
 
-/// Bars whose host admits no step longer than `limit` that ends in a window of time, as an element that is turned
-/// inside out by too large a step.
-struct Reluctant {
-    inner: LinearSystem<'static, f64>,
-    last: f64,
-    rule: Arc<Mutex<Rule>>,
-}
-
 #[derive(Clone, Copy)]
 struct Rule {
     window: [f64; 2],
@@ -51,40 +42,24 @@ struct Rule {
 
 const NEVER: Rule = Rule { window: [f64::INFINITY; 2], limit: 0.0, recoverable: true };
 
-impl System<f64> for Reluctant {
-    fn dofs(&self) -> usize {
-        self.inner.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        Linearity::Linear
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        self.inner.mass()
-    }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        let rule = *self.rule.lock().unwrap();
-        if (rule.window[0]..rule.window[1]).contains(&t) && t - self.last > rule.limit * (1.0 + 1e-6) {
-            let source = "an element is turned inside out".into();
-            return Err(match rule.recoverable {
-                true => Error::Inadmissible { callback: "force", source },
-                false => Error::Host { callback: "force", source },
-            });
+/// A host, last committed at `last`, that admits no step longer than the limit that ends in the window of time, as an
+/// element that is turned inside out by too large a step.
+fn host(system: LinearSystem<'static, f64>, mut last: f64, rule: Arc<Mutex<Rule>>) -> impl System<f64> + 'static {
+    Hooked::new(system, move |method, t, _| {
+        let rule = *rule.lock().unwrap();
+        match method {
+            "force" if (rule.window[0]..rule.window[1]).contains(&t) && t - last > rule.limit * (1.0 + 1e-6) => {
+                let source = "an element is turned inside out".into();
+                return Err(match rule.recoverable {
+                    true => Error::Inadmissible { callback: method, source },
+                    false => Error::Host { callback: method, source },
+                });
+            }
+            "commit" => last = t,
+            _ => {}
         }
-        self.inner.force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.inner.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-        self.inner.tangent(t, u, v, weights, out)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.inner.prescribed()
-    }
-    fn commit(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<()> {
-        self.last = t;
         Ok(())
-    }
+    })
 }
 
 const H: f64 = 1e-3;
@@ -92,7 +67,7 @@ const H: f64 = 1e-3;
 fn reluctant(make: Make, rule: Rule, control: Option<StepControl>) -> (Simulation<'static, f64>, Arc<Mutex<Rule>>) {
     let bars = Bars::paper(10).delayed(0.4, H);
     let rule = Arc::new(Mutex::new(rule));
-    let system = Reluctant { inner: bars.system(), last: 0.0, rule: Arc::clone(&rule) };
+    let system = host(bars.system(), 0.0, Arc::clone(&rule));
     let builder = Simulation::builder(system, make(), H)
         .velocity(bars.velocities())
         .constraint(bars.contact())
@@ -228,7 +203,7 @@ fn a_controlled_run_is_continued_bit_for_bit() {
         assert!(run.step_size() < H);
         let bars = Bars::paper(10).delayed(0.4, H);
         let shared = Arc::new(Mutex::new(rule));
-        let system = Reluctant { inner: bars.system(), last: run.time(), rule: shared };
+        let system = host(bars.system(), run.time(), shared);
         let mut resumed = Simulation::builder(system, make(), H)
             .constraint(bars.contact())
             .corrector(PersistencyCorrection::with_history_projection())
@@ -273,7 +248,7 @@ fn a_refused_step_may_have_found_other_contacts() {
                 .fold(system, |system: LinearSystem<'static, f64>, axis| system.fix(2 * n + axis).unwrap())
         });
         let shared = Arc::new(Mutex::new(rule));
-        let builder = Simulation::builder(Reluctant { inner, last: 0.0, rule: Arc::clone(&shared) }, Composite, h)
+        let builder = Simulation::builder(host(inner, 0.0, Arc::clone(&shared)), Composite, h)
             .constraint(contact)
             .corrector(PersistencyCorrection::with_history_projection());
         let builder = match control {

@@ -5,11 +5,11 @@ use contact_dynamics::corrector::{LaursenLove, Release};
 use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::observer::{DofRecorder, EnergyRecorder, Observer, Wants};
 use contact_dynamics::{
-    CdLagrange, CentralDifference, Cholesky, Composite, Condensation, Control, Corrector, DampingForce, EnergyMomentum,
-    Error, Factorization, LinearRows, LinearSolver, LinearSystem, Linearity, Mass, Newmark, Outcome, Park, Path,
-    PathForce, PersistencyCorrection, Result, Simulation, SimulationBuilder, StepControl, StepView, System,
-    TangentWeights, TimeIntegrator,
+    CdLagrange, CentralDifference, Cholesky, Composite, Condensation, Control, Corrector, EnergyMomentum, Error,
+    Factorization, LinearRows, LinearSolver, LinearSystem, Linearity, Newmark, Outcome, Park, PersistencyCorrection,
+    Result, Simulation, SimulationBuilder, StepControl, StepView, TimeIntegrator,
 };
+use contact_dynamics_scenes::hosts::Hooked;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -38,91 +38,6 @@ impl Fault {
             true => Err(Error::Host { callback, source: "refused".into() }),
             false => Ok(()),
         }
-    }
-}
-
-/// A driven chain of three masses in which everything may fail.
-struct Refusing {
-    inner: LinearSystem<'static, f64>,
-    linearity: Linearity,
-    along: bool,
-    fault: Fault,
-}
-
-impl System<f64> for Refusing {
-    fn dofs(&self) -> usize {
-        self.inner.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        self.linearity
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        self.inner.mass()
-    }
-    fn force(&mut self, t: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.fault.pass("force")?;
-        self.inner.force(t, u, v, out)
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.inner.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
-        self.fault.pass("tangent")?;
-        self.inner.tangent(t, u, v, weights, out)
-    }
-    fn path_force(&mut self) -> Option<&mut dyn PathForce<f64>> {
-        match self.along {
-            true => Some(self),
-            false => None,
-        }
-    }
-    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
-        match self.inner.damping_force().is_some() {
-            true => Some(self),
-            false => None,
-        }
-    }
-    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
-        self.inner.potential_energy(u)
-    }
-    fn external_load(&mut self, t: f64, out: &mut [f64]) -> Result<()> {
-        self.fault.pass("external_load")?;
-        self.inner.external_load(t, out)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.inner.prescribed()
-    }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> Result<()> {
-        self.fault.pass("prescribed_motion")?;
-        self.inner.prescribed_motion(t, out)
-    }
-    fn commit(&mut self, _: f64, _: &[f64], _: &[f64]) -> Result<()> {
-        self.fault.pass("commit")
-    }
-}
-
-impl DampingForce<f64> for Refusing {
-    fn evaluate(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.fault.pass("damping_force")?;
-        self.inner.evaluate(u, v, out)
-    }
-}
-
-impl PathForce<f64> for Refusing {
-    fn force_along(&mut self, t: f64, path: Path<'_, f64>, v: &[f64], out: &mut [f64]) -> Result<()> {
-        self.fault.pass("force_along")?;
-        self.inner.force(t, path.mean, v, out)
-    }
-    fn tangent_along(
-        &mut self,
-        t: f64,
-        path: Path<'_, f64>,
-        v: &[f64],
-        weights: TangentWeights<f64>,
-        out: &mut [f64],
-    ) -> Result<()> {
-        self.fault.pass("tangent_along")?;
-        self.inner.tangent(t, path.mean, v, weights, out)
     }
 }
 
@@ -251,7 +166,9 @@ impl Run {
                 Ok([-0.5 * t, -0.5, 0.0])
             })
             .unwrap();
-        let system = Refusing { inner, linearity: self.linearity, along: self.along, fault: fault.clone() };
+        let evaluated = fault.clone();
+        let system = Hooked::new(inner, move |method, _, _| evaluated.pass(method)).linearity(self.linearity);
+        let system = if self.along { system.along_paths() } else { system };
         let rows = LinearRows::new().unilateral(&[(2, 1.0)], 0.12).unilateral(&[(1, 1.0)], 0.3);
         Simulation::builder(system, self.scheme, 0.02)
             .velocity(vec![-0.5, -1.0, if self.end_mass > 0.0 { -1.5 } else { 0.0 }])
