@@ -19,6 +19,7 @@ mod curved_rows;
 mod curved_step;
 mod energy;
 mod finite;
+mod gaps;
 mod interface;
 mod judge;
 mod laws;

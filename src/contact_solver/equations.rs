@@ -15,13 +15,7 @@ pub(super) struct Equations<T> {
     /// The version of W, and the rows, to which these belong; version 0 if to none.
     version: u64,
     rows: Vec<usize>,
-    /// Iterations spent on these equations.
-    spent: usize,
 }
-
-/// Share of the number of rows that may go into iterations on the same equations. A factor costs about as much as that
-/// many: who pays for both has then spent twice the least, whether these equations come again or not.
-const PATIENCE: usize = 12;
 
 /// How the equations are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,8 +49,7 @@ impl<T: Real> Equations<T> {
     pub(super) fn with_capacity(rows: usize) -> Self {
         let dense = if rows < MANY { rows } else { FORESEEN };
         let factor = DenseCholesky::with_capacity(dense);
-        let rows = Vec::with_capacity(rows);
-        Self { factor, many: ManyRows::default(), method: Method::Factor, version: 0, rows, spent: 0 }
+        Self { factor, many: ManyRows::default(), method: Method::Factor, version: 0, rows: Vec::with_capacity(rows) }
     }
 
     /// Solves for `x`, which holds −q on entry. With a `shift` of the diagonal W is positive definite, and what is
@@ -70,24 +63,15 @@ impl<T: Real> Equations<T> {
     ) -> Result<Solved, usize> {
         let known = self.version > 0 && self.version == problem.version && self.rows == rows && shift.is_none();
         if !known {
-            (self.version, self.spent) = (0, 0);
+            self.version = 0;
             let iterates = rows.len() >= MANY && symmetry == Symmetry::Symmetric && shift.is_none();
             match iterates && self.many.prepare(problem, rows) {
                 true => self.method = Method::Iteration,
                 false => self.factorize(problem, (rows, symmetry), shift)?,
             }
         }
-        if known && self.method == Method::Iteration && self.spent > rows.len() / PATIENCE {
-            self.factorize(problem, (rows, symmetry), shift)?;
-            if self.factor.is_singular() {
-                // Iterations have solved them so far, and go on to.
-                (self.method, self.spent) = (Method::Iteration, 0);
-            }
-        }
         let mut solved = Solved::Once;
-        let iterations = if self.method == Method::Iteration { self.many.solve(problem, rows, x) } else { None };
-        self.spent += iterations.unwrap_or(0);
-        if iterations.is_none() {
+        if !(self.method == Method::Iteration && self.many.solve(problem, rows, x).is_some()) {
             if self.method == Method::Iteration {
                 self.factorize(problem, (rows, symmetry), shift)?;
             }

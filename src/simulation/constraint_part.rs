@@ -1,6 +1,6 @@
 //! One constraint of a run: its dofs, what it has said, and its local vectors.
 
-use crate::contact::{Candidates, ContactConstraint, ContactId, Contacts, Variation};
+use crate::contact::{Candidates, ContactConstraint, ContactId, Contacts, Rates, Variation};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -15,10 +15,8 @@ pub(super) struct Part<'a, T: Real> {
     pub(super) place: (f64, Vec<T>),
     /// Whether its rows may have changed since they were read.
     pub(super) stale: bool,
-    /// Whether it has left its rates to differences.
-    pub(super) differenced: bool,
-    /// Whether it has said that all its rates are zero.
-    pub(super) still: bool,
+    /// What it has said of its rates, once it was asked; forgotten when its rows change.
+    pub(super) rates: Option<Rates>,
 }
 
 impl<T: Real> Part<'_, T> {

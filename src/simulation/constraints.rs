@@ -6,42 +6,40 @@ use super::laws::Laws;
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
 use crate::contact::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, ContactLaw, Contacts, GapRates, NO_RESPONSE, Rates,
-    Stride, Variation,
+    Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride, Variation,
 };
-use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{ContactState, Motion, Names};
 
 /// The constraints in the order given, their rows one after the other.
 pub(crate) struct Constraints<'a, T: Real> {
-    parts: Vec<Part<'a, T>>,
+    pub(super) parts: Vec<Part<'a, T>>,
     pub(crate) ids: Vec<ContactId>,
-    laws: Laws,
-    magnitudes: Vec<T>,
+    pub(super) laws: Laws,
+    pub(super) magnitudes: Vec<T>,
     /// Rows and rates of a constraint that is evaluated at another motion.
-    scratch: Contacts<T>,
-    rates: Vec<GapRates<T>>,
-    local: Local<T>,
+    pub(super) scratch: Contacts<T>,
+    pub(super) rates: Vec<GapRates<T>>,
+    pub(super) local: Local<T>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
     /// For each dof of the system its place on the interface.
     places: Vec<usize>,
     admitted: Admitted,
     /// Whether candidates have changed since the rows were last read.
-    stale: bool,
+    pub(super) stale: bool,
     /// Counts how often the rows have been read, and how often their names have changed by that.
     version: u64,
     names: Names,
     /// The number of rows that there is to be memory for.
     room: usize,
     /// How far the last search looks ahead.
-    ahead: f64,
-    differences: RateDifferences<T>,
+    pub(super) ahead: f64,
+    pub(super) differences: RateDifferences<T>,
     /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
-    overclosures: Option<Overclosures<T>>,
-    added: Vec<T>,
+    pub(super) overclosures: Option<Overclosures<T>>,
+    pub(super) added: Vec<T>,
 }
 
 /// The place of a dof that no constraint has listed among those it may act on.
@@ -95,8 +93,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 dofs: list,
                 contacts,
                 stale: true,
-                differenced: false,
-                still: false,
+                rates: None,
             });
         }
         interface.sort_unstable();
@@ -204,7 +201,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.read_stale(jacobian)
     }
 
-    fn follow_part(&mut self, number: usize, t: f64, u: &[T]) -> Result<Candidates> {
+    pub(super) fn follow_part(&mut self, number: usize, t: f64, u: &[T]) -> Result<Candidates> {
         let Self { parts, local, .. } = self;
         let part = &mut parts[number];
         if part.variation != Variation::Follows {
@@ -252,7 +249,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         for (constraint, part) in parts.iter_mut().enumerate() {
             let Part { contacts, dofs, .. } = part;
             if part.stale {
-                part.still = false;
+                part.rates = None;
                 contacts.clear();
                 part.constraint.contacts(contacts);
             }
@@ -339,96 +336,6 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.ids.len()
     }
 
-    /// Gaps of all rows, refusing NaN and infinity.
-    pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
-        let Self { parts, local, .. } = self;
-        let mut rest = &mut *out;
-        for (number, part) in parts.iter_mut().enumerate() {
-            let (own, others) = rest.split_at_mut(part.contacts.len());
-            if !own.is_empty() {
-                let u = gather(&part.dofs, u, &mut local.u);
-                part.constraint.gaps(t, u, own).map_err(|error| of(number, error))?;
-            }
-            rest = others;
-        }
-        if let Some(overclosures) = &self.overclosures {
-            let share = T::of(overclosures.share(t)[0]);
-            for (gap, &added) in out.iter_mut().zip(&self.added) {
-                *gap += share * added;
-            }
-        }
-        self.refuse_infinite(t, "the gap", out)
-    }
-
-    /// Refuses values of the rows that are NaN or infinite.
-    fn refuse_infinite(&self, t: f64, what: &'static str, out: &[T]) -> Result<()> {
-        match out[..self.len()].iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(row) => Err(Error::ContactNotFinite { t, what, contact: self.ids[row], value: out[row].value() }),
-        }
-    }
-
-    /// The parts of the gap rates of all rows that do not come from v and a, refusing NaN and infinity.
-    pub(crate) fn finite_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
-        let mut rest = &mut *out;
-        for number in 0..self.parts.len() {
-            let (own, others) = rest.split_at_mut(self.parts[number].contacts.len());
-            self.rates_of(number, (t, u, v), own)?;
-            rest = others;
-        }
-        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
-            let [_, rate, acceleration] = overclosures.share(t).map(T::of);
-            for (rates, &added) in out.iter_mut().zip(&self.added) {
-                rates.rate += rate * added;
-                rates.acceleration += acceleration * added;
-            }
-        }
-        if self.parts.iter().all(|part| part.still) {
-            return Ok(());
-        }
-        for (&contact, rates) in self.ids.iter().zip(&*out) {
-            for (what, value) in [("the gap rate", rates.rate), ("the gap acceleration", rates.acceleration)] {
-                if !value.is_finite() {
-                    return Err(Error::ContactNotFinite { t, what, contact, value: value.value() });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// What the gap rates of a constraint have of their own, as it says or from differences of its gaps.
-    fn rates_of(&mut self, number: usize, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) -> Result<()> {
-        if out.is_empty() {
-            return Ok(());
-        }
-        let Self { parts, local, differences, ahead, .. } = self;
-        let Part { constraint, dofs, contacts, variation, place, differenced, still, .. } = &mut parts[number];
-        if *still {
-            out.fill(GapRates::default());
-            return Ok(());
-        }
-        let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
-        let found = match constraint.rates(t, u, v, out) {
-            Ok(Rates::Differences) => {
-                *differenced = true;
-                let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
-                differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out)
-            }
-            Ok(Rates::Zero) => {
-                *still = true;
-                out.fill(GapRates::default());
-                Ok(())
-            }
-            other => other.map(drop),
-        };
-        found.map_err(|error| of(number, error))
-    }
-
-    /// Whether the constraint of a row has given its rates when they were asked for.
-    pub(crate) fn gives_rates(&self, row: usize) -> bool {
-        !self.parts[self.ids[row].constraint].differenced
-    }
-
     /// (contact, row) of the contacts of a state that are still candidates: a search may have changed these since.
     pub(crate) fn rows_of<'c>(&'c self, contacts: &'c ContactState<T>) -> impl Iterator<Item = (usize, usize)> + 'c {
         let (same, sorted) = (self.ids == contacts.ids, self.ids.is_sorted());
@@ -457,77 +364,5 @@ impl<'a, T: Real> Constraints<'a, T> {
             }
         }
         Ok(())
-    }
-}
-
-impl<T: Real> Gaps<T> for Constraints<'_, T> {
-    fn law(&self, row: usize) -> ContactLaw {
-        self.laws[row]
-    }
-
-    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
-        rounding(magnitude + gap.abs() + self.magnitudes[row])
-    }
-
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
-        self.finite_rates(t, u, v, out)
-    }
-
-    fn elsewhere(
-        &mut self,
-        field: usize,
-        (t, [u, v, a]): (f64, [&[T]; 3]),
-        here: (f64, &[T]),
-        out: &mut [T],
-    ) -> Result<()> {
-        let mut first = 0;
-        for number in 0..self.parts.len() {
-            let found = self.follow_part(number, t, u).and_then(|_| {
-                let count = self.parts[number].contacts.len();
-                let out = &mut out[first..first + count];
-                if out.is_empty() {
-                    return Ok(());
-                }
-                if field == 0 {
-                    let Self { parts, local, .. } = self;
-                    let part = &mut parts[number];
-                    let u = gather(&part.dofs, u, &mut local.u);
-                    return part.constraint.gaps(t, u, out).map_err(|error| of(number, error));
-                }
-                let mut rates = std::mem::take(&mut self.rates);
-                rates.resize(count.max(rates.len()), GapRates::default());
-                let found = self.rates_of(number, (t, u, v), &mut rates[..count]);
-                let Self { parts, local, scratch, .. } = self;
-                let part = &mut parts[number];
-                let contacts = match part.variation {
-                    Variation::Follows => {
-                        scratch.clear();
-                        part.constraint.contacts(scratch);
-                        scratch
-                    }
-                    _ => &mut part.contacts,
-                };
-                let x = gather(&part.dofs, if field == 1 { v } else { a }, &mut local.other);
-                for (row, (out, own)) in out.iter_mut().zip(&rates).enumerate() {
-                    let own = if field == 1 { own.rate } else { own.acceleration };
-                    *out = contacts.rows().product(row, x) + own;
-                }
-                self.rates = rates;
-                found
-            });
-            // Back to the same rows, after an error too: G need not be read again.
-            let back = self.follow_part(number, here.0, here.1);
-            self.parts[number].stale |= back.is_err();
-            self.stale |= back.is_err();
-            found.and(back)?;
-            first += self.parts[number].contacts.len();
-        }
-        if let Some(overclosures) = &self.overclosures {
-            let share = T::of(overclosures.share(t)[field.min(2)]);
-            for (out, &added) in out.iter_mut().zip(&self.added) {
-                *out += share * added;
-            }
-        }
-        self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
     }
 }

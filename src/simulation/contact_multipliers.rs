@@ -145,7 +145,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             operator.sort(forces, sorted);
             problem.clear();
             problem.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
-            for buffer in [&mut *offset, &mut *problem_tolerance, &mut *multipliers] {
+            for buffer in [&mut *offset, &mut *problem_tolerance] {
                 buffer.clear();
             }
             sets.clear();
@@ -153,22 +153,25 @@ impl<T: Real> ContactStep<'_, '_, T> {
             for &j in problem.iter() {
                 offset.push((y[j] + shift[j]) / weight[j]);
                 problem_tolerance.push(tolerance[j] / weight[j]);
-                multipliers.push(trial.lambda_raw[j]);
                 sets.push(constraints.law(j).into());
             }
+            let guess = |problem: &[usize], multipliers: &mut Vec<T>| {
+                multipliers.clear();
+                multipliers.extend(problem.iter().map(|&row| trial.lambda_raw[row]));
+            };
             let InterfaceWork { pressing, response, .. } = &mut *interface;
             let mut solved = None;
             if operator.applies(problem.len()) {
                 own.clear();
                 own.extend(problem.iter().map(|&row| compliance[row] / weight[row]));
+                guess(problem, multipliers);
                 let problem = AppliedRows { g: forces, rows: problem, own, offset, sets, tolerance: problem_tolerance };
                 solved = problem.solve(operator, &mut **solver, [pressing, response], scale, multipliers)?;
             }
             if let Some(iterations) = solved {
                 statistics.contact_iterations += iterations as u64;
             } else {
-                multipliers.clear();
-                multipliers.extend(problem.iter().map(|&row| trial.lambda_raw[row]));
+                guess(problem, multipliers);
                 let mut iterations = 0;
                 for group in 0..operator.groups().len() {
                     let range = operator.groups().range(group);

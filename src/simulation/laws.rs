@@ -4,6 +4,7 @@ use crate::contact::ContactLaw;
 
 /// The laws of the rows, in their order.
 #[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each of them is a question of its own")]
 pub(crate) struct Laws {
     list: Vec<ContactLaw>,
     /// Whether the condition of any row depends on the gap at the start of the stage.

@@ -189,6 +189,68 @@ fn a_wall_that_moves_needs_no_rates() {
     assert!((run.state().velocity()[0] + 0.5).abs() < 1e-9, "{:?}", run.state());
 }
 
+/// A floor that says that it never changes, and writes down what it is asked besides gaps.
+#[derive(Default)]
+struct Still {
+    asked: Vec<&'static str>,
+    /// Its speed, of which it says nothing.
+    speed: f64,
+}
+
+impl ContactConstraint<f64> for Still {
+    fn dofs(&self) -> &[usize] {
+        &[0]
+    }
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        contacts.push((0, 0), ContactLaw::Rigid, &[(0, 1.0)]);
+    }
+    fn gaps(&mut self, t: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = u[0] + 1.0 - self.speed * t;
+        Ok(())
+    }
+    fn rates(&mut self, _: f64, _: &[f64], _: &[f64], rates: &mut [GapRates<f64>]) -> Result<Rates> {
+        self.asked.push("rates");
+        // (What is left in the slice is not read.)
+        rates[0] = GapRates { rate: f64::NAN, acceleration: f64::NAN };
+        Ok(Rates::Zero)
+    }
+    fn search(&mut self, _: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
+        self.asked.push("search");
+        Ok(Candidates::Unchanged)
+    }
+    fn inspect(&mut self, _: &Stride<'_, f64>) -> Result<()> {
+        self.asked.push("inspect");
+        Ok(())
+    }
+    fn inspects(&self) -> bool {
+        false
+    }
+    fn variation(&self) -> Variation {
+        Variation::Never
+    }
+}
+
+/// A mass that falls onto such a floor.
+fn fall(floor: &mut Still) -> Result<Simulation<'_, f64>> {
+    let builder = Simulation::builder(free(1), Composite, 0.01).velocity(vec![-2.0]);
+    builder.constraint(floor).corrector(PersistencyCorrection::new()).build()
+}
+
+#[test]
+fn what_never_changes_is_asked_once() {
+    let mut floor = Still::default();
+    let mut run = fall(&mut floor).unwrap();
+    run.run_until(2.0, &mut ()).unwrap();
+    let (u, v) = (run.state().displacement()[0], run.state().velocity()[0]);
+    assert!((u + 1.0).abs() < 1e-12 && v.abs() < 1e-12, "{u} {v}");
+    drop(run);
+    floor.asked.sort_unstable();
+    assert_eq!(floor.asked, ["rates", "search"]);
+    // One that moves all the same is found out.
+    let refused = fall(&mut Still { speed: 0.5, ..Still::default() }).map(drop);
+    assert!(matches!(refused, Err(Error::SilentMotion { .. })), "{refused:?}");
+}
+
 /// Floors under masses that come one after the other.
 struct Rain {
     dofs: Vec<usize>,

@@ -61,10 +61,13 @@ fn check<T: Real>(solver: &dyn LinearSolver<T>, n: usize, pairs: &[(usize, usize
     let pattern_of = tied::<T>(n, pairs, 0.1);
     let mut factor = solver.analyze(pattern_of.symbolic(), &[]).unwrap();
     assert!(factor.stored_values() >= n);
-    // The same analysis serves other values.
-    for shift in [0.1, 3.0] {
+    // The same analysis serves other values, after what factorizations need was freed too.
+    for (shift, released) in [(0.1, false), (3.0, true), (0.5, false)] {
         let a = tied::<T>(n, pairs, shift);
         factor.factorize(a.as_ref()).unwrap();
+        if released {
+            factor.release();
+        }
         for columns in [1, 3] {
             let x: Vec<T> = (0..n * columns).map(|i| T::of((i as f64 * 0.7).sin())).collect();
             let mut b = vec![T::zero(); n * columns];
