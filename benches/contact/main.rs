@@ -3,10 +3,11 @@
 //!
 //! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20) takes over ten minutes for all of it; a part
 //! alone is asked for by name: `-- blocks` for the above and a plate with ten thousand candidates, `-- pressed` for
-//! steps with few and many pressed contacts, `-- nonlinear` for iterations with contact, `-- candidates` for a million
-//! candidates.
+//! steps with few and many pressed contacts, `-- impact` for steps in which hundreds change, `-- nonlinear` for
+//! iterations with contact, `-- candidates` for a million candidates.
 
 mod candidates;
+mod impact;
 mod nonlinear;
 mod pressed;
 
@@ -32,9 +33,10 @@ type Part = (&'static str, fn(&Arguments));
 
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
-    let parts: [Part; 4] = [
+    let parts: [Part; 5] = [
         ("blocks", blocks),
         ("pressed", pressed::measure),
+        ("impact", impact::measure),
         ("nonlinear", nonlinear::measure),
         ("candidates", candidates::measure),
     ];

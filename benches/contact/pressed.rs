@@ -28,9 +28,7 @@ const LARGEST_TURNING: usize = 2000;
 const SETTLING: usize = 4;
 
 pub(crate) fn measure(arguments: &Arguments) {
-    let cells = if arguments.quick { [10, 10, 1] } else { CELLS };
-    let plate = Solid::block(SIZE, cells, MATERIAL);
-    let h = SIZE[0] / cells[0] as f64 / MATERIAL.wave_speed();
+    let (plate, cells, h) = plate(arguments);
     println!("plate of {cells:?} elements, {} dofs, trapezoidal rule, Courant number 1, corrected", plate.dofs());
     let sides: &[usize] = if arguments.quick { &[3, 5] } else { &[10, 20, 30, 40, 60] };
     for &side in sides {
@@ -39,8 +37,14 @@ pub(crate) fn measure(arguments: &Arguments) {
     }
 }
 
+/// The plate, its elements, and a step of Courant number 1.
+pub(super) fn plate(arguments: &Arguments) -> (Solid<3>, [usize; 3], f64) {
+    let cells = if arguments.quick { [10, 10, 1] } else { CELLS };
+    (Solid::block(SIZE, cells, MATERIAL), cells, SIZE[0] / cells[0] as f64 / MATERIAL.wave_speed())
+}
+
 /// Nodes at the bottom: a square of so many a side in the middle.
-fn patch(plate: &Solid<3>, cells: [usize; 3], side: usize) -> Vec<usize> {
+pub(super) fn patch(plate: &Solid<3>, cells: [usize; 3], side: usize) -> Vec<usize> {
     let width = |axis: usize| SIZE[axis] / cells[axis] as f64;
     let first = |axis: usize| (cells[axis] + 1 - side) / 2;
     let inside = |node: &usize| {
@@ -69,9 +73,10 @@ fn row(plate: &Solid<3>, nodes: &[usize], h: f64, arguments: &Arguments) {
         }
         drop(a);
         for (name, height) in [("step, open", 1e3), ("step, pressed", 0.0)] {
+            let rest = vec![0.0; plate.dofs()];
             let mut run = match kind {
-                "fixed normals" => simulation(plate, floor(&vertical, height), h),
-                _ => simulation(plate, ball(plate, nodes, height), h),
+                "fixed normals" => simulation(plate, floor_at(vertical.iter().map(|&dof| (dof, height))), h, rest),
+                _ => simulation(plate, ball(plate, nodes, height), h, rest),
             };
             for _ in 0..SETTLING {
                 run.step().expect("a well-posed step");
@@ -88,8 +93,9 @@ fn row(plate: &Solid<3>, nodes: &[usize], h: f64, arguments: &Arguments) {
     }
 }
 
-fn floor(dofs: &[usize], height: f64) -> LinearRows<'static, f64> {
-    dofs.iter().fold(LinearRows::new(), |rows, &dof| rows.unilateral(&[(dof, 1.0)], height))
+/// A floor below some dofs, as far as is given with each.
+pub(super) fn floor_at(dofs: impl Iterator<Item = (usize, f64)>) -> LinearRows<'static, f64> {
+    dofs.fold(LinearRows::new(), |rows, (dof, gap)| rows.unilateral(&[(dof, 1.0)], gap))
 }
 
 /// Nodes that stand on a ball, which begins to slide.
@@ -108,13 +114,18 @@ fn ball(plate: &Solid<3>, nodes: &[usize], height: f64) -> NodesOnObstacle<'stat
 }
 
 /// The plate under its weight.
-fn simulation<'a>(plate: &Solid<3>, contact: impl ContactConstraint<f64> + 'a, h: f64) -> Simulation<'a, f64> {
+pub(super) fn simulation<'a>(
+    plate: &Solid<3>,
+    contact: impl ContactConstraint<f64> + 'a,
+    h: f64,
+    velocity: Vec<f64>,
+) -> Simulation<'a, f64> {
     let mass = plate.lumped_mass::<f64>();
     let system = plate.system::<f64>().load(move |_, f| {
         for (f, m) in f.iter_mut().zip(&mass).skip(2).step_by(3) {
             *f = -1e-3 * m;
         }
     });
-    let builder = Simulation::builder(system, Newmark::trapezoidal(), h).constraint(contact);
+    let builder = Simulation::builder(system, Newmark::trapezoidal(), h).velocity(velocity).constraint(contact);
     builder.build().expect("a well-posed scene")
 }
