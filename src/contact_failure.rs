@@ -24,6 +24,11 @@ pub enum ContactFailure<T> {
         /// Its residual, in the unit of y.
         residual: T,
     },
+    /// The problem has a contact with friction, and the solver takes none; nothing was done.
+    Friction {
+        /// The first row of the contact.
+        row: usize,
+    },
     /// W is not symmetric, and the solver is for symmetric ones; nothing was done.
     Unsymmetric {
         /// The pair of rows whose entries across the diagonal differ most.
@@ -43,6 +48,9 @@ impl<T: Real> std::fmt::Display for ContactFailure<T> {
             Self::NotConverged { iterations, row, residual } => {
                 let residual = residual.value();
                 write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
+            }
+            Self::Friction { row } => {
+                write!(f, "row {row} is that of a contact with friction; use ActiveSet or GaussSeidel")
             }
             Self::Unsymmetric { row, other } => {
                 write!(

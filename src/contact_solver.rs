@@ -3,6 +3,9 @@
 mod acceptance;
 mod active_set;
 mod applied;
+mod blocks;
+mod cone;
+mod cone_newton;
 mod equations;
 mod failure;
 mod gauss_seidel;

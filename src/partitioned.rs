@@ -275,6 +275,7 @@ fn of_frame<T: Real>(failure: ContactFailure<T>, nodes: &[usize]) -> ContactFail
         ContactFailure::NotConverged { iterations, row, residual } => {
             ContactFailure::NotConverged { iterations, row: nodes[row], residual: residual.value() }
         }
+        ContactFailure::Friction { row } => ContactFailure::Friction { row: nodes[row] },
         ContactFailure::Unsymmetric { row, other } => {
             ContactFailure::Unsymmetric { row: nodes[row], other: nodes[other] }
         }

@@ -57,6 +57,11 @@ impl<T: Real> Default for Settings<T> {
 }
 
 impl<T: Real> Settings<T> {
+    /// The admissible residual, as a fraction of the largest |q_i|.
+    pub(super) fn tolerance(&self) -> T {
+        self.tolerance
+    }
+
     pub(super) fn with_tolerance(self, tolerance: f64) -> Result<Self> {
         match (0.0..1.0).contains(&tolerance) {
             true => Ok(Self { tolerance: T::of(tolerance), ..self }),
@@ -83,6 +88,10 @@ impl<T: Real> Settings<T> {
         known: bool,
         multipliers: &mut [T],
     ) -> std::result::Result<Acceptance<'a, T>, ContactFailure<T>> {
+        if problem.has_cones() {
+            let friction = problem.blocks().find(|(_, set)| set.friction().is_some());
+            return Err(ContactFailure::Friction { row: friction.map_or(0, |(rows, _)| rows.start) });
+        }
         let finite = |i: &usize| problem.offset[*i].is_finite() && (known || T::all_finite(problem.row(*i)));
         if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
             return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });

@@ -2,6 +2,7 @@
 
 use super::acceptance::{Acceptance, Settings};
 use super::applied::{AppliedProblem, AppliedSet};
+use super::cone_newton::ConeNewton;
 use super::equations::{Equations, Solved, Symmetry};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
@@ -32,6 +33,12 @@ use crate::real::Real;
 ///
 /// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant
 /// rows always go the way of proximal steps.
+///
+/// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton iterations
+/// on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), where contacts are open, stick or
+/// slide; they begin at what a few sweeps over the contacts leave ([`GaussSeidel`](super::GaussSeidel)). Where these do
+/// not end, as on redundant rows, proximal steps follow, with a share of the diagonal that shrinks. All begin at zero:
+/// large coefficients may leave several solutions, and the guess chooses none of them.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,
@@ -49,6 +56,8 @@ pub struct ActiveSet<T = f64> {
     shift: Vec<T>,
     offset: Vec<T>,
     center: Vec<T>,
+    /// Problems with friction.
+    cones: ConeNewton<T>,
     /// The last resort on rows that are nearly dependent.
     pivoting: Pivoting<T>,
 }
@@ -179,7 +188,7 @@ impl<T: Real> ActiveSet<T> {
             let exceeds = |i: usize, miss: T| exceeds_rounding(problem, own, i, miss);
             let open = |i: usize| singular && exceeds(i, y[i]);
             let violates = |i: usize| match problem.sets[i] {
-                AdmissibleSet::Free => false,
+                AdmissibleSet::Free | AdmissibleSet::Cone2 { .. } | AdmissibleSet::Cone3 { .. } => false,
                 AdmissibleSet::NonNegative if active[i] => {
                     exceeds(i, -problem.delassus(i, i) * multipliers[i]) || open(i)
                 }
@@ -282,6 +291,11 @@ impl<T: Real> ActiveSet<T> {
 }
 
 impl<T: Real> ContactSolver<T> for ActiveSet<T> {
+    /// All of them.
+    fn admits(&self, _set: AdmissibleSet) -> bool {
+        true
+    }
+
     fn reserve(&mut self, size: usize) {
         let reals = || Vec::with_capacity(size);
         let mut pivoting = Pivoting::default();
@@ -299,6 +313,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             shift: reals(),
             offset: reals(),
             center: reals(),
+            cones: ConeNewton::default(),
             pivoting,
         };
     }
@@ -314,6 +329,9 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
         if problem.size() == 0 {
             return Ok(0);
+        }
+        if problem.has_cones() {
+            return self.cones.solve(problem, Settings::default().tolerance(), multipliers);
         }
         let known = problem.version != 0 && self.symmetry.0 == problem.version;
         let mut acceptance = Settings::default().begin_with(problem, known, multipliers)?;

@@ -44,7 +44,7 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the lengths do not fit each other.
+    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Incompatible`] for sets of several rows.
     pub fn new(
         product: &'a mut dyn FnMut(&[T], &mut [T]),
         scale: &'a [T],
@@ -61,6 +61,10 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
             if expected != found {
                 return Err(Error::Dimension { what, expected, found });
             }
+        }
+        if sets.iter().any(|set| set.rows() > 1) {
+            let reason = "it takes no contacts with friction";
+            return Err(Error::Incompatible { part: "a contact problem whose W is applied".into(), reason });
         }
         Ok(Self { product, scale, offset, sets, tolerance })
     }

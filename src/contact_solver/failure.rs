@@ -19,6 +19,10 @@ pub(crate) fn contact_error<T: Real>(t: f64, failure: ContactFailure<T>, id: imp
         ContactFailure::NotConverged { iterations, row, residual } => {
             Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
         }
+        ContactFailure::Friction { row } => Error::Incompatible {
+            part: format!("the contact solver, for contact {}", id(row)),
+            reason: "the contact has friction; use ActiveSet or GaussSeidel",
+        },
         ContactFailure::Unsymmetric { row, other } => {
             Error::UnsymmetricContacts { t, contact: id(row), other: id(other) }
         }

@@ -7,23 +7,45 @@ use crate::real::Real;
 use std::ops::Range;
 
 /// The set that the multipliers of a block of rows belong to, which says what they and the block's y are to each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AdmissibleSet {
     /// A row with 0 ≤ y ⊥ λ ≥ 0.
     NonNegative,
     /// A row with y = 0, and λ of either sign.
     Free,
+    /// A contact with Coulomb's friction in a plane: a normal row with 0 ≤ y_n ⊥ p ≥ 0, and a tangential one. |f| ≤ μ p,
+    /// and y_t, the slip, is zero or opposes f, which is then on the rim of the cone: y_t = −γ f, γ ≥ 0,
+    /// γ (μ p − |f|) = 0. (This is no condition of a minimum: where it slides y_n is zero, not −μ |y_t|.)
+    Cone2 {
+        /// μ, from 0.
+        friction: f64,
+    },
+    /// The same in space: a normal row, and two tangential ones along orthonormal directions.
+    Cone3 {
+        /// μ, from 0.
+        friction: f64,
+    },
 }
 
 impl AdmissibleSet {
-    /// All sets that there are.
-    pub(crate) const ALL: [Self; 2] = [Self::NonNegative, Self::Free];
+    /// The sets that laws ask for.
+    pub(crate) const OF_LAWS: [Self; 2] = [Self::NonNegative, Self::Free];
 
     /// The number of rows of a block.
     pub fn rows(self) -> usize {
         match self {
             Self::NonNegative | Self::Free => 1,
+            Self::Cone2 { .. } => 2,
+            Self::Cone3 { .. } => 3,
+        }
+    }
+
+    /// μ, if the set is a cone.
+    pub fn friction(self) -> Option<f64> {
+        match self {
+            Self::NonNegative | Self::Free => None,
+            Self::Cone2 { friction } | Self::Cone3 { friction } => Some(friction),
         }
     }
 
@@ -36,33 +58,79 @@ impl AdmissibleSet {
     /// assert_eq!(multipliers, [-2.0]);
     /// AdmissibleSet::NonNegative.project(&mut multipliers);
     /// assert_eq!(multipliers, [0.0]);
+    /// let mut contact = [1.0, 0.6, -0.8];
+    /// AdmissibleSet::Cone3 { friction: 0.5 }.project(&mut contact);
+    /// assert!((contact[0] - 1.2_f64).abs() < 1e-15 && (contact[1] - 0.36_f64).abs() < 1e-15);
     /// ```
     pub fn project<T: Real>(self, multipliers: &mut [T]) {
-        for multiplier in multipliers {
-            *multiplier = self.nearest(*multiplier);
+        let Some(friction) = self.friction() else {
+            for multiplier in multipliers {
+                *multiplier = self.nearest(*multiplier);
+            }
+            return;
+        };
+        let Some((normal, tangential)) = multipliers.split_first_mut() else { return };
+        let (friction, size) = (T::of(friction), norm(tangential));
+        if size <= friction * *normal {
+            return;
         }
+        let inside = (*normal + friction * size) / (T::one() + friction * friction);
+        *normal = inside.max(T::zero());
+        let share = if size > T::zero() { friction * *normal / size } else { T::zero() };
+        tangential.iter_mut().for_each(|f| *f *= share);
     }
 
     /// The nearest multiplier in a set of one row.
     pub(super) fn nearest<T: Real>(self, multiplier: T) -> T {
         match self {
-            Self::Free => multiplier,
             Self::NonNegative => multiplier.max(T::zero()),
+            Self::Free | Self::Cone2 { .. } | Self::Cone3 { .. } => multiplier,
         }
     }
 
     /// By how much the y and the multipliers of a block miss their conditions (unit of y): |min(y, W_ii λ)|, or |y| of
     /// a free row; NaN if y is not finite. `compliance` is the diagonal of W.
+    ///
+    /// Of a cone the larger one of |min(y_n, W_nn p)| and of |W_t f − P(W_t f − y_t)|, with P the nearest point of the
+    /// disc of radius W_t μ max(0, p) and W_t the larger one of the tangential rows (Alart and Curnier, Comput. Methods
+    /// Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
+        if let Some(friction) = self.friction() {
+            return cone_residual(T::of(friction), y, multipliers, compliance);
+        }
         let rows = y.iter().zip(multipliers).zip(compliance);
         let misses = rows.map(|((&y, &multiplier), &compliance)| match self {
             // (`min` would prefer any number to NaN.)
             _ if !y.is_finite() => T::nan(),
             Self::Free => y.abs(),
-            Self::NonNegative => y.min(compliance * multiplier).abs(),
+            Self::NonNegative | Self::Cone2 { .. } | Self::Cone3 { .. } => y.min(compliance * multiplier).abs(),
         });
         misses.fold(T::zero(), |worst, miss| if miss > worst || miss.is_nan() { miss } else { worst })
     }
+}
+
+/// [`AdmissibleSet::residual`] of a cone.
+fn cone_residual<T: Real>(friction: T, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
+    if y.iter().chain(multipliers).any(|x| !x.is_finite()) {
+        return T::nan();
+    }
+    let tangential = compliance[1..].iter().fold(T::zero(), |most, &w| most.max(w));
+    let mut miss = [T::zero(); 2];
+    let mut aim = [T::zero(); 2];
+    for (k, aim) in aim.iter_mut().enumerate().take(y.len() - 1) {
+        *aim = tangential * multipliers[k + 1] - y[k + 1];
+    }
+    let (size, radius) = (norm(&aim), tangential * friction * multipliers[0].max(T::zero()));
+    let share = if size > radius { radius / size } else { T::one() };
+    for (k, miss) in miss.iter_mut().enumerate().take(y.len() - 1) {
+        *miss = tangential * multipliers[k + 1] - share * aim[k];
+    }
+    y[0].min(compliance[0] * multipliers[0]).abs().max(norm(&miss))
+}
+
+/// The length of a tangential vector.
+fn norm<T: Real>(x: &[T]) -> T {
+    x.iter().fold(T::zero(), |length, &x| length.hypot(x))
 }
 
 impl From<ContactLaw> for AdmissibleSet {
@@ -105,7 +173,8 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the lengths do not fit each other.
+    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Parameter`] for a friction coefficient that is
+    /// negative or not finite.
     pub fn new(delassus: &'a [T], offset: &'a [T], sets: &'a [AdmissibleSet], tolerance: &'a [T]) -> Result<Self> {
         let size = offset.len();
         let rows = sets.iter().map(|set| set.rows()).sum();
@@ -117,6 +186,11 @@ impl<'a, T: Real> ContactProblem<'a, T> {
             if expected != found {
                 return Err(Error::Dimension { what, expected, found });
             }
+        }
+        let wrong = |friction: &f64| !(*friction >= 0.0 && friction.is_finite());
+        if let Some(value) = sets.iter().filter_map(|set| set.friction()).find(wrong) {
+            let range = "not negative and finite";
+            return Err(Error::Parameter { name: "a friction coefficient of a contact problem", value, range });
         }
         Ok(Self::of(delassus, offset, sets, tolerance, 0))
     }
@@ -193,12 +267,27 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     /// [`AdmissibleSet::residual`].
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
         let worst = |worst: (usize, T), (row, miss): (usize, T)| if miss > worst.1 { (row, miss) } else { worst };
-        (0..self.size()).map(|i| (i, self.miss(i, multipliers))).fold((0, T::zero()), worst)
+        let misses = self.blocks().map(|(rows, set)| (rows.start, self.block_miss(rows, set, multipliers)));
+        misses.fold((0, T::zero()), worst)
     }
 
-    /// By how much row i misses the conditions of its set, which has one row.
+    /// By how much the rows of a block miss the conditions of its set.
+    pub(super) fn block_miss(&self, rows: Range<usize>, set: AdmissibleSet, multipliers: &[T]) -> T {
+        let (mut y, mut compliance) = ([T::zero(); 3], [T::zero(); 3]);
+        for (k, row) in rows.clone().enumerate() {
+            (y[k], compliance[k]) = (self.gap(row, multipliers), self.delassus(row, row));
+        }
+        set.residual(&y[..rows.len()], &multipliers[rows.clone()], &compliance[..rows.len()])
+    }
+
+    /// By how much row i misses the conditions of its set, in a problem whose sets have one row each.
     pub(super) fn miss(&self, i: usize, multipliers: &[T]) -> T {
         self.sets[i].residual(&[self.gap(i, multipliers)], &[multipliers[i]], &[self.delassus(i, i)])
+    }
+
+    /// Whether any block is a cone.
+    pub fn has_cones(&self) -> bool {
+        self.sets.len() < self.size()
     }
 }
 
@@ -225,7 +314,7 @@ mod tests {
 
     #[test]
     fn residuals_are_those_of_the_sets() {
-        let [unilateral, free] = AdmissibleSet::ALL;
+        let [unilateral, free] = AdmissibleSet::OF_LAWS;
         for (set, y, multiplier, expected) in [
             (unilateral, 0.5, 0.0, 0.0),
             (unilateral, 0.0, 3.0, 0.0),

@@ -54,7 +54,7 @@ pub(super) fn admitted<T: Real>(
     tableau: &Tableau,
     solver: &dyn ContactSolver<T>,
 ) -> Admitted {
-    let no_sets = AdmissibleSet::ALL.into_iter().filter(|&set| !solver.admits(set)).collect();
+    let no_sets = AdmissibleSet::OF_LAWS.into_iter().filter(|&set| !solver.admits(set)).collect();
     let (integrator_name, solver) = (integrator.name(), format!("{solver:?}"));
     let mut admitted = Admitted { integrator: integrator_name, solver, no_sets, ..Admitted::default() };
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;

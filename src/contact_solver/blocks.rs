@@ -1,0 +1,104 @@
+//! Problems with cones, block by block: when they count as solved, and sweeps over their blocks.
+
+use super::cone::Cone;
+use super::{ContactFailure, ContactProblem};
+use crate::real::Real;
+use std::ops::Range;
+
+/// When a problem with cones counts as solved: every block misses its conditions by no more than rounding, or than a
+/// share of the largest |q|.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockAcceptance<T> {
+    accepted: T,
+}
+
+impl<T: Real> BlockAcceptance<T> {
+    /// Begins at zero: where there are several solutions the guess must not choose. Refuses what no iteration could
+    /// mend, as that of the other sets does.
+    pub(super) fn begin(
+        problem: &ContactProblem<'_, T>,
+        tolerance: T,
+        multipliers: &mut [T],
+    ) -> Result<Self, ContactFailure<T>> {
+        multipliers.fill(T::zero());
+        let finite = |i: &usize| problem.offset[*i].is_finite() && T::all_finite(problem.row(*i));
+        if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
+            return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
+        }
+        let Self { accepted } = Self::of(problem, tolerance);
+        for (rows, set) in problem.blocks() {
+            let row = rows.start;
+            let free = set.friction().is_none() && set.nearest(-T::one()) < T::zero();
+            let miss = if free { problem.offset[row].abs() } else { -problem.offset[row] };
+            if problem.delassus(row, row) <= T::zero() && miss > accepted.max(problem.tolerance[row]) {
+                return Err(ContactFailure::NotConverged { iterations: 0, row, residual: miss });
+            }
+        }
+        Ok(Self { accepted })
+    }
+
+    /// The rule for a problem, whose rest is known to be sound.
+    pub(super) fn of(problem: &ContactProblem<'_, T>, tolerance: T) -> Self {
+        Self { accepted: tolerance * T::largest(problem.offset) }
+    }
+
+    /// Whether every block is solved.
+    pub(super) fn accepts(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
+        problem.blocks().all(|(rows, set)| {
+            let miss = problem.block_miss(rows.clone(), set, multipliers);
+            // NaN fails both.
+            miss <= self.accepted || {
+                let rounding = |row: usize| problem.rounding(row, multipliers);
+                miss <= T::of(2.0) * rows.map(rounding).fold(T::zero(), T::max)
+            }
+        })
+    }
+}
+
+/// The failure that names the worst block.
+pub(super) fn failure<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    iterations: usize,
+    multipliers: &[T],
+) -> ContactFailure<T> {
+    let (row, residual) = problem.residual(multipliers);
+    ContactFailure::NotConverged { iterations, row, residual }
+}
+
+/// One sweep: each block in turn takes the multipliers that solve it while the others keep theirs, relaxed by `omega`.
+pub(super) fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
+    for (rows, set) in problem.blocks() {
+        match set.friction() {
+            None => {
+                let (row, diagonal) = (rows.start, problem.delassus(rows.start, rows.start));
+                if diagonal > T::zero() {
+                    let correction = omega * problem.gap(row, multipliers) / diagonal;
+                    multipliers[row] = set.nearest(multipliers[row] - correction);
+                }
+            }
+            Some(friction) => {
+                let solved = alone(problem, rows.clone(), T::of(friction), multipliers).solve();
+                for (multiplier, solved) in multipliers[rows.clone()].iter_mut().zip(solved) {
+                    *multiplier += omega * (solved - *multiplier);
+                }
+                // (Relaxed beyond its solution a block may leave its cone.)
+                if omega > T::one() {
+                    set.project(&mut multipliers[rows]);
+                }
+            }
+        }
+    }
+}
+
+/// A block while the others keep their multipliers.
+fn alone<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, friction: T, multipliers: &[T]) -> Cone<T> {
+    let (mut delassus, mut offset) = ([[T::zero(); 3]; 3], [T::zero(); 3]);
+    for (i, row) in rows.clone().enumerate() {
+        offset[i] = problem.gap(row, multipliers);
+        for (j, other) in rows.clone().enumerate() {
+            delassus[i][j] = problem.delassus(row, other);
+            offset[i] -= delassus[i][j] * multipliers[other];
+        }
+    }
+    Cone { delassus, offset, friction, tangents: rows.len() - 1 }
+}

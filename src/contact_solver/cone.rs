@@ -1,0 +1,118 @@
+//! One contact with friction, alone: the multipliers of a block of a normal row and one or two tangential ones, exactly.
+
+use crate::real::Real;
+
+/// A block W r + b of a contact, with the friction coefficient of its cone; two rows are three whose last is nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cone<T> {
+    /// W of the block, row by row: the normal row first.
+    pub(super) delassus: [[T; 3]; 3],
+    /// y of the block at r = 0.
+    pub(super) offset: [T; 3],
+    pub(super) friction: T,
+    /// 1 or 2.
+    pub(super) tangents: usize,
+}
+
+/// Steps of the search for the direction of slip, each of which at least halves what is left every other time.
+const STEPS: usize = 200;
+
+impl<T: Real> Cone<T> {
+    /// The multipliers (p, f) with 0 ≤ y_n ⊥ p ≥ 0, |f| ≤ μ p, and y_t = −γ f with γ ≥ 0 where |f| = μ p.
+    ///
+    /// A block that is open without forces stays open, though for a large μ it might stick as well. Else it sticks if
+    /// the multipliers that hold it are in the cone. If not, it slides: with the normal multiplier eliminated,
+    /// y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ, so that there
+    /// is a γ at which it vanishes.
+    pub(super) fn solve(&self) -> [T; 3] {
+        let Self { delassus: w, offset: b, friction, tangents } = *self;
+        let none = [T::zero(); 3];
+        if b[0] >= T::zero() || w[0][0] <= T::zero() {
+            return none;
+        }
+        let normal = |f: [T; 2]| -(b[0] + w[0][1] * f[0] + w[0][2] * f[1]) / w[0][0];
+        if friction <= T::zero() {
+            return [normal([T::zero(); 2]), T::zero(), T::zero()];
+        }
+        // The tangential rows without the normal multiplier: S f + c.
+        let without = |i: usize, x: T, over: T| x - w[i][0] / w[0][0] * over;
+        let s = |i: usize, j: usize| without(i, w[i][j], w[0][j]);
+        let c = [without(1, b[1], b[0]), if tangents > 1 { without(2, b[2], b[0]) } else { T::zero() }];
+        let schur = match tangents {
+            1 => [[s(1, 1), T::zero()], [T::zero(), T::one()]],
+            _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
+        };
+        let tangential = |gamma: T| solve_two(schur, gamma, c);
+        let beyond = |f: [T; 2]| length(f) - friction * normal(f);
+        let held = tangential(T::zero());
+        if beyond(held) <= T::zero() && held.iter().all(|f| f.is_finite()) {
+            return [normal(held), held[0], held[1]];
+        }
+        if length(c) == T::zero() {
+            return [normal([T::zero(); 2]), T::zero(), T::zero()];
+        }
+        let direction =
+            if tangents == 1 { [-c[0].signum(), T::zero()] } else { slip_direction(schur, tangential, beyond) };
+        // In this direction the block is on the rim of its cone, and its gap is zero, to rounding.
+        let along = w[0][1] * direction[0] + w[0][2] * direction[1];
+        let p = -b[0] / (w[0][0] + friction * along);
+        [p, friction * p * direction[0], friction * p * direction[1]]
+    }
+}
+
+/// The direction of the friction of a block that slides in a plane.
+fn slip_direction<T: Real>(
+    schur: [[T; 2]; 2],
+    tangential: impl Fn(T) -> [T; 2],
+    beyond: impl Fn([T; 2]) -> T,
+) -> [T; 2] {
+    let two = T::of(2.0);
+    let size = (schur[0][0] + schur[1][1]).abs();
+    let (mut low, mut high) = (T::zero(), if size > T::zero() { size } else { T::one() });
+    for _ in 0..STEPS {
+        if beyond(tangential(high)) < T::zero() {
+            break;
+        }
+        (low, high) = (high, two * two * high);
+    }
+    // Regula falsi (Illinois), and a halving wherever it gains less than that.
+    let (mut below, mut above) = (beyond(tangential(low)), beyond(tangential(high)));
+    for _ in 0..STEPS {
+        let width = high - low;
+        if width <= T::of(4.0) * T::epsilon() * high {
+            break;
+        }
+        let guess = low + width * (below / (below - above));
+        let middle = low + width / two;
+        for gamma in [guess, middle] {
+            if gamma > low && gamma < high {
+                let value = beyond(tangential(gamma));
+                if value >= T::zero() {
+                    (low, below) = (gamma, value);
+                } else {
+                    (high, above) = (gamma, value);
+                }
+            }
+        }
+    }
+    let f = tangential(high);
+    let length = length(f);
+    if length > T::zero() { f.map(|f| f / length) } else { [T::zero(); 2] }
+}
+
+/// (S + γ) f = −c.
+fn solve_two<T: Real>(s: [[T; 2]; 2], gamma: T, c: [T; 2]) -> [T; 2] {
+    let [[a, b], [d, e]] = [[s[0][0] + gamma, s[0][1]], [s[1][0], s[1][1] + gamma]];
+    let determinant = a * e - b * d;
+    [(b * c[1] - e * c[0]) / determinant, (d * c[0] - a * c[1]) / determinant]
+}
+
+/// |f|, without overflow.
+pub(super) fn length<T: Real>(f: [T; 2]) -> T {
+    let most = f[0].abs().max(f[1].abs());
+    if most > T::zero() && most.is_finite() {
+        most * ((f[0] / most) * (f[0] / most) + (f[1] / most) * (f[1] / most)).sqrt()
+    } else {
+        f[0].abs() + f[1].abs()
+    }
+}

@@ -1,0 +1,267 @@
+//! Contact problems with friction by a semismooth Newton method: open, stick and slip as states of the blocks.
+
+use super::blocks::{BlockAcceptance, failure, sweep_blocks};
+use super::{AdmissibleSet, ContactFailure, ContactProblem};
+use crate::dense::DenseCholesky;
+use crate::real::Real;
+
+/// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), begun from sweeps over
+/// the blocks, and from more of them where it does not end. On redundant rows neither may end: then the problem is
+/// solved by proximal steps, each of which has a positive definite W.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ConeNewton<T> {
+    factor: DenseCholesky<T>,
+    /// Rows that take part.
+    rows: Vec<usize>,
+    matrix: Vec<T>,
+    right: Vec<T>,
+    y: Vec<T>,
+    tried: Vec<T>,
+    /// A proximal problem: its W, offset and center.
+    shifted: Vec<T>,
+    offset: Vec<T>,
+    center: Vec<T>,
+}
+
+/// Sweeps before Newton's method: at first, and each time that it has not ended.
+const FIRST_SWEEPS: usize = 3;
+const MORE_SWEEPS: usize = 50;
+
+/// Newton iterations before more sweeps, and how often both are tried.
+const ITERATIONS: usize = 20;
+const ROUNDS: usize = 4;
+
+/// Proximal steps: the share of the diagonal that is added to W at first, by how much it shrinks, and the least.
+const PROXIMAL_STEPS: usize = 300;
+const FIRST_SHARE: f64 = 1.0;
+const SHRINK: f64 = 0.3;
+const LEAST_SHARE: f64 = 1e-6;
+
+/// Sweeps that go on alone in the end.
+const LAST_SWEEPS: usize = 20_000;
+
+/// What a row of a block is in an iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Status<T> {
+    /// λ = 0.
+    Open,
+    /// y = 0.
+    Held,
+    /// Slides: the friction is μ p times this direction. With κ, the share of the disc's radius in the length of the
+    /// point whose nearest one is sought, and the mean compliance of the tangential rows.
+    Slides { direction: [T; 2], share: T, compliance: T },
+}
+
+impl<T: Real> ConeNewton<T> {
+    /// Solves; the guess is not used.
+    pub(super) fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        tolerance: T,
+        multipliers: &mut [T],
+    ) -> Result<usize, ContactFailure<T>> {
+        let acceptance = BlockAcceptance::begin(problem, tolerance, multipliers)?;
+        let mut spent = 0;
+        for round in 0..ROUNDS {
+            let sweeps = if round == 0 { FIRST_SWEEPS } else { MORE_SWEEPS };
+            if sweep(problem, &acceptance, sweeps, &mut spent, multipliers)
+                || self.newton(problem, &acceptance, &mut spent, multipliers)
+            {
+                return Ok(spent);
+            }
+        }
+        if self.proximal(problem, (&acceptance, tolerance), &mut spent, multipliers)
+            || sweep(problem, &acceptance, LAST_SWEEPS, &mut spent, multipliers)
+        {
+            return Ok(spent);
+        }
+        Err(failure(problem, spent, multipliers))
+    }
+
+    /// Newton iterations; says whether they have ended. If not, the multipliers are left as they were.
+    fn newton(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        acceptance: &BlockAcceptance<T>,
+        spent: &mut usize,
+        multipliers: &mut [T],
+    ) -> bool {
+        let mut tried = std::mem::take(&mut self.tried);
+        tried.clear();
+        tried.extend_from_slice(multipliers);
+        let mut solved = false;
+        for _ in 0..ITERATIONS {
+            *spent += 1;
+            let sound = self.iterate(problem, &mut tried);
+            solved = sound && acceptance.accepts(problem, &tried);
+            if solved || !sound {
+                break;
+            }
+        }
+        if solved {
+            multipliers.copy_from_slice(&tried);
+        }
+        self.tried = tried;
+        solved
+    }
+
+    /// Proximal steps: λ' solves the problem with W + D and q − D λ, D a share of the diagonal of W that shrinks.
+    fn proximal(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        (acceptance, tolerance): (&BlockAcceptance<T>, T),
+        spent: &mut usize,
+        multipliers: &mut [T],
+    ) -> bool {
+        let size = problem.size();
+        let [mut shifted, mut offset, mut center] =
+            [&mut self.shifted, &mut self.offset, &mut self.center].map(std::mem::take);
+        let (mut share, mut solved) = (T::of(FIRST_SHARE), false);
+        for _ in 0..PROXIMAL_STEPS {
+            center.clear();
+            center.extend_from_slice(multipliers);
+            shifted.clear();
+            shifted.extend_from_slice(problem.delassus);
+            offset.clear();
+            offset.extend_from_slice(problem.offset);
+            for (rows, _) in problem.blocks() {
+                // (One number a block: tangential directions stay equal.)
+                let own = rows.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
+                for row in rows {
+                    shifted[row * size + row] += share * own;
+                    offset[row] -= share * own * center[row];
+                }
+            }
+            let step = ContactProblem::of(&shifted, &offset, problem.sets, problem.tolerance, 0);
+            let own = BlockAcceptance::of(&step, tolerance);
+            for _ in 0..ROUNDS {
+                if self.newton(&step, &own, spent, multipliers) || sweep(&step, &own, MORE_SWEEPS, spent, multipliers) {
+                    break;
+                }
+            }
+            solved = acceptance.accepts(problem, multipliers);
+            if solved {
+                break;
+            }
+            share = (share * T::of(SHRINK)).max(T::of(LEAST_SHARE));
+        }
+        (self.shifted, self.offset, self.center) = (shifted, offset, center);
+        solved
+    }
+
+    /// One iteration; says whether its equations could be solved.
+    fn iterate(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> bool {
+        let Self { factor, rows, matrix, right, y, .. } = self;
+        y.clear();
+        y.extend((0..problem.size()).map(|row| problem.gap(row, multipliers)));
+        rows.clear();
+        for (block, set) in problem.blocks() {
+            if status(problem, block.start, set, multipliers, y) != Status::Open {
+                rows.extend(block);
+            } else {
+                multipliers[block].fill(T::zero());
+            }
+        }
+        let size = rows.len();
+        matrix.clear();
+        right.clear();
+        for (block, set) in problem.blocks() {
+            let status = status(problem, block.start, set, multipliers, y);
+            if status == Status::Open {
+                continue;
+            }
+            let first = block.start;
+            // The normal row, or the only one: y = 0.
+            matrix.extend(rows.iter().map(|&j| problem.delassus(first, j)));
+            right.push(-problem.offset[first]);
+            for (k, row) in block.clone().enumerate().skip(1) {
+                match status {
+                    Status::Slides { direction, share, compliance } => {
+                        let friction = T::of(set.friction().unwrap_or(0.0));
+                        // W_t f − μ W_t p n − κ (1 − n nᵀ) (W_t f − y_t) = 0, κ and n as they are, and κ |…| = μ W_t p.
+                        let across = |i: usize| {
+                            let own = if i == k { T::one() } else { T::zero() };
+                            share * (own - direction[k - 1] * direction[i - 1])
+                        };
+                        let tangents = 1..block.len();
+                        let entry = |j: usize| {
+                            let mut sum = T::zero();
+                            for i in tangents.clone() {
+                                let other = first + i;
+                                sum += across(i) * problem.delassus(other, j);
+                                if other == j {
+                                    let own = if other == row { T::one() } else { T::zero() };
+                                    sum += compliance * (own - across(i));
+                                }
+                            }
+                            if j == first { sum - friction * compliance * direction[k - 1] } else { sum }
+                        };
+                        matrix.extend(rows.iter().map(|&j| entry(j)));
+                        let pushed = tangents.clone().map(|i| across(i) * problem.offset[first + i]).sum::<T>();
+                        right.push(-pushed);
+                    }
+                    Status::Held | Status::Open => {
+                        matrix.extend(rows.iter().map(|&j| problem.delassus(row, j)));
+                        right.push(-problem.offset[row]);
+                    }
+                }
+            }
+        }
+        let solvable = factor.factorize_general(size, |i, j| matrix[i * size + j]).is_ok() && !factor.is_singular();
+        if !solvable {
+            return false;
+        }
+        factor.solve(right);
+        for (&row, &value) in rows.iter().zip(right.iter()) {
+            multipliers[row] = value;
+        }
+        T::all_finite(multipliers)
+    }
+}
+
+/// Sweeps until the problem is solved, or so many; says whether it is.
+fn sweep<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    acceptance: &BlockAcceptance<T>,
+    sweeps: usize,
+    spent: &mut usize,
+    multipliers: &mut [T],
+) -> bool {
+    for _ in 0..sweeps {
+        if acceptance.accepts(problem, multipliers) {
+            return true;
+        }
+        sweep_blocks(problem, T::one(), multipliers);
+        *spent += 1;
+    }
+    acceptance.accepts(problem, multipliers)
+}
+
+/// What the rows of a block are at these multipliers and y.
+fn status<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    first: usize,
+    set: AdmissibleSet,
+    multipliers: &[T],
+    y: &[T],
+) -> Status<T> {
+    let own = problem.delassus(first, first);
+    if set == AdmissibleSet::Free {
+        return if own > T::zero() { Status::Held } else { Status::Open };
+    }
+    if own * multipliers[first] <= y[first] {
+        return Status::Open;
+    }
+    let Some(friction) = set.friction() else { return Status::Held };
+    let tangents = first + 1..first + set.rows();
+    let compliance = tangents.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
+    let mut aim = [T::zero(); 2];
+    for (aim, row) in aim.iter_mut().zip(tangents) {
+        *aim = compliance * multipliers[row] - y[row];
+    }
+    let (size, radius) = (aim[0].hypot(aim[1]), compliance * T::of(friction) * multipliers[first].max(T::zero()));
+    match size > radius {
+        false => Status::Held,
+        true => Status::Slides { direction: aim.map(|aim| aim / size), share: radius / size, compliance },
+    }
+}

@@ -1,0 +1,353 @@
+//! Contact problems with Coulomb's friction: one block against its conditions, many against each other and against all
+//! combinations of their states, redundant rows, other units, refusals.
+
+use contact_dynamics::contact_solver::{
+    ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
+};
+use contact_dynamics::{Error, Real};
+use contact_dynamics_scenes::random::Congruential;
+
+fn cone(rows: usize, friction: f64) -> AdmissibleSet {
+    if rows == 2 { AdmissibleSet::Cone2 { friction } } else { AdmissibleSet::Cone3 { friction } }
+}
+
+/// B Bᵀ, `share` of the identity added, for B of so many columns.
+fn semidefinite(random: &mut Congruential, size: usize, columns: usize, share: f64) -> Vec<f64> {
+    let b = random.vector(size * columns, 1.0);
+    let entry = |i: usize, j: usize| (0..columns).map(|k| b[i * columns + k] * b[j * columns + k]).sum::<f64>();
+    (0..size * size).map(|e| entry(e / size, e % size) + if e / size == e % size { share } else { 0.0 }).collect()
+}
+
+fn solve<T: Real>(
+    solver: &mut dyn ContactSolver<T>,
+    (w, q, sets): (&[T], &[T], &[AdmissibleSet]),
+) -> Result<Vec<T>, ContactFailure<T>> {
+    let tolerance = vec![T::zero(); q.len()];
+    let mut multipliers = vec![T::one(); q.len()];
+    solver.solve(&ContactProblem::new(w, q, sets, &tolerance).unwrap(), &mut multipliers)?;
+    Ok(multipliers)
+}
+
+/// Coulomb's law as it is written in books, each part relative to the sizes of the problem.
+fn check(w: &[f64], q: &[f64], sets: &[AdmissibleSet], r: &[f64], tolerance: f64, what: &str) {
+    let size = q.len();
+    let y: Vec<f64> = (0..size).map(|i| q[i] + (0..size).map(|j| w[i * size + j] * r[j]).sum::<f64>()).collect();
+    let length = q.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
+    let force = r.iter().fold(0.0, |most: f64, r| most.max(r.abs()));
+    let (mut first, small, weak) = (0, tolerance * length, tolerance * force);
+    for set in sets {
+        let (y, r) = (&y[first..first + set.rows()], &r[first..first + set.rows()]);
+        let what = format!("{what}, row {first}: y {y:?}, r {r:?}");
+        first += set.rows();
+        assert!(y[0] >= -small && r[0] >= -weak && (y[0] <= small || r[0] <= weak), "{what}");
+        let Some(friction) = set.friction() else { continue };
+        let [slip, rubbed] = [&y[1..], &r[1..]].map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt());
+        assert!(rubbed <= friction * r[0] + weak, "{what}");
+        if slip > small {
+            // Opposite to the slip, and all that there is.
+            for (&slipping, &f) in y[1..].iter().zip(&r[1..]) {
+                let expected = -friction * r[0] * slipping / slip;
+                assert!((f - expected).abs() <= weak * (1.0 + length / slip), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_contact_is_open_sticks_or_slides() {
+    let w = [2.0, 0.0, 0.0, 4.0];
+    for (q, friction, expected) in [
+        ([1.0, -3.0], 0.5, [0.0, 0.0]),
+        ([-2.0, 0.8], 0.5, [1.0, -0.2]),
+        ([-2.0, -8.0], 0.5, [1.0, 0.5]),
+        ([-2.0, 8.0], 0.5, [1.0, -0.5]),
+        ([-2.0, 8.0], 0.0, [1.0, 0.0]),
+    ] {
+        for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+            let found = solve(solver, (&w, &q, &[cone(2, friction)])).unwrap();
+            let miss = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(miss < 1e-15, "{solver:?} {q:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn blocks_alone_meet_coulombs_law() {
+    let mut random = Congruential(11);
+    for trial in 0..3000 {
+        let rows = 2 + trial % 2;
+        let w = semidefinite(&mut random, rows, rows, if trial % 5 == 0 { 1e-6 } else { 0.05 });
+        let q = random.vector(rows, 1.0);
+        let sets = [cone(rows, [0.0, 0.1, 0.6, 1.5][trial / 2 % 4])];
+        let found = solve(&mut GaussSeidel::default(), (&w, &q, &sets)).unwrap();
+        check(&w, &q, &sets, &found, 1e-8, &format!("trial {trial}"));
+    }
+}
+
+/// All solutions of a problem in a plane: every combination of open, stick, and slip to either side.
+fn all_solutions(w: &[f64], q: &[f64], frictions: &[f64]) -> Vec<Vec<f64>> {
+    let (contacts, size) = (frictions.len(), q.len());
+    let mut found = Vec::new();
+    for state in 0..4_usize.pow(contacts as u32) {
+        let status = |contact: usize| state / 4_usize.pow(contact as u32) % 4;
+        // Rows of A r = b, solved by elimination.
+        let mut a = vec![vec![0.0; size + 1]; size];
+        for contact in 0..contacts {
+            let (n, t) = (2 * contact, 2 * contact + 1);
+            for (row, held) in [(n, status(contact) != 0), (t, status(contact) == 1)] {
+                if held {
+                    a[row][..size].copy_from_slice(&w[row * size..(row + 1) * size]);
+                    a[row][size] = -q[row];
+                } else {
+                    a[row][row] = 1.0;
+                }
+            }
+            match status(contact) {
+                2 => a[t][n] = -frictions[contact],
+                3 => a[t][n] = frictions[contact],
+                _ => {}
+            }
+        }
+        let Some(r) = eliminate(a) else { continue };
+        let y: Vec<f64> = (0..size).map(|i| q[i] + (0..size).map(|j| w[i * size + j] * r[j]).sum::<f64>()).collect();
+        let holds = (0..contacts).all(|contact| {
+            let (n, t) = (2 * contact, 2 * contact + 1);
+            match status(contact) {
+                0 => y[n] >= 0.0,
+                1 => r[n] >= 0.0 && r[t].abs() <= frictions[contact] * r[n],
+                2 => r[n] >= 0.0 && y[t] <= 0.0,
+                _ => r[n] >= 0.0 && y[t] >= 0.0,
+            }
+        });
+        if holds {
+            found.push(r);
+        }
+    }
+    found
+}
+
+/// Solves by elimination with pivoting; nothing if the matrix is singular.
+fn eliminate(mut a: Vec<Vec<f64>>) -> Option<Vec<f64>> {
+    let n = a.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
+        if a[pivot][k].abs() < 1e-12 {
+            return None;
+        }
+        a.swap(k, pivot);
+        for i in (0..n).filter(|&i| i != k) {
+            let factor = a[i][k] / a[k][k];
+            for j in k..=n {
+                a[i][j] -= factor * a[k][j];
+            }
+        }
+    }
+    Some((0..n).map(|i| a[i][n] / a[i][i]).collect())
+}
+
+#[test]
+fn solutions_in_a_plane_are_among_all_there_are() {
+    let mut random = Congruential(5);
+    let (mut alone, mut trials) = (0, 0);
+    for trial in 0..400 {
+        let contacts = 1 + trial % 4;
+        let size = 2 * contacts;
+        let w = semidefinite(&mut random, size, size, 0.1);
+        let q = random.vector(size, 1.0);
+        let frictions: Vec<f64> = (0..contacts).map(|_| random.within(0.0, 0.7)).collect();
+        let sets: Vec<_> = frictions.iter().map(|&friction| cone(2, friction)).collect();
+        let known = all_solutions(&w, &q, &frictions);
+        for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+            let found = solve(solver, (&w, &q, &sets)).unwrap();
+            check(&w, &q, &sets, &found, 1e-8, &format!("{solver:?}, trial {trial}"));
+            let far = |r: &Vec<f64>| r.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let nearest = known.iter().map(far).fold(f64::INFINITY, f64::min);
+            let scale = found.iter().fold(1.0, |most: f64, r| most.max(r.abs()));
+            assert!(nearest < 1e-7 * scale, "{solver:?}, trial {trial}: {nearest:e}");
+        }
+        alone += usize::from(known.len() == 1);
+        trials += 1;
+    }
+    // With moderate friction there is mostly one.
+    assert!(alone * 10 > trials * 9, "{alone} of {trials}");
+}
+
+#[test]
+fn many_contacts_by_newton_and_by_sweeps() {
+    let mut random = Congruential(3);
+    for trial in 0..40 {
+        let (rows, contacts) = (2 + trial % 2, 5 + trial);
+        let size = rows * contacts;
+        let w = semidefinite(&mut random, size, 2 * size, 0.0);
+        let q = random.vector(size, 1.0);
+        let sets = vec![cone(rows, 0.3); contacts];
+        let tolerance = vec![0.0; size];
+        let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();
+        let mut newton = vec![0.0; size];
+        let iterations = ActiveSet::default().solve(&problem, &mut newton).unwrap();
+        assert!(iterations <= 30, "{iterations} iterations for {contacts} contacts");
+        assert!(problem.residual(&newton).1 < 1e-12, "{:?}", problem.residual(&newton));
+        check(&w, &q, &sets, &newton, 1e-8, &format!("trial {trial}"));
+        let swept = solve(&mut GaussSeidel::default(), (&w, &q, &sets)).unwrap();
+        let (far, most) = newton
+            .iter()
+            .zip(&swept)
+            .fold((0.0_f64, 0.0_f64), |(far, most), (a, b)| (far.max((a - b).abs()), most.max(a.abs())));
+        assert!(far < 1e-8 * most, "trial {trial}: {far:e} of {most:e}");
+    }
+}
+
+#[test]
+fn the_guess_chooses_nothing() {
+    let mut random = Congruential(17);
+    let w = semidefinite(&mut random, 12, 12, 0.1);
+    let q = random.vector(12, 1.0);
+    let (sets, tolerance) = ([cone(3, 0.8); 4], [0.0; 12]);
+    let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();
+    let mut first = None;
+    for _ in 0..5 {
+        let mut multipliers = random.vector(12, 10.0);
+        ActiveSet::default().solve(&problem, &mut multipliers).unwrap();
+        assert_eq!(first.get_or_insert_with(|| multipliers.clone()), &multipliers);
+    }
+}
+
+#[test]
+fn rows_with_and_without_friction_stand_side_by_side() {
+    // A unilateral row, a contact with friction, and a tie, on three masses that springs couple.
+    let mut random = Congruential(23);
+    for trial in 0..200 {
+        let w = semidefinite(&mut random, 5, 5, 0.1);
+        let q = random.vector(5, 1.0);
+        let sets = [AdmissibleSet::NonNegative, cone(3, 0.4), AdmissibleSet::Free];
+        for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+            let found = solve(solver, (&w, &q, &sets)).unwrap();
+            check(&w, &q, &sets[..2], &found, 1e-8, &format!("{solver:?}, trial {trial}"));
+            let tied = q[4] + (0..5).map(|j| w[20 + j] * found[j]).sum::<f64>();
+            assert!(tied.abs() < 1e-10, "{tied:e}");
+        }
+    }
+}
+
+/// Half the lengths of a rigid box, its mass, and the moments of inertia.
+const HALF: [f64; 3] = [0.5, 0.4, 0.2];
+const MASS: f64 = 2.0;
+const INERTIA: [f64; 3] = [0.13, 0.19, 0.27];
+
+/// Boxes on a rough floor, one on the other, each shifted by so much, with a contact at each corner of its bottom: rows
+/// of G by the velocities and spins of all boxes, normal rows first.
+fn pile(shifts: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    let size = 6 * shifts.len();
+    let mut rows = Vec::new();
+    for (place, shift) in shifts.iter().enumerate() {
+        for corner in 0..4 {
+            let x = [HALF[0] * [-1.0, 1.0][corner % 2], HALF[1] * [-1.0, 1.0][corner / 2], -HALF[2]];
+            for axis in [2, 0, 1] {
+                let mut row = vec![0.0; size];
+                // The velocity of a point along an axis: e · (v + ω × x).
+                let mut add = |place: usize, x: [f64; 3], sign: f64| {
+                    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+                    row[6 * place + axis] += sign;
+                    row[6 * place + 3 + j] += sign * x[k];
+                    row[6 * place + 3 + k] -= sign * x[j];
+                };
+                add(place, x, 1.0);
+                if place > 0 {
+                    let below = [x[0] + shift[0], x[1] + shift[1], HALF[2]];
+                    add(place - 1, below, -1.0);
+                }
+                rows.push(row);
+            }
+        }
+    }
+    rows
+}
+
+/// W and q of a pile whose boxes would move so without contact.
+fn rigid(rows: &[Vec<f64>], free: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let inverse = |k: usize| if k % 6 < 3 { MASS.recip() } else { INERTIA[k % 6 - 3].recip() };
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).enumerate().map(|(k, (a, b))| a * b * inverse(k)).sum::<f64>();
+    let w = rows.iter().flat_map(|a| rows.iter().map(|b| product(a, b))).collect();
+    let q = rows.iter().map(|row| row.iter().zip(free).map(|(g, v)| g * v).sum()).collect();
+    (w, q)
+}
+
+/// W of twelve rows has rank six.
+#[test]
+fn a_rigid_box_stands_and_slides() {
+    let rows = pile(&[[0.0; 2]]);
+    let sets = [cone(3, 0.5); 4];
+    for (speed, fall) in [(0.1, 1.0), (0.9, 1.0), (0.6, 2.0)] {
+        // It moves along the floor, and its weight is about to move it down.
+        let (w, q) = rigid(&rows, &[speed, 0.0, -fall, 0.0, 0.0, 0.0]);
+        let r = solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap();
+        check(&w, &q, &sets, &r, 1e-9, &format!("at speed {speed}"));
+        let [up, along] = [0, 1].map(|k| r.chunks(3).map(|r| r[k]).sum::<f64>());
+        // (Its corners are far enough apart for it not to topple.)
+        assert!((up - MASS * fall).abs() < 1e-10, "{up}");
+        assert!((along + MASS * speed.min(0.5 * fall)).abs() < 1e-10, "{along} at speed {speed}");
+    }
+}
+
+#[test]
+fn piles_of_rigid_boxes_stand_and_slide() {
+    let mut random = Congruential(41);
+    for trial in 0..60 {
+        let boxes = 1 + trial % 8;
+        let shifts: Vec<[f64; 2]> = (0..boxes).map(|_| [0.1 * random.signed(), 0.1 * random.signed()]).collect();
+        let free: Vec<f64> = (0..6 * boxes)
+            .map(|k| match k % 6 {
+                2 => -1.0,
+                0 | 1 => 0.5 * random.signed(),
+                _ => 0.1 * random.signed(),
+            })
+            .collect();
+        let (w, q) = rigid(&pile(&shifts), &free);
+        let sets = vec![cone(3, 0.3 + 0.1 * (trial % 5) as f64); 4 * boxes];
+        let tolerance = vec![0.0; q.len()];
+        let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();
+        let mut r = vec![0.0; q.len()];
+        let spent = ActiveSet::default().solve(&problem, &mut r);
+        assert!(spent.is_ok(), "trial {trial}, {boxes} boxes: {spent:?}");
+        assert!(problem.residual(&r).1 < 1e-11, "trial {trial}, {boxes} boxes: {:?}", problem.residual(&r));
+        check(&w, &q, &sets, &r, 1e-7, &format!("trial {trial}, {boxes} boxes"));
+    }
+}
+
+#[test]
+fn units_do_not_matter() {
+    let mut random = Congruential(29);
+    let w = semidefinite(&mut random, 9, 9, 0.1);
+    let q = random.vector(9, 1.0);
+    let sets = [cone(3, 0.4); 3];
+    let base = solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap();
+    // Powers of two: the same bits.
+    for (length, force) in [(1, 60), (-40, 3), (30, -50)] {
+        let [length, force] = [length, force].map(|power| 2.0_f64.powi(power));
+        let scaled_w: Vec<f64> = w.iter().map(|w| w * length / force).collect();
+        let scaled_q: Vec<f64> = q.iter().map(|q| q * length).collect();
+        let found = solve(&mut ActiveSet::default(), (&scaled_w, &scaled_q, &sets)).unwrap();
+        assert_eq!(found.iter().map(|r| r / force).collect::<Vec<_>>(), base);
+    }
+    let single = |x: &[f64]| x.iter().map(|&x| x as f32).collect::<Vec<f32>>();
+    let found = solve(&mut ActiveSet::default(), (&single(&w), &single(&q), &sets)).unwrap();
+    let far = found.iter().zip(&base).map(|(&a, b)| (f64::from(a) - b).abs()).fold(0.0, f64::max);
+    assert!(far < 1e-4, "{far:e}");
+}
+
+#[test]
+fn who_takes_no_friction_says_so() {
+    let (w, q, sets) = ([1.0, 0.0, 0.0, 1.0], [-1.0, 1.0], [cone(2, 0.3)]);
+    let refusing: [&mut dyn ContactSolver<f64>; 2] = [&mut Pivoting::default(), &mut ProjectedGradient::default()];
+    for solver in refusing {
+        assert!(!solver.admits(sets[0]) && solver.admits(AdmissibleSet::Free));
+        assert_eq!(solve(solver, (&w, &q, &sets)), Err(ContactFailure::Friction { row: 0 }));
+    }
+    assert!(ActiveSet::<f64>::default().admits(sets[0]) && GaussSeidel::<f64>::default().admits(sets[0]));
+    for friction in [-0.1, f64::NAN, f64::INFINITY] {
+        let refused = ContactProblem::new(&w, &q, &[cone(2, friction)], &[0.0; 2]).map(drop);
+        assert!(matches!(refused, Err(Error::Parameter { .. })), "{refused:?}");
+    }
+    let not_a_number = solve(&mut ActiveSet::default(), (&w, &[f64::NAN, 0.0], &sets));
+    assert!(matches!(not_a_number, Err(ContactFailure::NotConverged { iterations: 0, .. })), "{not_a_number:?}");
+}
