@@ -10,9 +10,9 @@ use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 
 /// A time integrator and the mass matrix (and corrections, if any) that go with it.
 ///
-/// What each buys and costs is measured in `docs/corrections.md`. Known bias: the mass of the contact dofs goes to the rest
-/// of the body, whose impedance it raises, and with it the force of lasting contact: by about 1/(3n) for n elements
-/// behind the contact, a third of a percent on bars of 100 (section 4 there), more on coarse meshes.
+/// What each buys and costs is measured in `docs/corrections.md`. Known bias: the mass of the contact dofs goes to the
+/// rest of the body, whose impedance it raises, and with it the force of lasting contact: by about 1/(3n) for n
+/// elements behind the contact, a third of a percent on bars of 100 (section 4 there), more on coarse meshes.
 ///
 /// The mass is made once, from the consistent one:
 ///

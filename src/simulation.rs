@@ -11,6 +11,7 @@ mod constraint_part;
 mod constraints;
 mod contact_multipliers;
 mod contact_output;
+mod contact_path;
 mod contact_rows;
 mod contact_solve;
 mod contact_step;

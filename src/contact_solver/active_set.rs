@@ -16,9 +16,9 @@ use crate::real::Real;
 /// principal minors). Steady contact takes one iteration, and while W and the active
 /// rows stay the same no factorization.
 ///
-/// From 256 active rows on, the equations are solved by conjugate gradients with a factorized sparse approximate inverse
-/// (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), to the rounding of each, if no row depends on its
-/// neighbors; else by the factor. Problems whose W is applied and not formed
+/// From 256 active rows on, the equations are solved by conjugate gradients with a factorized sparse approximate
+/// inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), to the rounding of each, if no row depends on
+/// its neighbors; else by the factor. Problems whose W is applied and not formed
 /// ([`solve_applied`](ContactSolver::solve_applied)) take plain exchanges of blocks, and are given back where these do
 /// not end.
 ///
@@ -34,11 +34,11 @@ use crate::real::Real;
 /// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant
 /// rows always go the way of proximal steps.
 ///
-/// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton iterations
-/// on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), where contacts are open, stick or
-/// slide; they begin at what a few sweeps over the contacts leave ([`GaussSeidel`](super::GaussSeidel)). Where these do
-/// not end, as on redundant rows, proximal steps follow, with a share of the diagonal that shrinks. All begin at zero:
-/// large coefficients may leave several solutions, and the guess chooses none of them.
+/// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton
+/// iterations on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), where contacts are
+/// open, stick or slide; they begin at what a few sweeps over the contacts leave ([`GaussSeidel`](super::GaussSeidel)).
+/// Where these do not end, as on redundant rows, proximal steps follow, with a share of the diagonal that shrinks. All
+/// begin at zero: large coefficients may leave several solutions, and the guess chooses none of them.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,

@@ -1,4 +1,5 @@
-//! One contact with friction, alone: the multipliers of a block of a normal row and one or two tangential ones, exactly.
+//! One contact with friction, alone: the multipliers of a block of a normal row and one or two tangential ones,
+//! exactly.
 
 use crate::real::Real;
 

@@ -27,9 +27,9 @@ use crate::real::Real;
 /// most the tolerance times the largest |q_i|. A guess that is accepted is returned after 0 sweeps; one that is not
 /// finite is not used.
 ///
-/// A contact with friction is a block: in its turn it gets the multipliers that solve it alone, exactly. Sweeps begin at
-/// zero then, whatever the guess, and there is no theorem that they converge; on independent rows and with coefficients
-/// below 1 they have in every test, on redundant ones often not.
+/// A contact with friction is a block: in its turn it gets the multipliers that solve it alone, exactly. Sweeps begin
+/// at zero then, whatever the guess, and there is no theorem that they converge; on independent rows and with
+/// coefficients below 1 they have in every test, on redundant ones often not.
 ///
 /// Known weakness: convergence is linear, and the number of sweeps grows with the condition of W: stiff against soft,
 /// or long stacks, take thousands. The tolerance is one for all rows: small gaps beside large ones are less exact. A

@@ -173,8 +173,8 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Parameter`] for a friction coefficient that is
-    /// negative or not finite.
+    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Parameter`] for a friction coefficient that
+    /// is negative or not finite.
     pub fn new(delassus: &'a [T], offset: &'a [T], sets: &'a [AdmissibleSet], tolerance: &'a [T]) -> Result<Self> {
         let size = offset.len();
         let rows = sets.iter().map(|set| set.rows()).sum();

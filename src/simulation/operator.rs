@@ -1,17 +1,18 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 
+use super::contact_path::{ContactPath, analyze, condensation, respond};
 use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::contact::{ContactJacobian, Groups};
 use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
-use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
+use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
 use crate::system::{Linearity, System, TangentWeights};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::sparse::SparseColMatRef;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -43,20 +44,6 @@ pub(crate) struct Operator<T> {
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
 }
-
-/// How contact gets its responses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ContactPath {
-    /// From the trailing block of a factor with the interface eliminated last.
-    Condensed,
-    /// By full solves, a column a row.
-    Full,
-    /// From a diagonal matrix: a force moves the dof that it acts on, and nothing else.
-    Apart,
-}
-
-/// Fill over that of a free order beyond which a matrix that is factorized often is not ordered for contact.
-const DEAR: f64 = 1.25;
 
 /// The Delassus operator of some rows, kept until they or their responses change. It grows with them.
 #[derive(Debug)]
@@ -402,7 +389,8 @@ impl<T: Real> Operator<T> {
         );
     }
 
-    /// W λ of some rows by one solve; the forces Gᵀ λ and their response on the interface are left in two vectors there.
+    /// W λ of some rows by one solve; the forces Gᵀ λ and their response on the interface are left in two vectors
+    /// there.
     pub(crate) fn apply(
         &mut self,
         g: &ContactJacobian<T>,
@@ -441,67 +429,4 @@ impl<T: Real> Operator<T> {
     pub(crate) fn stored_values(&self) -> usize {
         self.factor.stored_values()
     }
-}
-
-/// Analyzes with the interface eliminated last, if the solver condenses; in a free order if a matrix that varies would
-/// otherwise be much dearer to factorize.
-fn analyze<T: Real>(
-    solver: &dyn LinearSolver<T>,
-    pattern: SymbolicSparseColMatRef<'_, usize>,
-    interface: &[usize],
-    varies: bool,
-) -> Result<(Box<dyn Factorization<T>>, ContactPath)> {
-    let mut last = solver.analyze(pattern, interface)?;
-    if last.condensation().is_none() {
-        return Ok((last, ContactPath::Full));
-    }
-    // (The diagonal is always part of the pattern.)
-    if pattern.row_idx().len() == pattern.ncols() {
-        return Ok((last, ContactPath::Apart));
-    }
-    if varies && !interface.is_empty() {
-        let free = solver.analyze(pattern, &[])?;
-        if last.stored_values() as f64 > DEAR * free.stored_values() as f64 {
-            return Ok((free, ContactPath::Full));
-        }
-    }
-    Ok((last, ContactPath::Condensed))
-}
-
-/// The condensation, where contact uses it.
-fn condensation<T: Real>(path: ContactPath, factor: &mut dyn Factorization<T>) -> Option<&mut dyn Condensation<T>> {
-    match path {
-        ContactPath::Condensed => factor.condensation(),
-        ContactPath::Full | ContactPath::Apart => None,
-    }
-}
-
-/// `f ← A⁻¹ f` on the interface, for columns of forces there; `full` is scratch for full solves.
-fn respond<T: Real>(
-    (path, factor): (ContactPath, &mut dyn Factorization<T>),
-    interface: &[usize],
-    full: &mut [T],
-    forces: &mut [T],
-) -> Result<()> {
-    // A condensation answers on the interface without a full solve, whether steps condense or not.
-    if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
-        return condensed.solve(forces);
-    }
-    let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
-    for forces in forces.chunks_mut(COLUMNS * height) {
-        let columns = &mut full[..forces.len() / height * size];
-        columns.fill(T::zero());
-        for (column, forces) in columns.chunks_exact_mut(size).zip(forces.chunks_exact(height)) {
-            for (&force, &dof) in forces.iter().zip(interface) {
-                column[dof] = force;
-            }
-        }
-        factor.solve(columns)?;
-        for (column, forces) in columns.chunks_exact(size).zip(forces.chunks_exact_mut(height)) {
-            for (x, &dof) in forces.iter_mut().zip(interface) {
-                *x = column[dof];
-            }
-        }
-    }
-    Ok(())
 }

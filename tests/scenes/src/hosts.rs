@@ -52,7 +52,8 @@ impl<T: Real, S: System<T>> System<T> for Bare<S> {
 }
 
 /// A system whose every evaluation passes a hook, which may change the result or fail: `hook(method, t, out)`, with the
-/// method as errors name it. The damping force has no t (NaN), `commit` no result. What the system says of itself stays.
+/// method as errors name it. The damping force has no t (NaN), `commit` no result. What the system says of itself
+/// stays.
 #[derive(Clone, Debug)]
 pub struct Hooked<S, F> {
     system: S,

@@ -1,0 +1,86 @@
+//! How contact gets its responses from a factor, and the order of elimination that this asks for.
+
+use crate::error::Result;
+use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
+use crate::real::Real;
+use faer::sparse::SymbolicSparseColMatRef;
+
+/// How contact gets its responses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ContactPath {
+    /// From the trailing block of a factor with the interface eliminated last.
+    Condensed,
+    /// By full solves, a column a row.
+    Full,
+    /// From a diagonal matrix: a force moves the dof that it acts on, and nothing else.
+    Apart,
+}
+
+/// Fill over that of a free order beyond which a matrix that is factorized often is not ordered for contact.
+const DEAR: f64 = 1.25;
+
+/// Analyzes with the interface eliminated last, if the solver condenses; in a free order if a matrix that varies would
+/// otherwise be much dearer to factorize.
+pub(super) fn analyze<T: Real>(
+    solver: &dyn LinearSolver<T>,
+    pattern: SymbolicSparseColMatRef<'_, usize>,
+    interface: &[usize],
+    varies: bool,
+) -> Result<(Box<dyn Factorization<T>>, ContactPath)> {
+    let mut last = solver.analyze(pattern, interface)?;
+    if last.condensation().is_none() {
+        return Ok((last, ContactPath::Full));
+    }
+    // (The diagonal is always part of the pattern.)
+    if pattern.row_idx().len() == pattern.ncols() {
+        return Ok((last, ContactPath::Apart));
+    }
+    if varies && !interface.is_empty() {
+        let free = solver.analyze(pattern, &[])?;
+        if last.stored_values() as f64 > DEAR * free.stored_values() as f64 {
+            return Ok((free, ContactPath::Full));
+        }
+    }
+    Ok((last, ContactPath::Condensed))
+}
+
+/// The condensation, where contact uses it.
+pub(super) fn condensation<T: Real>(
+    path: ContactPath,
+    factor: &mut dyn Factorization<T>,
+) -> Option<&mut dyn Condensation<T>> {
+    match path {
+        ContactPath::Condensed => factor.condensation(),
+        ContactPath::Full | ContactPath::Apart => None,
+    }
+}
+
+/// `f ← A⁻¹ f` on the interface, for columns of forces there; `full` is scratch for full solves.
+pub(super) fn respond<T: Real>(
+    (path, factor): (ContactPath, &mut dyn Factorization<T>),
+    interface: &[usize],
+    full: &mut [T],
+    forces: &mut [T],
+) -> Result<()> {
+    // A condensation answers on the interface without a full solve, whether steps condense or not.
+    if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
+        return condensed.solve(forces);
+    }
+    let (height, size) = (interface.len().max(1), full.len() / COLUMNS);
+    for forces in forces.chunks_mut(COLUMNS * height) {
+        let columns = &mut full[..forces.len() / height * size];
+        columns.fill(T::zero());
+        for (column, forces) in columns.chunks_exact_mut(size).zip(forces.chunks_exact(height)) {
+            for (&force, &dof) in forces.iter().zip(interface) {
+                column[dof] = force;
+            }
+        }
+        factor.solve(columns)?;
+        for (column, forces) in columns.chunks_exact(size).zip(forces.chunks_exact_mut(height)) {
+            for (x, &dof) in forces.iter_mut().zip(interface) {
+                *x = column[dof];
+            }
+        }
+    }
+    Ok(())
+}
