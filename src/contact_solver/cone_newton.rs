@@ -156,10 +156,9 @@ impl<T: Real> ConeNewton<T> {
         y.extend((0..problem.size()).map(|row| problem.gap(row, multipliers)));
         rows.clear();
         for (block, set) in problem.blocks() {
-            if status(problem, block.start, set, multipliers, y) != Status::Open {
-                rows.extend(block);
-            } else {
-                multipliers[block].fill(T::zero());
+            match status(problem, block.start, set, multipliers, y) {
+                Status::Open => multipliers[block].fill(T::zero()),
+                Status::Held | Status::Slides { .. } => rows.extend(block),
             }
         }
         let size = rows.len();

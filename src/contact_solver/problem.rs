@@ -77,7 +77,9 @@ impl AdmissibleSet {
         let inside = (*normal + friction * size) / (T::one() + friction * friction);
         *normal = inside.max(T::zero());
         let share = if size > T::zero() { friction * *normal / size } else { T::zero() };
-        tangential.iter_mut().for_each(|f| *f *= share);
+        for f in tangential {
+            *f *= share;
+        }
     }
 
     /// The nearest multiplier in a set of one row.

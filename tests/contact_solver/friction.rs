@@ -5,6 +5,7 @@ use contact_dynamics::contact_solver::{
     ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
 };
 use contact_dynamics::{Error, Real};
+use contact_dynamics_scenes::boxes::{self, MASS, pile};
 use contact_dynamics_scenes::random::Congruential;
 
 fn cone(rows: usize, friction: f64) -> AdmissibleSet {
@@ -88,8 +89,9 @@ fn blocks_alone_meet_coulombs_law() {
 fn all_solutions(w: &[f64], q: &[f64], frictions: &[f64]) -> Vec<Vec<f64>> {
     let (contacts, size) = (frictions.len(), q.len());
     let mut found = Vec::new();
-    for state in 0..4_usize.pow(contacts as u32) {
-        let status = |contact: usize| state / 4_usize.pow(contact as u32) % 4;
+    // Two bits for each contact.
+    for state in 0..1_usize << (2 * contacts) {
+        let status = |contact: usize| state >> (2 * contact) & 3;
         // Rows of A r = b, solved by elimination.
         let mut a = vec![vec![0.0; size + 1]; size];
         for contact in 0..contacts {
@@ -229,49 +231,6 @@ fn rows_with_and_without_friction_stand_side_by_side() {
     }
 }
 
-/// Half the lengths of a rigid box, its mass, and the moments of inertia.
-const HALF: [f64; 3] = [0.5, 0.4, 0.2];
-const MASS: f64 = 2.0;
-const INERTIA: [f64; 3] = [0.13, 0.19, 0.27];
-
-/// Boxes on a rough floor, one on the other, each shifted by so much, with a contact at each corner of its bottom: rows
-/// of G by the velocities and spins of all boxes, normal rows first.
-fn pile(shifts: &[[f64; 2]]) -> Vec<Vec<f64>> {
-    let size = 6 * shifts.len();
-    let mut rows = Vec::new();
-    for (place, shift) in shifts.iter().enumerate() {
-        for corner in 0..4 {
-            let x = [HALF[0] * [-1.0, 1.0][corner % 2], HALF[1] * [-1.0, 1.0][corner / 2], -HALF[2]];
-            for axis in [2, 0, 1] {
-                let mut row = vec![0.0; size];
-                // The velocity of a point along an axis: e · (v + ω × x).
-                let mut add = |place: usize, x: [f64; 3], sign: f64| {
-                    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
-                    row[6 * place + axis] += sign;
-                    row[6 * place + 3 + j] += sign * x[k];
-                    row[6 * place + 3 + k] -= sign * x[j];
-                };
-                add(place, x, 1.0);
-                if place > 0 {
-                    let below = [x[0] + shift[0], x[1] + shift[1], HALF[2]];
-                    add(place - 1, below, -1.0);
-                }
-                rows.push(row);
-            }
-        }
-    }
-    rows
-}
-
-/// W and q of a pile whose boxes would move so without contact.
-fn rigid(rows: &[Vec<f64>], free: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let inverse = |k: usize| if k % 6 < 3 { MASS.recip() } else { INERTIA[k % 6 - 3].recip() };
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).enumerate().map(|(k, (a, b))| a * b * inverse(k)).sum::<f64>();
-    let w = rows.iter().flat_map(|a| rows.iter().map(|b| product(a, b))).collect();
-    let q = rows.iter().map(|row| row.iter().zip(free).map(|(g, v)| g * v).sum()).collect();
-    (w, q)
-}
-
 /// W of twelve rows has rank six.
 #[test]
 fn a_rigid_box_stands_and_slides() {
@@ -279,7 +238,7 @@ fn a_rigid_box_stands_and_slides() {
     let sets = [cone(3, 0.5); 4];
     for (speed, fall) in [(0.1, 1.0), (0.9, 1.0), (0.6, 2.0)] {
         // It moves along the floor, and its weight is about to move it down.
-        let (w, q) = rigid(&rows, &[speed, 0.0, -fall, 0.0, 0.0, 0.0]);
+        let (w, q) = boxes::problem(&rows, &[speed, 0.0, -fall, 0.0, 0.0, 0.0]);
         let r = solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap();
         check(&w, &q, &sets, &r, 1e-9, &format!("at speed {speed}"));
         let [up, along] = [0, 1].map(|k| r.chunks(3).map(|r| r[k]).sum::<f64>());
@@ -302,7 +261,7 @@ fn piles_of_rigid_boxes_stand_and_slide() {
                 _ => 0.1 * random.signed(),
             })
             .collect();
-        let (w, q) = rigid(&pile(&shifts), &free);
+        let (w, q) = boxes::problem(&pile(&shifts), &free);
         let sets = vec![cone(3, 0.3 + 0.1 * (trial % 5) as f64); 4 * boxes];
         let tolerance = vec![0.0; q.len()];
         let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();

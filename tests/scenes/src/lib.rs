@@ -1,6 +1,7 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
 pub mod bars;
+pub mod boxes;
 pub mod combinations;
 pub mod curved;
 pub mod disc;
