@@ -36,9 +36,9 @@ use crate::real::Real;
 ///
 /// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton
 /// iterations on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), where contacts are
-/// open, stick or slide; they begin at what a few sweeps over the contacts leave ([`GaussSeidel`](super::GaussSeidel)).
-/// Where these do not end, as on redundant rows, proximal steps follow, with a share of the diagonal that shrinks. All
-/// begin at zero: large coefficients may leave several solutions, and the guess chooses none of them.
+/// open, stick or slide; they begin where sweeps over the contacts ([`GaussSeidel`](super::GaussSeidel)) converge no
+/// more. Where these do not end, as on redundant rows, proximal steps follow, with a share of the diagonal that
+/// shrinks. All begin at zero: large coefficients may leave several solutions, and the guess chooses none of them.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,

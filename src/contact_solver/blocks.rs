@@ -53,6 +53,39 @@ impl<T: Real> BlockAcceptance<T> {
             }
         })
     }
+
+    /// Sweeps until the problem is solved, or so many; says whether it is, and counts them. An `impatient` one ends too
+    /// where sweeps hardly change less than those before.
+    pub(super) fn sweep(
+        &self,
+        problem: &ContactProblem<'_, T>,
+        omega: T,
+        sweeps: usize,
+        impatient: bool,
+        (spent, multipliers): (&mut usize, &mut [T]),
+    ) -> bool {
+        /// Sweeps after which the problem is looked at, whatever they have changed; an impatient caller wants the
+        /// change halved by then.
+        const LOOK: usize = 8;
+        let mut before = T::infinity();
+        for sweep in 0..sweeps {
+            if sweep % LOOK == 0 && self.accepts(problem, multipliers) {
+                return true;
+            }
+            let change = sweep_blocks(problem, omega, multipliers);
+            *spent += 1;
+            if change <= self.accepted && self.accepts(problem, multipliers) {
+                return true;
+            }
+            if sweep % LOOK == LOOK - 1 {
+                if impatient && change > T::of(0.5) * before {
+                    break;
+                }
+                before = change;
+            }
+        }
+        self.accepts(problem, multipliers)
+    }
 }
 
 /// The failure that names the worst block.
@@ -66,8 +99,13 @@ pub(super) fn failure<T: Real>(
 }
 
 /// One sweep: each block in turn takes the multipliers that solve it while the others keep theirs, relaxed by `omega`.
-pub(super) fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
+/// Returns the largest change of a multiplier, times its own compliance.
+fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
+    let mut largest = T::zero();
     for (rows, set) in problem.blocks() {
+        let mut before = [T::zero(); 3];
+        before[..rows.len()].copy_from_slice(&multipliers[rows.clone()]);
+        let own = rows.clone();
         match set.friction() {
             None => {
                 let (row, diagonal) = (rows.start, problem.delassus(rows.start, rows.start));
@@ -87,7 +125,11 @@ pub(super) fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, m
                 }
             }
         }
+        for (row, before) in own.zip(before) {
+            largest = largest.max(problem.delassus(row, row) * (multipliers[row] - before).abs());
+        }
     }
+    largest
 }
 
 /// A block while the others keep their multipliers.

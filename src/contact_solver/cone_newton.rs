@@ -1,6 +1,6 @@
 //! Contact problems with friction by a semismooth Newton method: open, stick and slip as states of the blocks.
 
-use super::blocks::{BlockAcceptance, failure, sweep_blocks};
+use super::blocks::{BlockAcceptance, failure};
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
@@ -63,15 +63,17 @@ impl<T: Real> ConeNewton<T> {
         let acceptance = BlockAcceptance::begin(problem, tolerance, multipliers)?;
         let mut spent = 0;
         for round in 0..ROUNDS {
-            let sweeps = if round == 0 { FIRST_SWEEPS } else { MORE_SWEEPS };
-            if sweep(problem, &acceptance, sweeps, &mut spent, multipliers)
+            // A sweep costs about as much as the share 3/n of an iteration: at first as many as half of one, while they
+            // converge.
+            let sweeps = if round == 0 { FIRST_SWEEPS.max(problem.size() / 6) } else { MORE_SWEEPS };
+            if acceptance.sweep(problem, T::one(), sweeps, true, (&mut spent, multipliers))
                 || self.newton(problem, &acceptance, &mut spent, multipliers)
             {
                 return Ok(spent);
             }
         }
         if self.proximal(problem, (&acceptance, tolerance), &mut spent, multipliers)
-            || sweep(problem, &acceptance, LAST_SWEEPS, &mut spent, multipliers)
+            || acceptance.sweep(problem, T::one(), LAST_SWEEPS, false, (&mut spent, multipliers))
         {
             return Ok(spent);
         }
@@ -134,16 +136,18 @@ impl<T: Real> ConeNewton<T> {
             }
             let step = ContactProblem::of(&shifted, &offset, problem.sets, problem.tolerance, 0);
             let own = BlockAcceptance::of(&step, tolerance);
-            for _ in 0..ROUNDS {
-                if self.newton(&step, &own, spent, multipliers) || sweep(&step, &own, MORE_SWEEPS, spent, multipliers) {
-                    break;
-                }
-            }
+            let ended = self.newton(&step, &own, spent, multipliers)
+                || own.sweep(&step, T::one(), MORE_SWEEPS, false, (&mut *spent, multipliers))
+                || self.newton(&step, &own, spent, multipliers);
             solved = acceptance.accepts(problem, multipliers);
             if solved {
                 break;
             }
-            share = (share * T::of(SHRINK)).max(T::of(LEAST_SHARE));
+            // A step that cannot be solved is too bold.
+            share = match ended {
+                true => (share * T::of(SHRINK)).max(T::of(LEAST_SHARE)),
+                false => share / T::of(SHRINK * SHRINK),
+            };
         }
         (self.shifted, self.offset, self.center) = (shifted, offset, center);
         solved
@@ -216,24 +220,6 @@ impl<T: Real> ConeNewton<T> {
         }
         T::all_finite(multipliers)
     }
-}
-
-/// Sweeps until the problem is solved, or so many; says whether it is.
-fn sweep<T: Real>(
-    problem: &ContactProblem<'_, T>,
-    acceptance: &BlockAcceptance<T>,
-    sweeps: usize,
-    spent: &mut usize,
-    multipliers: &mut [T],
-) -> bool {
-    for _ in 0..sweeps {
-        if acceptance.accepts(problem, multipliers) {
-            return true;
-        }
-        sweep_blocks(problem, T::one(), multipliers);
-        *spent += 1;
-    }
-    acceptance.accepts(problem, multipliers)
 }
 
 /// What the rows of a block are at these multipliers and y.

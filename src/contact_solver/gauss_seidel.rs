@@ -1,7 +1,7 @@
 //! Projected Gauss–Seidel: row by row, robust, for many rows and moderate accuracy.
 
 use super::acceptance::Settings;
-use super::blocks::{BlockAcceptance, failure, sweep_blocks};
+use super::blocks::{BlockAcceptance, failure};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -95,15 +95,10 @@ impl<T: Real> GaussSeidel<T> {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let acceptance = BlockAcceptance::begin(problem, self.settings.tolerance(), multipliers)?;
-        for sweep in 0..self.settings.iterations {
-            if acceptance.accepts(problem, multipliers) {
-                return Ok(sweep);
-            }
-            sweep_blocks(problem, self.relaxation, multipliers);
-        }
-        match acceptance.accepts(problem, multipliers) {
-            true => Ok(self.settings.iterations),
-            false => Err(failure(problem, self.settings.iterations, multipliers)),
+        let (limit, mut spent) = (self.settings.iterations, 0);
+        match acceptance.sweep(problem, self.relaxation, limit, false, (&mut spent, multipliers)) {
+            true => Ok(spent),
+            false => Err(failure(problem, spent, multipliers)),
         }
     }
 }

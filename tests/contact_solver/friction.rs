@@ -94,7 +94,7 @@ fn all_solutions(w: &[f64], q: &[f64], frictions: &[f64]) -> Vec<Vec<f64>> {
         let status = |contact: usize| state >> (2 * contact) & 3;
         // Rows of A r = b, solved by elimination.
         let mut a = vec![vec![0.0; size + 1]; size];
-        for contact in 0..contacts {
+        for (contact, friction) in frictions.iter().enumerate() {
             let (n, t) = (2 * contact, 2 * contact + 1);
             for (row, held) in [(n, status(contact) != 0), (t, status(contact) == 1)] {
                 if held {
@@ -105,8 +105,8 @@ fn all_solutions(w: &[f64], q: &[f64], frictions: &[f64]) -> Vec<Vec<f64>> {
                 }
             }
             match status(contact) {
-                2 => a[t][n] = -frictions[contact],
-                3 => a[t][n] = frictions[contact],
+                2 => a[t][n] = -friction,
+                3 => a[t][n] = *friction,
                 _ => {}
             }
         }
@@ -138,10 +138,8 @@ fn eliminate(mut a: Vec<Vec<f64>>) -> Option<Vec<f64>> {
         }
         a.swap(k, pivot);
         for i in (0..n).filter(|&i| i != k) {
-            let factor = a[i][k] / a[k][k];
-            for j in k..=n {
-                a[i][j] -= factor * a[k][j];
-            }
+            let (pivots, factor) = (a[k].clone(), a[i][k] / a[k][k]);
+            a[i].iter_mut().zip(&pivots).for_each(|(x, pivot)| *x -= factor * pivot);
         }
     }
     Some((0..n).map(|i| a[i][n] / a[i][i]).collect())
@@ -288,7 +286,7 @@ fn units_do_not_matter() {
         let found = solve(&mut ActiveSet::default(), (&scaled_w, &scaled_q, &sets)).unwrap();
         assert_eq!(found.iter().map(|r| r / force).collect::<Vec<_>>(), base);
     }
-    let single = |x: &[f64]| x.iter().map(|&x| x as f32).collect::<Vec<f32>>();
+    let single = |x: &[f64]| x.iter().map(|&x| f32::of(x)).collect::<Vec<f32>>();
     let found = solve(&mut ActiveSet::default(), (&single(&w), &single(&q), &sets)).unwrap();
     let far = found.iter().zip(&base).map(|(&a, b)| (f64::from(a) - b).abs()).fold(0.0, f64::max);
     assert!(far < 1e-4, "{far:e}");
