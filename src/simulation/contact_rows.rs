@@ -257,7 +257,9 @@ impl<T: Real> ContactRowsWork<T> {
             constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
         }
         // Far rows are those whose gap is beyond any tolerance of a row: at the end of a stage nothing more is asked.
-        let ends = approach > 0.0 && constraints.laws().are_uniform() && !level.is_velocity();
+        // (Where rows are few, bounds over all dofs cost more than these rows do.)
+        let many = 16 * constraints.len() > values.len();
+        let ends = approach > 0.0 && many && constraints.laws().are_uniform() && !level.is_velocity();
         let far = ends.then(|| {
             let way =
                 g.largest_row() * T::largest(&new.v) + rates.iter().fold(T::zero(), |most, x| most.max(x.rate.abs()));
