@@ -48,7 +48,7 @@ enum Status<T> {
     /// y = 0.
     Held,
     /// Slides: the friction is μ p times this direction. With κ, the share of the disc's radius in the length of the
-    /// point whose nearest one is sought, and the mean compliance of the tangential rows.
+    /// point whose nearest one is sought, and the larger compliance of the tangential rows.
     Slides { direction: [T; 2], share: T, compliance: T },
 }
 
@@ -161,7 +161,7 @@ impl<T: Real> ConeNewton<T> {
         rows.clear();
         for (block, set) in problem.blocks() {
             match status(problem, block.start, set, multipliers, y) {
-                Status::Open => multipliers[block].fill(T::zero()),
+                Status::Open => {}
                 Status::Held | Status::Slides { .. } => rows.extend(block),
             }
         }
@@ -215,6 +215,8 @@ impl<T: Real> ConeNewton<T> {
             return false;
         }
         factor.solve(right);
+        // (Not before: what a block is depends on its multipliers.)
+        multipliers.fill(T::zero());
         for (&row, &value) in rows.iter().zip(right.iter()) {
             multipliers[row] = value;
         }
