@@ -76,7 +76,7 @@ fn slip_direction<T: Real>(
         }
         (low, high) = (high, two * two * high);
     }
-    // Regula falsi (Illinois), and a halving wherever it gains less than that.
+    // Regula falsi, and a halving where it gains less than that.
     let (mut below, mut above) = (beyond(tangential(low)), beyond(tangential(high)));
     for _ in 0..STEPS {
         let width = high - low;
