@@ -8,7 +8,7 @@ use crate::error::{Error, Result, step_size};
 use crate::real::Real;
 #[cfg(feature = "serde")]
 use crate::state::{Checkpoint, Motion};
-use crate::state::{Clock, History, State};
+use crate::state::{Clock, History, Names, State};
 use crate::system::check_vector;
 
 /// State and history that a run continues from.
@@ -21,7 +21,9 @@ pub(super) struct Resumed<T> {
 }
 
 impl<T: Real> Resumed<T> {
-    pub(super) fn new(state: State<T>, history: History<T>) -> Self {
+    pub(super) fn new(mut state: State<T>, history: History<T>) -> Self {
+        // Versions of names count within a run: those of another one mean nothing here.
+        state.contacts.names = Names::default();
         Self {
             state,
             history,

@@ -15,7 +15,7 @@ pub enum ContactStatus {
     Closed,
 }
 
-/// Which version of the names of all rows a list holds: lists of one version are equal.
+/// Which version of the names of all rows of a run a list holds: lists of one version are equal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Names(u64);
 

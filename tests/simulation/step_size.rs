@@ -3,8 +3,8 @@
 use contact_dynamics::observer::ContactRecorder;
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::{
-    Bathe, Bdf2, Composite, Corrector, Error, GeneralizedAlpha, Houbolt, LinearSystem, MoreauJean, Newmark, Oalts,
-    Park, PersistencyCorrection, Simulation, SimulationBuilder, StartUp, TimeIntegrator,
+    Bathe, Bdf2, Composite, Corrector, Error, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem, MoreauJean, Newmark,
+    Oalts, Park, PersistencyCorrection, Simulation, SimulationBuilder, StartUp, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::record_run;
@@ -290,6 +290,30 @@ fn changes_of_the_step_conserve_momentum() {
         }
         let end = run.momentum(&direction).unwrap();
         assert!((end / start - 1.0).abs() < 1e-11, "{}: {:e}", scheme.name(), end / start - 1.0);
+    }
+}
+
+/// A host may sort its rows into other constraints before it goes on.
+#[test]
+fn a_resumed_run_names_its_own_contacts() {
+    let free = || LinearSystem::lumped(vec![1.0; 3], matrix(3, (0..3).map(|i| (i, i, 0.0)))).unwrap();
+    let row = |rows: LinearRows<'static, f64>, dof| rows.unilateral(&[(dof, 1.0)], 1.0);
+    let together = (0..3).fold(LinearRows::new(), row);
+    let mut run = Simulation::builder(free(), Composite, 0.01).constraint(together).build().unwrap();
+    run.step().unwrap();
+    for apart in [&[0..1, 1..3][..], &[0..1, 1..2, 2..3], &[0..1, 1..2]] {
+        let mut builder = Simulation::builder(free(), Composite, 0.01);
+        for dofs in apart {
+            builder = builder.constraint(dofs.clone().fold(LinearRows::new(), row));
+        }
+        let mut resumed = builder.resume(run.state().clone(), run.history().clone()).build().unwrap();
+        let own: Vec<_> =
+            apart.iter().enumerate().flat_map(|(part, dofs)| (0..dofs.len()).map(move |row| (part, row))).collect();
+        for _ in 0..4 {
+            resumed.step().unwrap();
+            let ids = resumed.state().contacts().ids().iter();
+            assert_eq!(ids.map(|id| (id.constraint, id.feature)).collect::<Vec<_>>(), own);
+        }
     }
 }
 
