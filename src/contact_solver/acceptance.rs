@@ -31,6 +31,15 @@ impl<T: Real> ContactProblem<'_, T> {
         worst.1
     }
 
+    /// Refuses numbers that are not finite; W need not be looked at if it is `known` to be.
+    pub(super) fn check_finite(&self, known: bool) -> std::result::Result<(), ContactFailure<T>> {
+        let finite = |i: &usize| self.offset[*i].is_finite() && (known || T::all_finite(self.row(*i)));
+        match (0..self.size()).find(|i| !finite(i)) {
+            Some(row) => Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() }),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses a W that is not symmetric. What rounding of badly conditioned responses makes of a symmetric one passes;
     /// that little is for the acceptance rule to judge.
     pub(super) fn check_symmetric(&self) -> std::result::Result<(), ContactFailure<T>> {
@@ -92,10 +101,7 @@ impl<T: Real> Settings<T> {
             let friction = problem.blocks().find(|(_, set)| set.friction().is_some());
             return Err(ContactFailure::Friction { row: friction.map_or(0, |(rows, _)| rows.start) });
         }
-        let finite = |i: &usize| problem.offset[*i].is_finite() && (known || T::all_finite(problem.row(*i)));
-        if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
-            return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
-        }
+        problem.check_finite(known)?;
         let scale = problem.offset.iter().fold(T::zero(), |scale, q| scale.max(q.abs()));
         let alone = |i: usize| problem.offset[i].abs() / problem.delassus(i, i).sqrt();
         let coupled = (0..problem.size()).filter(|&i| problem.delassus(i, i) > T::zero());

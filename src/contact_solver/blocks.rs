@@ -1,7 +1,7 @@
 //! Problems with cones, block by block: when they count as solved, and sweeps over their blocks.
 
 use super::cone::Cone;
-use super::{ContactFailure, ContactProblem};
+use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::real::Real;
 use std::ops::Range;
 
@@ -21,15 +21,12 @@ impl<T: Real> BlockAcceptance<T> {
         multipliers: &mut [T],
     ) -> Result<Self, ContactFailure<T>> {
         multipliers.fill(T::zero());
-        let finite = |i: &usize| problem.offset[*i].is_finite() && T::all_finite(problem.row(*i));
-        if let Some(row) = (0..problem.size()).find(|i| !finite(i)) {
-            return Err(ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() });
-        }
+        problem.check_finite(false)?;
         let Self { accepted } = Self::of(problem, tolerance);
         for (rows, set) in problem.blocks() {
             let row = rows.start;
-            let free = set.friction().is_none() && set.nearest(-T::one()) < T::zero();
-            let miss = if free { problem.offset[row].abs() } else { -problem.offset[row] };
+            let q = problem.offset[row];
+            let miss = if set == AdmissibleSet::Free { q.abs() } else { -q };
             if problem.delassus(row, row) <= T::zero() && miss > accepted.max(problem.tolerance[row]) {
                 return Err(ContactFailure::NotConverged { iterations: 0, row, residual: miss });
             }
@@ -107,13 +104,7 @@ fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers:
         before[..rows.len()].copy_from_slice(&multipliers[rows.clone()]);
         let own = rows.clone();
         match set.friction() {
-            None => {
-                let (row, diagonal) = (rows.start, problem.delassus(rows.start, rows.start));
-                if diagonal > T::zero() {
-                    let correction = omega * problem.gap(row, multipliers) / diagonal;
-                    multipliers[row] = set.nearest(multipliers[row] - correction);
-                }
-            }
+            None => relax_row(problem, (rows.start, set), omega, multipliers),
             Some(friction) => {
                 let solved = alone(problem, rows.clone(), T::of(friction), multipliers).solve();
                 for (multiplier, solved) in multipliers[rows.clone()].iter_mut().zip(solved) {
@@ -130,6 +121,20 @@ fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers:
         }
     }
     largest
+}
+
+/// A row without friction closes its gap, as far as its multiplier may; without W_ii it is left out.
+pub(super) fn relax_row<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    (row, set): (usize, AdmissibleSet),
+    omega: T,
+    multipliers: &mut [T],
+) {
+    let diagonal = problem.delassus(row, row);
+    if diagonal > T::zero() {
+        let correction = omega * problem.gap(row, multipliers) / diagonal;
+        multipliers[row] = set.nearest(multipliers[row] - correction);
+    }
 }
 
 /// A block while the others keep their multipliers.

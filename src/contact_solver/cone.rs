@@ -44,12 +44,12 @@ impl<T: Real> Cone<T> {
             _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
         };
         let tangential = |gamma: T| solve_two(schur, gamma, c);
-        let beyond = |f: [T; 2]| length(f) - friction * normal(f);
+        let beyond = |f: [T; 2]| f[0].hypot(f[1]) - friction * normal(f);
         let held = tangential(T::zero());
         if beyond(held) <= T::zero() && held.iter().all(|f| f.is_finite()) {
             return [normal(held), held[0], held[1]];
         }
-        if length(c) == T::zero() {
+        if c == [T::zero(); 2] {
             return [normal([T::zero(); 2]), T::zero(), T::zero()];
         }
         let direction =
@@ -97,7 +97,7 @@ fn slip_direction<T: Real>(
         }
     }
     let f = tangential(high);
-    let length = length(f);
+    let length = f[0].hypot(f[1]);
     if length > T::zero() { f.map(|f| f / length) } else { [T::zero(); 2] }
 }
 
@@ -106,14 +106,4 @@ fn solve_two<T: Real>(s: [[T; 2]; 2], gamma: T, c: [T; 2]) -> [T; 2] {
     let [[a, b], [d, e]] = [[s[0][0] + gamma, s[0][1]], [s[1][0], s[1][1] + gamma]];
     let determinant = a * e - b * d;
     [(b * c[1] - e * c[0]) / determinant, (d * c[0] - a * c[1]) / determinant]
-}
-
-/// |f|, without overflow.
-pub(super) fn length<T: Real>(f: [T; 2]) -> T {
-    let most = f[0].abs().max(f[1].abs());
-    if most > T::zero() && most.is_finite() {
-        most * ((f[0] / most) * (f[0] / most) + (f[1] / most) * (f[1] / most)).sqrt()
-    } else {
-        f[0].abs() + f[1].abs()
-    }
 }

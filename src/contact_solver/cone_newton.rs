@@ -11,7 +11,8 @@ use crate::real::Real;
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
     factor: DenseCholesky<T>,
-    /// Rows that take part.
+    /// What each block is, and the rows of those that are not open.
+    statuses: Vec<Status<T>>,
     rows: Vec<usize>,
     matrix: Vec<T>,
     right: Vec<T>,
@@ -40,8 +41,8 @@ const LEAST_SHARE: f64 = 1e-6;
 /// Sweeps that go on alone in the end.
 const LAST_SWEEPS: usize = 20_000;
 
-/// What a row of a block is in an iteration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a block is in an iteration.
+#[derive(Clone, Copy, Debug)]
 enum Status<T> {
     /// λ = 0.
     Open,
@@ -155,22 +156,23 @@ impl<T: Real> ConeNewton<T> {
 
     /// One iteration; says whether its equations could be solved.
     fn iterate(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> bool {
-        let Self { factor, rows, matrix, right, y, .. } = self;
+        let Self { factor, statuses, rows, matrix, right, y, .. } = self;
         y.clear();
         y.extend((0..problem.size()).map(|row| problem.gap(row, multipliers)));
         rows.clear();
+        statuses.clear();
         for (block, set) in problem.blocks() {
-            match status(problem, block.start, set, multipliers, y) {
-                Status::Open => {}
-                Status::Held | Status::Slides { .. } => rows.extend(block),
+            let status = status(problem, block.start, set, multipliers, y);
+            statuses.push(status);
+            if !matches!(status, Status::Open) {
+                rows.extend(block);
             }
         }
         let size = rows.len();
         matrix.clear();
         right.clear();
-        for (block, set) in problem.blocks() {
-            let status = status(problem, block.start, set, multipliers, y);
-            if status == Status::Open {
+        for ((block, set), &status) in problem.blocks().zip(statuses.iter()) {
+            if matches!(status, Status::Open) {
                 continue;
             }
             let first = block.start;
@@ -215,7 +217,6 @@ impl<T: Real> ConeNewton<T> {
             return false;
         }
         factor.solve(right);
-        // (Not before: what a block is depends on its multipliers.)
         multipliers.fill(T::zero());
         for (&row, &value) in rows.iter().zip(right.iter()) {
             multipliers[row] = value;

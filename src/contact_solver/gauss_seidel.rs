@@ -1,7 +1,7 @@
 //! Projected Gauss–Seidel: row by row, robust, for many rows and moderate accuracy.
 
 use super::acceptance::Settings;
-use super::blocks::{BlockAcceptance, failure};
+use super::blocks::{BlockAcceptance, failure, relax_row};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -105,12 +105,8 @@ impl<T: Real> GaussSeidel<T> {
 
 /// One sweep with relaxation factor `omega`; rows without W_ii are left out.
 pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
-    for i in 0..problem.size() {
-        let diagonal = problem.delassus(i, i);
-        if diagonal > T::zero() {
-            let correction = omega * problem.gap(i, multipliers) / diagonal;
-            multipliers[i] = problem.sets[i].nearest(multipliers[i] - correction);
-        }
+    for (i, &set) in problem.sets.iter().enumerate() {
+        relax_row(problem, (i, set), omega, multipliers);
     }
 }
 

@@ -261,8 +261,8 @@ impl<T: Real> ContactRowsWork<T> {
         let many = 16 * constraints.len() > values.len();
         let ends = approach > 0.0 && many && constraints.laws().are_uniform() && !level.is_velocity();
         let far = ends.then(|| {
-            let way =
-                g.largest_row() * T::largest(&new.v) + rates.iter().fold(T::zero(), |most, x| most.max(x.rate.abs()));
+            let way = g.largest_row() * T::largest(&new.v)
+                + rates[..constraints.len()].iter().fold(T::zero(), |most, x| most.max(x.rate.abs()));
             (g.largest_row() * T::largest(values), T::of(approach * h) * way)
         });
         for row in 0..constraints.len() {
