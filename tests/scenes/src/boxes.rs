@@ -36,6 +36,16 @@ pub fn pile(shifts: &[[f64; 2]]) -> Vec<Vec<f64>> {
     rows
 }
 
+/// The same pile in the plane of the first and the last axis: two corners a box, two rows a corner.
+pub fn in_plane(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut place = 0..;
+    rows.retain(|_| place.next().is_some_and(|row| row / 3 % 4 < 2 && row % 3 < 2));
+    for row in &mut rows {
+        row.iter_mut().enumerate().filter(|(k, _)| ![0, 2, 4].contains(&(k % 6))).for_each(|(_, entry)| *entry = 0.0);
+    }
+    rows
+}
+
 /// W and q of a pile whose boxes would move so without contact.
 pub fn problem(rows: &[Vec<f64>], free: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let inverse = |k: usize| if k % 6 < 3 { MASS.recip() } else { INERTIA[k % 6 - 3].recip() };
