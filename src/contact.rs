@@ -15,6 +15,7 @@ mod obstacle;
 mod rows;
 #[cfg(feature = "search")]
 mod surface;
+mod tangents;
 
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub use contacts::{Contact, Contacts};
@@ -32,6 +33,7 @@ pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
 #[cfg(feature = "search")]
 pub use surface::Facet;
+pub(crate) use tangents::Tangents;
 
 pub use crate::contact_id::ContactId;
 use crate::error::{Error, Result};

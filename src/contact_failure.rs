@@ -24,6 +24,18 @@ pub enum ContactFailure<T> {
         /// Its residual, in the unit of y.
         residual: T,
     },
+    /// A contact for which friction leaves no way out (Painlevé): sliding on, every force that presses closes the gap by
+    /// more than it opens it, μ |W_nt| ≥ W_nn, and the problem was not solved.
+    Jammed {
+        /// The first row of the contact.
+        row: usize,
+        /// μ.
+        friction: f64,
+        /// W_nn: what a unit of the normal multiplier adds to the gap.
+        normal: T,
+        /// W_nt: what a unit of friction adds to it, in the direction in which that is most.
+        coupling: T,
+    },
     /// The problem has a contact with friction, and the solver takes none; nothing was done.
     Friction {
         /// The first row of the contact.
@@ -48,6 +60,14 @@ impl<T: Real> std::fmt::Display for ContactFailure<T> {
             Self::NotConverged { iterations, row, residual } => {
                 let residual = residual.value();
                 write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
+            }
+            Self::Jammed { row, friction, normal, coupling } => {
+                let (normal, coupling) = (normal.value(), coupling.value());
+                write!(
+                    f,
+                    "the contact of row {row} jams: with μ = {friction} friction moves its gap by {friction} × \
+                     {coupling:e} where the normal force moves it by {normal:e}"
+                )
             }
             Self::Friction { row } => {
                 write!(f, "row {row} is that of a contact with friction; use ActiveSet or GaussSeidel")

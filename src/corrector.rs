@@ -9,6 +9,7 @@ mod laursen_love;
 mod persistency;
 mod prediction;
 mod release;
+mod rubbing_problem;
 mod zero_acceleration;
 
 pub(crate) use crate::contact::{ErasedGaps, Gaps, rounding};
@@ -23,6 +24,7 @@ pub use laursen_love::LaursenLove;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
+pub(crate) use rubbing_problem::{Block, Rubbing, slides};
 pub use zero_acceleration::ZeroAcceleration;
 
 use crate::error::Result;
@@ -81,6 +83,16 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
+    /// Whether it can act where contacts have friction, or why not; asked once, at build. Default: it cannot. (What is
+    /// made of [`Correction::solve_velocity_jumps`] and the other three of these methods can.)
+    ///
+    /// # Errors
+    ///
+    /// The reason, as from [`check`](Self::check).
+    fn check_friction(&self) -> std::result::Result<(), &'static str> {
+        Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none")
+    }
+
     /// Whether [`predict`](Self::predict) does anything; memory for it is reserved only then.
     fn predicts(&self) -> bool {
         false
@@ -128,6 +140,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
         (**self).check_damping(tableau)
+    }
+    fn check_friction(&self) -> std::result::Result<(), &'static str> {
+        (**self).check_friction()
     }
     fn predicts(&self) -> bool {
         (**self).predicts()

@@ -56,6 +56,16 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
+    /// Memory for [`factorize_general`](Self::factorize_general) of so many rows.
+    pub(crate) fn reserve_general(&mut self, size: usize) {
+        let Self { l, first, diagonal, independent, .. } = self;
+        l.reserve((size * size).saturating_sub(l.len()));
+        diagonal.reserve(size.saturating_sub(diagonal.len()));
+        for list in [first, independent] {
+            list.reserve(size.saturating_sub(list.len()));
+        }
+    }
+
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
     /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row, and so does one

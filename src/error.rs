@@ -287,6 +287,25 @@ pub enum Error {
         /// The violation, in units of the gap.
         violation: f64,
     },
+    /// Friction leaves a contact no way out: sliding on, no force of it can stop the approach (Painlevé), since
+    /// μ |W_nt| ≥ W_nn. Bodies would jam, or jump; a model that resolves what happens then has compliance.
+    #[error(
+        "t = {t:e}: contact {contact} jams: with μ = {friction} a unit of its force closes the gap by {friction} × \
+         {coupling:e} through friction and opens it by {normal:e} only; lower μ, or give the contact compliance \
+         (`ContactLaw::Penalty`)"
+    )]
+    Jammed {
+        /// Time of the stage.
+        t: f64,
+        /// The contact.
+        contact: ContactId,
+        /// μ.
+        friction: f64,
+        /// W_nn: what a unit of the normal multiplier adds to the gap.
+        normal: f64,
+        /// W_nt: what a unit of friction adds to it, in the direction in which that is most.
+        coupling: f64,
+    },
     /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver
     /// is for symmetric problems.
     #[error(
@@ -558,6 +577,7 @@ impl Error {
             Self::Contact { .. }
                 | Self::Frame { .. }
                 | Self::ContradictoryContacts { .. }
+                | Self::Jammed { .. }
                 | Self::ContactLost { .. }
                 | Self::PassedThrough { .. }
                 | Self::NewtonNotConverged { .. }

@@ -275,6 +275,10 @@ fn of_frame<T: Real>(failure: ContactFailure<T>, nodes: &[usize]) -> ContactFail
         ContactFailure::NotConverged { iterations, row, residual } => {
             ContactFailure::NotConverged { iterations, row: nodes[row], residual: residual.value() }
         }
+        ContactFailure::Jammed { row, friction, normal, coupling } => {
+            let [normal, coupling] = [normal, coupling].map(Real::value);
+            ContactFailure::Jammed { row: nodes[row], friction, normal, coupling }
+        }
         ContactFailure::Friction { row } => ContactFailure::Friction { row: nodes[row] },
         ContactFailure::Unsymmetric { row, other } => {
             ContactFailure::Unsymmetric { row: nodes[row], other: nodes[other] }

@@ -46,6 +46,7 @@ mod run;
 mod scheme;
 #[cfg(feature = "serde")]
 mod settings;
+mod slip;
 mod stability;
 mod stage;
 mod stage_vectors;

@@ -11,6 +11,7 @@ use contact_dynamics::{
     LinearSolver, LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
+use contact_dynamics_scenes::bed::Bed;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::masses::{Takers, Treatment};
@@ -30,6 +31,41 @@ fn steps_do_not_allocate() {
     iterations();
     frames();
     rotors();
+    friction();
+}
+
+/// A bar on a rough bed that comes to rest, and a block that is thrown along a rough floor: once all contacts have
+/// pressed nothing is allocated.
+fn friction() {
+    let bed = Bed::new(30);
+    for scheme in all().into_iter().filter(Listed::takes_multipliers) {
+        let correction = PersistencyCorrection::with_history_projection();
+        let correctors: Vec<Box<dyn Corrector<f64>>> =
+            if scheme.takes_corrections() { vec![Box::new(correction)] } else { Vec::new() };
+        let mut run = bed.run((scheme.make)(), correctors, 0.5).unwrap();
+        for _ in 0..10 {
+            run.step().unwrap();
+        }
+        assert_steps_allocate_nothing(&mut run, 300, 0, &format!("friction, {}", scheme.name()));
+    }
+    let solid = Solid::block([1.0; 3], [3; 3], Material { young: 1e3, poisson: 0.3, density: 1.0 });
+    let nodes: Vec<usize> = (0..solid.nodes.len()).filter(|&n| solid.nodes[n][2] == 0.0).collect();
+    let floor = Plane::new([0.0; 3], [0.1, 0.0, 1.0]).unwrap();
+    let floor = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &nodes).unwrap().friction(0.3);
+    let mass = solid.lumped_mass::<f64>();
+    let system = solid.system().load(move |_, f| {
+        f.iter_mut().zip(&mass).skip(2).step_by(3).for_each(|(f, m)| *f = -10.0 * m);
+    });
+    let mut run = Simulation::builder(system, Composite, 5e-3)
+        .displacement(solid.uniform([0.0, 0.0, 0.05]))
+        .velocity(solid.uniform([1.0, 0.5, 0.0]))
+        .constraint(floor)
+        .build()
+        .unwrap();
+    for _ in 0..60 {
+        run.step().unwrap();
+    }
+    assert_steps_allocate_nothing(&mut run, 300, 8, "friction of a block");
 }
 
 /// Takes so many steps of a run in which contacts change at least so often, from its start to their end.

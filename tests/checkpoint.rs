@@ -12,6 +12,7 @@ use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::hosts::Hooked;
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::matrix;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -457,7 +458,7 @@ fn other_files_and_formats_are_refused_in_words() {
     let [files, _] = samples();
     let read = |text: &str| serde_json::from_str::<Checkpoint<f64>>(text).unwrap_err().to_string();
     for (written, words) in [
-        (files.text.replace("checkpoint 1", "checkpoint 7"), ["format 7", "reads format 1"]),
+        (files.text.replace("checkpoint 2", "checkpoint 7"), ["format 7", "reads format 2"]),
         (files.text.replace("contact-dynamics checkpoint", "results"), ["no checkpoint", "contact-dynamics"]),
         (files.text.replace("\"f64\"", "\"f16\""), ["f16", "f64"]),
         ("7".to_owned(), ["a checkpoint of contact-dynamics", "integer"]),
@@ -476,13 +477,16 @@ fn other_files_and_formats_are_refused_in_words() {
 fn another_layout_is_another_format() {
     let [files, _] = samples();
     let document: Value = serde_json::from_str(&files.text).unwrap();
-    assert_eq!(document["format"], "contact-dynamics checkpoint 1");
+    assert_eq!(document["format"], "contact-dynamics checkpoint 2");
     // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
     for (path, names) in [
         ("", "format history rows scalar scheme state"),
         ("/state", "contacts motion shown"),
         ("/state/motion", "acceleration displacement time velocity"),
-        ("/state/contacts", "closed dissipated forces gaps ids impulses lambda_a lambda_v raw_forces"),
+        (
+            "/state/contacts",
+            "closed dissipated forces friction gaps ids impulses lambda_a lambda_v raw_forces sliding slips",
+        ),
         ("/history", "clock known made_with overclosures pace past slopes smooth trail trail_room unmoved"),
         ("/history/clock", "elapsed h origin steps"),
         ("/history/pace", "grown level nominal patience position steps"),
@@ -627,4 +631,55 @@ fn a_fall_with_the_correction_of_the_past_goes_on_bit_for_bit() {
         run.step().unwrap();
     }
     go_on(&mut run, |checkpoint| build().resume_from(checkpoint).build().unwrap(), 100, "block");
+}
+
+/// Masses that slide and stick, one of them not rough: friction forces, slips and flags are part of the file, and a file
+/// with wrong ones is refused.
+#[test]
+fn friction_goes_on_too() {
+    let scene = || {
+        let k = matrix(6, (0..3).flat_map(|m| [(2 * m, 2 * m, 30.0), (2 * m + 1, 2 * m + 1, 0.0)]));
+        let system = LinearSystem::lumped(vec![1.0; 6], k).unwrap().load(|_, f: &mut [f64]| {
+            (f[1], f[3], f[5]) = (-10.0, -10.0, -10.0);
+        });
+        let floor = LinearRows::new()
+            .unilateral(&[(1, 1.0)], 0.0)
+            .friction(0.3, &[&[(0, 1.0)]])
+            .unilateral(&[(3, 1.0)], 0.0)
+            .unilateral(&[(5, 1.0)], 0.01)
+            .friction(0.1, &[&[(4, 1.0)]]);
+        let velocity = vec![1.0, 0.0, 1.0, 0.0, 2.0, -1.0];
+        Simulation::builder(system, Composite, 0.01).velocity(velocity).constraint(floor).energy_balance()
+    };
+    let mut run = scene().build().unwrap();
+    for steps in [3, 20, 60] {
+        for _ in 0..steps {
+            run.step().unwrap();
+        }
+        let files = save(&run);
+        let mut resumed = scene().resume_from(read::<f64>(&files)[0].clone()).build().unwrap();
+        let mut other = scene().resume_from(run.checkpoint()).build().unwrap();
+        for _ in 0..30 {
+            resumed.step().unwrap();
+            other.step().unwrap();
+        }
+        assert!(resumed.state() == other.state());
+        assert_eq!(resumed.energy(), other.energy());
+    }
+    let mut document: Value = serde_json::from_str(&save(&run).text).unwrap();
+    assert_eq!(document["state"]["contacts"]["friction"], json!([[0, 0.3, 1], [2, 0.1, 1]]));
+    for (field, value, words) in [
+        ("friction", json!([[0, 0.3, 1]]), "contact forces"),
+        ("friction", json!([[2, 0.3, 1], [0, 0.1, 1]]), "contact with friction"),
+        ("friction", json!([[0, -0.3, 1], [2, 0.1, 1]]), "friction coefficient"),
+        ("friction", json!([[0, 0.3, 3], [2, 0.1, 1]]), "tangents of a contact"),
+        ("friction", json!([[0, 0.3, 1], [7, 0.1, 1]]), "contact with friction"),
+        ("sliding", json!([true]), "sliding contacts"),
+        ("slips", json!([0.0]), "slips"),
+    ] {
+        let before = std::mem::replace(&mut document["state"]["contacts"][field], value);
+        let refused = serde_json::from_str::<Checkpoint<f64>>(&document.to_string()).unwrap_err().to_string();
+        assert!(refused.contains(words), "{field}: {refused}");
+        document["state"]["contacts"][field] = before;
+    }
 }

@@ -113,6 +113,21 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Rates::Differences)
     }
 
+    /// The parts of the slip, and of its rate, that do not come from v and a, one entry a tangent, in the order in which
+    /// [`contacts`](Self::contacts) gives them: slip = H v + `rate`, and where contact sticks H a + `acceleration` = 0.
+    /// For an obstacle whose points at the contact move with velocity w and acceleration b these are −t·w and −t·b, t
+    /// the direction of the tangent. Asked of constraints with [friction](super::Contact::friction) only. Default:
+    /// [`Rates::Zero`], as of obstacles at rest, and of bodies whose dofs are all in H. ([`Rates::Differences`] is no
+    /// answer here.)
+    ///
+    /// # Errors
+    ///
+    /// As of [`gaps`](Self::gaps).
+    fn slip_rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let _ = (t, u, v, rates);
+        Ok(Rates::Zero)
+    }
+
     /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change,
     /// and their rows [follow](Self::follow) u.
     ///
@@ -197,6 +212,9 @@ macro_rules! forward {
             }
             fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
                 (**self).rates(t, u, v, rates)
+            }
+            fn slip_rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+                (**self).slip_rates(t, u, v, rates)
             }
             fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
                 (**self).search(t, u, v, ahead)

@@ -2,6 +2,7 @@
 
 use super::{ContactJacobian, ContactLaw};
 use crate::real::Real;
+use std::ops::Range;
 
 /// What a constraint says of its candidates, in their order: filled by
 /// [`ContactConstraint::contacts`](super::ContactConstraint::contacts), one [`push`](Self::push) a candidate.
@@ -15,11 +16,11 @@ use crate::real::Real;
 ///
 /// let mut contacts = Contacts::new();
 /// // A node (dofs at places 0 and 1) against a slope, and a spring between two others.
-/// contacts.push((7, 0), ContactLaw::Rigid, &[(0, 0.6), (1, 0.8)]).tangent(&[(0, 0.8), (1, -0.6)]).magnitude(2.0);
-/// contacts.push((8, 0), ContactLaw::Penalty { stiffness: 1e3 }, &[(2, -1.0), (3, 1.0)]);
+/// contacts.push((7, 0), ContactLaw::Rigid, &[(0, 0.6), (1, 0.8)]).tangent(&[(0, 0.8), (1, -0.6)]).friction(0.3);
+/// contacts.push((8, 0), ContactLaw::Penalty { stiffness: 1e3 }, &[(2, -1.0), (3, 1.0)]).magnitude(2.0);
 /// assert_eq!((contacts.len(), contacts.name(1)), (2, (8, 0)));
 /// assert_eq!(contacts.row(0).collect::<Vec<_>>(), [(0, 0.6), (1, 0.8)]);
-/// assert_eq!(contacts.tangents(0).len(), 1);
+/// assert_eq!((contacts.tangents(0).len(), contacts.friction(0)), (1, 0.3));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts<T> {
@@ -30,6 +31,7 @@ pub struct Contacts<T> {
     tangents: ContactJacobian<T>,
     /// Where the tangents of each contact begin.
     first_tangents: Vec<usize>,
+    frictions: Vec<f64>,
     positions: Vec<Option<[T; 3]>>,
     normals: Vec<Option<[T; 3]>>,
 }
@@ -43,6 +45,7 @@ impl<T> Default for Contacts<T> {
             magnitudes: Vec::new(),
             tangents: ContactJacobian::default(),
             first_tangents: Vec::new(),
+            frictions: Vec::new(),
             positions: Vec::new(),
             normals: Vec::new(),
         }
@@ -57,13 +60,14 @@ impl<T: Real> Contacts<T> {
 
     /// Forgets all, and keeps the memory.
     pub fn clear(&mut self) {
-        let Self { names, laws, rows, magnitudes, tangents, first_tangents, positions, normals } = self;
+        let Self { names, laws, rows, magnitudes, tangents, first_tangents, frictions, positions, normals } = self;
         names.clear();
         laws.clear();
         rows.clear();
         magnitudes.clear();
         tangents.clear();
         first_tangents.clear();
+        frictions.clear();
         positions.clear();
         normals.clear();
     }
@@ -92,6 +96,7 @@ impl<T: Real> Contacts<T> {
         self.laws.push(law);
         self.magnitudes.push(T::zero());
         self.first_tangents.push(self.tangents.rows());
+        self.frictions.push(0.0);
         self.positions.push(None);
         self.normals.push(None);
         Contact { contacts: self }
@@ -139,8 +144,34 @@ impl<T: Real> Contacts<T> {
 
     /// The rows of [`Contact::tangent`], as (place, weight) pairs.
     pub fn tangents(&self, contact: usize) -> Vec<Vec<(usize, T)>> {
+        self.tangents_of(contact).map(|row| self.tangents.row(row).collect()).collect()
+    }
+
+    /// The friction coefficient of a candidate; zero if none was given.
+    pub fn friction(&self, contact: usize) -> f64 {
+        self.frictions[contact]
+    }
+
+    /// The tangents of all candidates, one after the other; the dofs that they name are places.
+    pub(crate) fn tangent_rows(&self) -> &ContactJacobian<T> {
+        &self.tangents
+    }
+
+    /// Those of a candidate among them.
+    pub(crate) fn tangents_of(&self, contact: usize) -> Range<usize> {
         let end = self.first_tangents.get(contact + 1).copied().unwrap_or(self.tangents.rows());
-        (self.first_tangents[contact]..end).map(|row| self.tangents.row(row).collect()).collect()
+        self.first_tangents[contact]..end
+    }
+
+    /// Whether any candidate has friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        self.frictions.iter().any(|&friction| friction != 0.0)
+    }
+
+    /// The number of rows that candidates have for their friction.
+    pub(crate) fn rubbing_rows(&self) -> usize {
+        let rubs = |contact: &usize| self.frictions[*contact] != 0.0;
+        (0..self.len()).filter(rubs).map(|contact| self.tangents_of(contact).len()).sum()
     }
 
     /// Where a contact is, if its constraint has said so.
@@ -161,10 +192,31 @@ pub struct Contact<'c, T> {
 }
 
 impl<T: Real> Contact<'_, T> {
-    /// A row beside the normal one, orthogonal to it, along which bodies slide: (place, weight) pairs. One in the
-    /// plane, two in space. Kept for output; laws without friction do not read it.
+    /// A row beside the normal one, along which bodies slide: (place, weight) pairs, so that its product with the
+    /// velocities is the slip. One in the plane; two in space, along directions that are orthonormal, for the cone of
+    /// friction is round. Without [`friction`](Self::friction) it is kept for output.
     pub fn tangent(&mut self, row: &[(usize, T)]) -> &mut Self {
         self.contacts.tangents.push(row);
+        self
+    }
+
+    /// The same with a row of a matrix.
+    pub(crate) fn tangent_row(&mut self, (rows, row): (&ContactJacobian<T>, usize)) {
+        self.contacts.tangents.push_row(rows, row);
+    }
+
+    /// The same with the pairs one by one.
+    #[cfg(feature = "search")]
+    pub(crate) fn tangent_entries(&mut self, entries: impl Iterator<Item = (usize, T)>) {
+        self.contacts.tangents.push_entries(entries);
+    }
+
+    /// Coulomb's friction along the [tangents](Self::tangent): the coefficient μ, from 0, the default. |f| ≤ μ p, and f
+    /// opposes the slip. It may be another one after each search: a function of the place, for instance.
+    pub fn friction(&mut self, coefficient: f64) -> &mut Self {
+        if let Some(friction) = self.contacts.frictions.last_mut() {
+            *friction = coefficient;
+        }
         self
     }
 

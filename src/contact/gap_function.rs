@@ -7,6 +7,16 @@ use crate::real::Real;
 
 type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]> + Send + 'a>;
 
+type Tangents<'a, T> = Box<dyn FnMut(f64, &[T], &mut [T]) -> [[T; 2]; 2] + Send + 'a>;
+
+/// The friction of a row.
+struct Friction<'a, T> {
+    coefficient: f64,
+    function: Tangents<'a, T>,
+    /// The places of the dofs with the weights of each tangent, where the row is linearized.
+    rows: Vec<Vec<(usize, T)>>,
+}
+
 /// A row and where it is linearized.
 struct Row<'a, T> {
     function: Function<'a, T>,
@@ -15,6 +25,7 @@ struct Row<'a, T> {
     place: Vec<T>,
     /// Whether there is no gradient there: then there is no gap.
     broken: bool,
+    friction: Option<Friction<'a, T>>,
 }
 
 /// Any number of rows `g(t, x) ≥ 0`, each a smooth function of the displacements x of some dofs.
@@ -133,11 +144,55 @@ impl<'a, T: Real> GapFunction<'a, T> {
     ) -> Self {
         let entries = dofs.iter().map(|&dof| (self.dofs.place(dof), T::zero())).collect();
         let place = vec![T::zero(); dofs.len()];
-        self.rows.push(Row { function: Box::new(function), entries, place, broken: false });
+        self.rows.push(Row { function: Box::new(function), entries, place, broken: false, friction: None });
         for buffer in &mut self.buffers {
             buffer.resize(buffer.len().max(dofs.len()), T::zero());
         }
         self.candidates = 0;
+        self
+    }
+
+    /// Gives friction to the row that was added last: the coefficient μ, from 0, and a function for the rows along which
+    /// it slides, one in the plane, `tangents` = 2 orthonormal ones in space. It is called with t, the displacements of
+    /// the dofs of the row, and a slice for the weights of the tangents, one tangent after the other, whose product with
+    /// the velocities of the dofs is the slip; it returns the velocities of the obstacle along them and its
+    /// accelerations, zero for one at rest.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::{Contacts, GapFunction};
+    ///
+    /// // A bead outside of the unit circle, which turns with 3 rad/s.
+    /// let circle = |_: f64, x: &[f64], _: &[f64], gradient: &mut [f64]| {
+    ///     let r = x[0].hypot(x[1]);
+    ///     gradient.copy_from_slice(&[x[0] / r, x[1] / r]);
+    ///     [r - 1.0, 0.0, 0.0]
+    /// };
+    /// let along = |_: f64, x: &[f64], tangent: &mut [f64]| {
+    ///     let r = x[0].hypot(x[1]);
+    ///     tangent.copy_from_slice(&[-x[1] / r, x[0] / r]);
+    ///     [[3.0, 0.0], [0.0; 2]]
+    /// };
+    /// let mut contact = GapFunction::new(&[0, 1], circle).friction(0.4, 1, along);
+    /// contact.search(0.0, &[0.0, 2.0], &[0.0; 2], 0.0)?;
+    /// assert_eq!(Contacts::of(&contact).tangents(0), [[(0, -1.0), (1, 0.0)]]);
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    #[must_use]
+    pub fn friction(
+        mut self,
+        coefficient: f64,
+        tangents: usize,
+        function: impl FnMut(f64, &[T], &mut [T]) -> [[T; 2]; 2] + Send + 'a,
+    ) -> Self {
+        if let Some(row) = self.rows.last_mut() {
+            let rows = vec![row.entries.clone(); tangents.min(3)];
+            let size = row.entries.len() * rows.len();
+            row.friction = Some(Friction { coefficient, function: Box::new(function), rows });
+            for buffer in &mut self.buffers {
+                buffer.resize(buffer.len().max(size), T::zero());
+            }
+        }
         self
     }
 
@@ -163,10 +218,10 @@ impl<'a, T: Real> GapFunction<'a, T> {
     /// Linearizes all rows at u; whether a gradient changed.
     fn linearize(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs.as_slice().len())?;
-        let Self { rows, buffers: [_, still, gradient], .. } = self;
+        let Self { rows, buffers: [all, still, gradient], .. } = self;
         still.fill(T::zero());
         let mut found = Candidates::Unchanged;
-        for Row { function, entries, place, broken } in rows {
+        for Row { function, entries, place, broken, friction } in rows {
             for (x, &(dof, _)) in place.iter_mut().zip(&*entries) {
                 *x = u[dof];
             }
@@ -176,11 +231,22 @@ impl<'a, T: Real> GapFunction<'a, T> {
             function(t, place, &still[..place.len()], gradient)?;
             // Without a gradient the row stays as it was, and reports a gap that is NaN.
             *broken = !gradient.iter().all(|x| x.is_finite());
-            if !*broken {
-                for ((_, old), &mut new) in entries.iter_mut().zip(gradient) {
-                    if *old != new {
-                        (*old, found) = (new, Candidates::Changed);
-                    }
+            if *broken {
+                continue;
+            }
+            for ((_, old), &mut new) in entries.iter_mut().zip(gradient) {
+                if *old != new {
+                    (*old, found) = (new, Candidates::Changed);
+                }
+            }
+            let Some(Friction { function, rows, .. }) = friction else { continue };
+            let weights = &mut all[..entries.len() * rows.len()];
+            weights.fill(T::nan());
+            function(t, place, weights);
+            for ((_, old), &mut new) in rows.iter_mut().flatten().zip(weights) {
+                // (What is no number is refused where rows are read.)
+                if *old != new {
+                    (*old, found) = (new, Candidates::Changed);
                 }
             }
         }
@@ -194,15 +260,22 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        for (row, Row { entries, .. }) in self.rows[..self.candidates].iter().enumerate() {
-            contacts.push((row, 0), self.law, entries).magnitude(self.scale);
+        for (row, Row { entries, friction, .. }) in self.rows[..self.candidates].iter().enumerate() {
+            let mut contact = contacts.push((row, 0), self.law, entries);
+            contact.magnitude(self.scale);
+            if let Some(Friction { coefficient, rows, .. }) = friction {
+                contact.friction(*coefficient);
+                for tangent in rows {
+                    contact.tangent(tangent);
+                }
+            }
         }
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         let Self { rows, buffers: [_, still, gradient], candidates, .. } = self;
         still.fill(T::zero());
-        for (Row { function, entries, place, broken }, out) in rows[..*candidates].iter_mut().zip(gaps) {
+        for (Row { function, entries, place, broken, .. }, out) in rows[..*candidates].iter_mut().zip(gaps) {
             let [gap, ..] = function(t, place, &still[..place.len()], &mut gradient[..place.len()])?;
             let moved = entries.iter().zip(&*place).map(|(&(dof, weight), &x)| weight * (u[dof] - x));
             *out = if *broken { T::nan() } else { gap + moved.sum() };
@@ -219,6 +292,24 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
             }
             let [_, rate, acceleration] = function(t, x, w, &mut gradient[..entries.len()])?;
             *out = GapRates { rate, acceleration };
+        }
+        Ok(Rates::Given)
+    }
+
+    fn slip_rates(&mut self, t: f64, u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let Self { rows, buffers: [x, _, weights], candidates, .. } = self;
+        let mut rates = rates.iter_mut();
+        for Row { entries, friction, .. } in &mut rows[..*candidates] {
+            let Some(Friction { function, rows, .. }) = friction else { continue };
+            let x = &mut x[..entries.len()];
+            for (x, &(dof, _)) in x.iter_mut().zip(&*entries) {
+                *x = u[dof];
+            }
+            let [velocity, acceleration] = function(t, x, &mut weights[..entries.len() * rows.len()]);
+            for (k, rates) in rates.by_ref().take(rows.len()).enumerate() {
+                let of = |along: [T; 2]| along.get(k).map_or(T::zero(), |x| -*x);
+                *rates = GapRates { rate: of(velocity), acceleration: of(acceleration) };
+            }
         }
         Ok(Rates::Given)
     }

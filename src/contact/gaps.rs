@@ -1,6 +1,6 @@
 //! The gaps of all constraints of a run as one list, for those who read them without knowing the constraints.
 
-use super::{ContactLaw, GapRates};
+use super::{ContactLaw, GapRates, Tangents};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -12,6 +12,12 @@ pub(crate) trait Gaps<T: Real> {
     fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T;
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
+
+    /// Which rows are those of friction.
+    fn tangents(&self) -> &Tangents;
+
+    /// What slips and their rates have of their own, one entry a tangential row.
+    fn slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
 
     /// Gaps, gap rates or gap accelerations (`field` 0, 1, 2) at another motion (time; u, v, a), by rows linearized
     /// there; afterwards rows are those of `here` (time, u) again.

@@ -35,11 +35,13 @@ impl Groups {
         }
     }
 
-    /// Sorts rows by the dofs (below `dofs`) that each of them acts on.
+    /// Sorts rows by the dofs (below `dofs`) that each of them acts on. Rows that are tied to the one before them in
+    /// the list are in its group whatever they act on.
     pub(crate) fn sort<D: Iterator<Item = usize>>(
         &mut self,
         rows: &[usize],
         dofs: usize,
+        is_tied: impl Fn(usize) -> bool,
         acts_on: impl Fn(usize) -> D,
     ) {
         let Self { positions, starts, leader, owner, place, next } = self;
@@ -49,6 +51,9 @@ impl Groups {
         leader.clear();
         leader.extend(0..rows.len());
         for (position, &row) in rows.iter().enumerate() {
+            if position > 0 && is_tied(row) {
+                join(leader, position - 1, position);
+            }
             for dof in acts_on(row) {
                 match owner[dof] {
                     FREE => owner[dof] = position,
@@ -143,13 +148,17 @@ mod tests {
         let dofs: [&[usize]; 5] = [&[0, 1], &[7], &[2, 3], &[3, 0], &[5]];
         let acts_on = |row: usize| dofs[row].iter().copied();
         let mut groups = Groups::default();
-        groups.sort(&[0, 1, 2, 3, 4], 10, acts_on);
+        groups.sort(&[0, 1, 2, 3, 4], 10, |_| false, acts_on);
         let found: Vec<&[usize]> = (0..groups.len()).map(|k| groups.group(k)).collect();
         assert_eq!(found, [&[0, 2, 3][..], &[1], &[4]]);
         // Without the row that ties them; positions count in the list given.
-        groups.sort(&[0, 2, 4], 10, acts_on);
+        groups.sort(&[0, 2, 4], 10, |_| false, acts_on);
         let found: Vec<&[usize]> = (0..groups.len()).map(|k| groups.group(k)).collect();
         assert_eq!(found, [[0], [1], [2]]);
+        // Row 4 is that of the contact before it.
+        groups.sort(&[0, 1, 4, 2], 10, |row| row == 4, acts_on);
+        let found: Vec<&[usize]> = (0..groups.len()).map(|k| groups.group(k)).collect();
+        assert_eq!(found, [&[0][..], &[1, 2], &[3]]);
         groups.together(2);
         assert_eq!((groups.len(), groups.group(0)), (1, &[0, 1][..]));
         groups.together(0);

@@ -236,6 +236,23 @@ impl ContactLaw {
         matches!(self, Self::Rigid | Self::Equality)
     }
 
+    /// Whether the contact may have friction, bounded by μ times the force of the law: not where that may pull, nor
+    /// where it is no force of the instant alone.
+    pub(crate) fn admits_friction(&self) -> bool {
+        match self {
+            Self::Rigid
+            | Self::Restitution { .. }
+            | Self::Penalty { .. }
+            | Self::PowerLaw { .. }
+            | Self::AugmentedLagrangian { .. } => true,
+            Self::Equality
+            | Self::RateCondition
+            | Self::PersistencySwitch
+            | Self::Bipenalty { .. }
+            | Self::StabilizedBipenalty { .. } => false,
+        }
+    }
+
     /// Whether a compliant law reads the gap that the scheme constrains, ahead of the state, beside those of the step.
     pub(crate) fn is_predictive(&self) -> bool {
         matches!(self, Self::StabilizedBipenalty { .. })

@@ -1,13 +1,33 @@
 //! Contact rows with constant G: gap = G u + g0(t).
 
 use super::dofs::DofList;
-use super::obstacle::unit;
+use super::obstacle::{across, unit};
 use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, Contacts, GapRates, Rates, Variation};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::sparse::SparseRowMatRef;
+use std::ops::Range;
 
 type OffsetFunction<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
+type Drag<'a, T> = Box<dyn FnMut(f64) -> [[T; 2]; 2] + Send + 'a>;
+
+/// The friction of a row.
+struct Friction<'a, T> {
+    row: usize,
+    coefficient: f64,
+    /// Rows of `LinearRows::tangents`.
+    tangents: Range<usize>,
+    drag: Option<Drag<'a, T>>,
+}
+
+impl<T> std::fmt::Debug for Friction<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Friction")
+            .field("row", &self.row)
+            .field("coefficient", &self.coefficient)
+            .finish_non_exhaustive()
+    }
+}
 
 /// The part g0 of a gap that does not depend on u: constant, or a function of time with its first two derivatives.
 pub enum GapOffset<'a, T> {
@@ -40,6 +60,7 @@ impl<T: Real> From<T> for GapOffset<'_, T> {
 }
 
 /// Any number of rows `g = G u + g0(t)` with constant G. Rows are identified by their order: (row, 0).
+/// [`friction`](Self::friction) gives them tangents.
 ///
 /// ```
 /// use contact_dynamics::LinearRows;
@@ -61,6 +82,10 @@ pub struct LinearRows<'a, T: Real> {
     jacobian: ContactJacobian<T>,
     laws: Vec<ContactLaw>,
     offsets: Vec<GapOffset<'a, T>>,
+    /// In places of the list too.
+    tangents: ContactJacobian<T>,
+    /// In the order of their rows.
+    frictions: Vec<Friction<'a, T>>,
     coordinates: T,
     /// Whether the numbers given have been looked at.
     checked: bool,
@@ -76,7 +101,9 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// No rows yet.
     pub fn new() -> Self {
         let (dofs, jacobian) = (DofList::default(), ContactJacobian::default());
-        Self { dofs, jacobian, laws: Vec::new(), offsets: Vec::new(), coordinates: T::zero(), checked: false }
+        let (tangents, frictions) = (ContactJacobian::default(), Vec::new());
+        let (laws, offsets, coordinates) = (Vec::new(), Vec::new(), T::zero());
+        Self { dofs, jacobian, laws, offsets, tangents, frictions, coordinates, checked: false }
     }
 
     /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
@@ -135,9 +162,25 @@ impl<'a, T: Real> LinearRows<'a, T> {
         offset: impl Into<GapOffset<'a, T>>,
     ) -> Result<Self> {
         let normal = unit("the normal of a pair of nodes", normal)?;
-        let from = first.into_iter().zip(normal.map(|n| -n));
-        let entries: Vec<_> = from.chain(second.into_iter().zip(normal)).collect();
-        Ok(self.row(law, &entries, offset))
+        Ok(self.row(law, &apart(first, second, normal), offset))
+    }
+
+    /// The contact of a [`pair`](Self::pair) with friction: along one direction in the plane, two in space.
+    ///
+    /// # Errors
+    ///
+    /// As of `pair`.
+    pub fn pair_with_friction<const D: usize>(
+        self,
+        (law, friction): (ContactLaw, f64),
+        first: [usize; D],
+        second: [usize; D],
+        normal: [T; D],
+        offset: impl Into<GapOffset<'a, T>>,
+    ) -> Result<Self> {
+        let tangents = across(unit("the normal of a pair of nodes", normal)?).map(|t| apart(first, second, t));
+        let tangents: Vec<_> = tangents.iter().map(|tangent| &tangent[..]).take(D.saturating_sub(1)).collect();
+        Ok(self.pair(law, first, second, normal, offset)?.friction(friction, &tangents))
     }
 
     /// Adds a row under any law.
@@ -148,6 +191,55 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self.laws.push(law);
         self.offsets.push(offset.into());
         self.checked = false;
+        self
+    }
+
+    /// Gives friction to the row that was added last: the coefficient μ, from 0, and the rows along which it slides, as
+    /// (dof, weight) pairs; one in the plane, two of orthonormal directions in space. Slip is their product with the
+    /// velocities. Nothing if there is no row.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    ///
+    /// // A block of mass 2 on a floor (dofs x, y), thrown along it with speed 1; g = 10, μ = 0.25.
+    /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
+    /// let block = LinearSystem::lumped(vec![2.0; 2], free)?.load(|_, f| f[1] = -20.0);
+    /// let floor = LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.25, &[&[(0, 1.0)]]);
+    /// let mut run = Simulation::builder(block, Newmark::trapezoidal(), 0.01)
+    ///     .velocity(vec![1.0, 0.0])
+    ///     .constraint(floor)
+    ///     .build()?;
+    /// run.run_until(0.2, &mut ())?;
+    /// assert!((run.state().velocity()[0] - 0.5).abs() < 1e-12);
+    /// assert!((run.state().contacts().friction_forces(0)[0] + 5.0).abs() < 1e-12);
+    /// run.run_until(1.0, &mut ())?;
+    /// assert!((run.state().displacement()[0] - 0.2).abs() < 1e-12); // v²/(2 μ g)
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64, tangents: &[&[(usize, T)]]) -> Self {
+        let Some(row) = self.laws.len().checked_sub(1) else { return self };
+        self.frictions.retain(|friction| friction.row != row);
+        let first = self.tangents.rows();
+        for entries in tangents {
+            let entries = entries.iter().map(|&(dof, weight)| (self.dofs.place(dof), weight));
+            self.tangents.push_entries(entries);
+        }
+        self.frictions.push(Friction { row, coefficient, tangents: first..self.tangents.rows(), drag: None });
+        self.checked = false;
+        self
+    }
+
+    /// Lets the obstacle of the row that was added last move along its tangents, as a belt does: the closure returns its
+    /// velocities along them at t, and its accelerations. Nothing if the row has no [`friction`](Self::friction).
+    #[must_use]
+    pub fn dragging(mut self, drag: impl FnMut(f64) -> [[T; 2]; 2] + Send + 'a) -> Self {
+        let row = self.laws.len().wrapping_sub(1);
+        if let Some(friction) = self.frictions.last_mut().filter(|friction| friction.row == row) {
+            friction.drag = Some(Box::new(drag));
+        }
         self
     }
 
@@ -188,14 +280,28 @@ impl<'a, T: Real> LinearRows<'a, T> {
     }
 }
 
+/// The row of a distance along a direction from one node to another.
+fn apart<T: Real, const D: usize>(first: [usize; D], second: [usize; D], direction: [T; D]) -> Vec<(usize, T)> {
+    let from = first.into_iter().zip(direction.map(|n| -n));
+    from.chain(second.into_iter().zip(direction)).collect()
+}
+
 impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     fn dofs(&self) -> &[usize] {
         self.dofs.as_slice()
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
+        let mut frictions = self.frictions.iter().peekable();
         for (row, &law) in self.laws.iter().enumerate() {
-            contacts.push_row((row, 0), law, (&self.jacobian, row)).magnitude(self.coordinates);
+            let mut contact = contacts.push_row((row, 0), law, (&self.jacobian, row));
+            contact.magnitude(self.coordinates);
+            while let Some(friction) = frictions.next_if(|friction| friction.row == row) {
+                contact.friction(friction.coefficient);
+                for tangent in friction.tangents.clone() {
+                    contact.tangent_row((&self.tangents, tangent));
+                }
+            }
         }
     }
 
@@ -229,6 +335,21 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
                     GapRates { rate, acceleration }
                 }
             };
+        }
+        Ok(Rates::Given)
+    }
+
+    fn slip_rates(&mut self, t: f64, _u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        if self.frictions.iter().all(|friction| friction.drag.is_none()) {
+            return Ok(Rates::Zero);
+        }
+        let mut rates = rates.iter_mut();
+        for friction in &mut self.frictions {
+            let [velocity, acceleration] = friction.drag.as_mut().map_or([[T::zero(); 2]; 2], |drag| drag(t));
+            for (k, rates) in rates.by_ref().take(friction.tangents.len()).enumerate() {
+                let of = |along: [T; 2]| along.get(k).map_or(T::zero(), |x| -*x);
+                *rates = GapRates { rate: of(velocity), acceleration: of(acceleration) };
+            }
         }
         Ok(Rates::Given)
     }

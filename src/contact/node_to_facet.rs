@@ -5,6 +5,7 @@ mod passage;
 mod rows;
 
 use super::dofs::DofList;
+use super::obstacle::across;
 use super::surface::{Facet, Neighborhood, Point, Shape, Surface, overhang};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_mesh};
 use crate::error::{Error, Result, positive};
@@ -135,6 +136,7 @@ pub struct NodeToFacet<T: Real> {
     bodies: [Vec<usize>; 2],
     passes: Vec<Pass>,
     law: ContactLaw,
+    friction: f64,
     reach: f64,
     skin: Option<f64>,
     rebuilds: usize,
@@ -253,6 +255,7 @@ impl<T: Real> NodeToFacet<T> {
             passes: vec![Pass::new(bodies[0].clone())],
             bodies,
             law: ContactLaw::Rigid,
+            friction: 0.0,
             reach,
             skin: None,
             rebuilds: 0,
@@ -268,6 +271,31 @@ impl<T: Real> NodeToFacet<T> {
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
+        self
+    }
+
+    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of a node against the point of the facet that
+    /// it stands on: bodies that turn together do not slip.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{Contacts, NodeToFacet};
+    /// use contact_dynamics::ContactConstraint;
+    ///
+    /// // A node in the middle of a segment, and touching it.
+    /// let coordinates = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]];
+    /// let dofs = [[0, 1], [2, 3], [4, 5]];
+    /// let mut contact =
+    ///     NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[1, 0]])?.friction(0.3);
+    /// contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0)?;
+    /// let contacts = Contacts::of(&contact);
+    /// assert_eq!((contacts.friction(0), contacts.tangents(0).len()), (0.3, 1));
+    /// let slip: f64 = contacts.tangents(0)[0].iter().map(|&(place, w)| w * [5.0, 0.0, 5.0, 0.0, 5.0, 0.0][place]).sum();
+    /// assert_eq!(slip, 0.0); // all of them move along the segment
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64) -> Self {
+        self.friction = coefficient;
         self
     }
 
@@ -398,11 +426,27 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         for (row, (&(node, pass), stand)) in identities.iter().zip(stands).enumerate() {
             let position = self.positions[node];
             let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
-            contacts
-                .push_row((node, pass), self.law, (jacobian, row))
-                .magnitude(size)
-                .position(position.map(T::of))
-                .normal(stand.normal.map(T::of));
+            let mut contact = contacts.push_row((node, pass), self.law, (jacobian, row));
+            contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
+            if self.friction == 0.0 {
+                continue;
+            }
+            contact.friction(self.friction);
+            let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
+            let vertices = surface.facets()[stand.facet].nodes();
+            let [x, y, _] = stand.normal;
+            let tangents = match self.dimension {
+                2 => [[y, -x, 0.0], [0.0; 3]],
+                _ => across(stand.normal),
+            };
+            for tangent in tangents.into_iter().take(self.dimension - 1) {
+                let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
+                let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
+                    let dofs = &self.dofs[node][..self.dimension];
+                    dofs.iter().zip(tangent).map(move |(&dof, along)| (dof, T::of(share * along)))
+                });
+                contact.tangent_entries(entries);
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! Nodes of a deformable body against a rigid obstacle, which may move.
 
 use super::dofs::DofList;
-use super::obstacle::{dot, minus};
+use super::obstacle::{across, dot, minus};
 use super::{
     Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, LARGEST_MISS, LARGEST_TURN, Obstacle,
     Rates, STEEP, Stride, Variation, check_local, check_mesh, press_differently,
@@ -31,6 +31,12 @@ impl<T: Real, const D: usize> Node<T, D> {
         self.dofs.map(|dof| x[dof])
     }
 }
+
+/// Friction coefficient at a place in space.
+type Roughness<'a, T, const D: usize> = Box<dyn Fn([T; D]) -> f64 + Send + 'a>;
+
+/// Velocity and acceleration of a point of the obstacle's surface at t.
+type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a>;
 
 /// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
 /// identified by (number of the node, 0).
@@ -69,6 +75,9 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     law: ContactLaw,
     reach: T,
     motion: Option<Motion<'a, T, D>>,
+    friction: f64,
+    roughness: Option<Roughness<'a, T, D>>,
+    drag: Option<Drag<'a, T, D>>,
     rows: Vec<Row<T, D>>,
     /// Rows of the search before.
     before: Vec<Row<T, D>>,
@@ -88,6 +97,7 @@ struct Row<T, const D: usize> {
     at: [T; D],
     /// Gap and normal at the search.
     start: (T, [T; D]),
+    friction: f64,
 }
 
 impl<T: Real, const D: usize> std::fmt::Debug for NodesOnObstacle<'_, T, D> {
@@ -126,14 +136,82 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         let capacity = nodes.len();
         let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
-        let normal = obstacle.fixed_normal();
-        let mut acts = vec![normal.is_none(); list.as_slice().len()];
-        for (node, normal) in nodes.iter().filter_map(|node: &Node<T, D>| normal.map(|normal| (node, normal))) {
+        let acts = vec![false; list.as_slice().len()];
+        let (reach, friction) = (T::infinity(), 0.0);
+        let mut contact = Self {
+            obstacle,
+            dofs: list,
+            acts,
+            nodes,
+            law,
+            reach,
+            motion: None,
+            friction,
+            roughness: None,
+            drag: None,
+            rows,
+            before,
+        };
+        contact.settle_acting();
+        Ok(contact)
+    }
+
+    /// Coulomb's friction with a coefficient μ, from 0, for all nodes. Slip is the velocity of a node against the points
+    /// of the surface: those move with the obstacle ([`moving`](Self::moving), [`dragging`](Self::dragging)).
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{NodesOnObstacle, Plane};
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    ///
+    /// // A particle is laid on a belt that runs with speed 1 to the right; g = 10, μ = 0.2.
+    /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
+    /// let particle = LinearSystem::lumped(vec![1.0; 2], free)?.load(|_, f| f[1] = -10.0);
+    /// let belt = NodesOnObstacle::new(Plane::new([0.0; 2], [0.0, 1.0])?, &[[0.0; 2]], &[[0, 1]], &[0])?
+    ///     .friction(0.2)
+    ///     .dragging(|_, _| [[1.0, 0.0], [0.0; 2]]);
+    /// let mut run = Simulation::builder(particle, Newmark::trapezoidal(), 0.01).constraint(belt).build()?;
+    /// run.run_until(0.3, &mut ())?;
+    /// assert!((run.state().velocity()[0] - 0.6).abs() < 1e-12); // μ g t
+    /// run.run_until(1.0, &mut ())?;
+    /// assert!((run.state().velocity()[0] - 1.0).abs() < 1e-12); // that of the belt, from t = 0.5 on
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64) -> Self {
+        self.friction = coefficient;
+        self.settle_acting();
+        self
+    }
+
+    /// Friction with a coefficient that depends on the place of the node in space: it is that of the start of each step.
+    #[must_use]
+    pub fn friction_at(mut self, coefficient: impl Fn([T; D]) -> f64 + Send + 'a) -> Self {
+        self.roughness = Some(Box::new(coefficient));
+        self.settle_acting();
+        self
+    }
+
+    /// Lets the points of the surface move along it, though the obstacle stays where it is: belts, turning wheels. The
+    /// closure returns the velocity at t of the point of the obstacle that is at x (in space), and its acceleration;
+    /// those of [`moving`](Self::moving) are added. For a wheel that turns with ω they are ω × r and −ω² r.
+    #[must_use]
+    pub fn dragging(mut self, drag: impl FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a) -> Self {
+        self.drag = Some(Box::new(drag));
+        self
+    }
+
+    /// Which dofs rows may act on: with friction all, along a fixed normal those it has a part of.
+    fn settle_acting(&mut self) {
+        let normal = self.obstacle.fixed_normal();
+        let rubs = self.roughness.is_some() || self.friction != 0.0;
+        self.acts.fill(rubs || normal.is_none());
+        for (node, normal) in self.nodes.iter().filter_map(|node| normal.map(|normal| (node, normal))) {
             for (&place, weight) in node.dofs.iter().zip(normal) {
-                acts[place] |= weight != T::zero();
+                self.acts[place] |= weight != T::zero();
             }
         }
-        Ok(Self { obstacle, dofs: list, acts, nodes, law, reach: T::infinity(), motion: None, rows, before })
     }
 
     /// The law of all rows; [`ContactLaw::Rigid`] by default.
@@ -254,11 +332,18 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                 }
             }
             let size = row.place.iter().fold(row.size.max(own), |most, x| most.max(x.abs()));
-            contacts
-                .push((node.number, 0), self.law, &entries[..count])
-                .magnitude(size)
-                .position(in_space(row.at))
-                .normal(in_space(row.normal));
+            let mut contact = contacts.push((node.number, 0), self.law, &entries[..count]);
+            let contact = contact.magnitude(size).position(in_space(row.at)).normal(in_space(row.normal));
+            if row.friction == 0.0 {
+                continue;
+            }
+            let mut contact = contact.friction(row.friction);
+            for tangent in across(row.normal).into_iter().take(D.saturating_sub(1)) {
+                for (entry, along) in entries.iter_mut().zip(node.dofs.into_iter().zip(tangent)) {
+                    *entry = along;
+                }
+                contact = contact.tangent(&entries);
+            }
         }
     }
 
@@ -291,11 +376,15 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                         size,
                         at: x,
                         start: (distance, normal),
+                        friction: self.roughness.as_ref().map_or(self.friction, |friction| friction(x)),
                     });
                 }
             }
         }
-        let same = |(new, old): (&Row<T, D>, &Row<T, D>)| new.node == old.node && new.normal == old.normal;
+        let same = |(new, old): (&Row<T, D>, &Row<T, D>)| {
+            // (A coefficient that is NaN is refused when it is read.)
+            new.node == old.node && new.normal == old.normal && new.friction.to_bits() == old.friction.to_bits()
+        };
         let kept = self.rows.len() == self.before.len() && self.rows.iter().zip(&self.before).all(same);
         Ok(Candidates::changed_if(!kept))
     }
@@ -379,9 +468,29 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         Ok(Rates::Given)
     }
 
+    fn slip_rates(&mut self, t: f64, u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        if self.motion.is_none() && self.drag.is_none() {
+            return Ok(Rates::Zero);
+        }
+        let [_, velocity, acceleration] = self.motion(t);
+        let Self { nodes, rows, drag, .. } = self;
+        let mut rates = rates.iter_mut();
+        for row in rows.iter().filter(|row| row.friction != 0.0) {
+            let still = [[T::zero(); D]; 2];
+            let [along, faster] = drag.as_mut().map_or(still, |drag| drag(t, nodes[row.node].at(u)));
+            for (rates, tangent) in rates.by_ref().take(D.saturating_sub(1)).zip(across(row.normal)) {
+                *rates = GapRates {
+                    rate: -dot(tangent, velocity) - dot(tangent, along),
+                    acceleration: -dot(tangent, acceleration) - dot(tangent, faster),
+                };
+            }
+        }
+        Ok(Rates::Given)
+    }
+
     fn variation(&self) -> Variation {
         match self.obstacle.fixed_normal() {
-            Some(_) if self.reach.is_infinite() => Variation::Never,
+            Some(_) if self.reach.is_infinite() && self.roughness.is_none() => Variation::Never,
             Some(_) => Variation::BySearch,
             None => Variation::Follows,
         }

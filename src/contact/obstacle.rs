@@ -360,6 +360,27 @@ pub(super) fn dot<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> T {
     x.into_iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
+/// Orthonormal directions across a unit normal: one in the plane, two in space (others are zero). Across an axis they are
+/// axes.
+pub(super) fn across<T: Real, const D: usize>(normal: [T; D]) -> [[T; D]; 2] {
+    let mut directions = [[T::zero(); D]; 2];
+    if D == 2 {
+        (directions[0][0], directions[0][1]) = (normal[1], -normal[0]);
+    } else if D == 3 {
+        // From an axis far from the normal. (By a factor that no symmetric place has: directions must not jump between
+        // two axes while a normal is iterated for.)
+        let size = |axis: usize| normal[axis].abs();
+        let axis = (1..D).fold(0, |far, axis| if size(axis) < T::of(0.77) * size(far) { axis } else { far });
+        let mut first: [T; D] = std::array::from_fn(|k| -normal[axis] * normal[k]);
+        first[axis] += T::one();
+        let length = dot(first, first).sqrt();
+        directions[0] = first.map(|x| x / length);
+        let [n, s] = [normal, directions[0]];
+        directions[1] = std::array::from_fn(|k| n[(k + 1) % D] * s[(k + 2) % D] - n[(k + 2) % D] * s[(k + 1) % D]);
+    }
+    directions
+}
+
 pub(super) fn minus<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> [T; D] {
     std::array::from_fn(|k| x[k] - y[k])
 }

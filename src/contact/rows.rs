@@ -1,6 +1,7 @@
 //! What contact knows of the gaps between two searches: the rows of G, and the rates that do not come from them.
 
 use crate::real::Real;
+use std::ops::Range;
 
 /// The parts of the gap rates that do not come from v and a: ġ = G v + `rate`, g̈ = G a + `acceleration`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,6 +29,8 @@ pub struct ContactJacobian<T> {
     places: Vec<usize>,
     /// The largest Σ |weight| of a row, once places are known.
     largest: Option<T>,
+    /// The number of normal rows, if tangential ones stand behind them.
+    normals: Option<usize>,
 }
 
 /// The place of dofs that are no part of the interface.
@@ -36,7 +39,7 @@ pub(crate) const NO_RESPONSE: usize = usize::MAX;
 impl<T> Default for ContactJacobian<T> {
     fn default() -> Self {
         let (dofs, weights, places) = (Vec::new(), Vec::new(), Vec::new());
-        Self { pointers: vec![0], dofs, weights, places, largest: None }
+        Self { pointers: vec![0], dofs, weights, places, largest: None, normals: None }
     }
 }
 
@@ -46,6 +49,7 @@ impl<T> ContactJacobian<T> {
         self.dofs.clear();
         self.weights.clear();
         self.places.clear();
+        self.normals = None;
     }
 
     /// Number of rows.
@@ -59,7 +63,17 @@ impl<T: Real> ContactJacobian<T> {
         let mut pointers = Vec::with_capacity(rows + 1);
         pointers.push(0);
         let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        Self { pointers, dofs, weights: Vec::with_capacity(entries), places, largest: None }
+        Self { pointers, dofs, weights: Vec::with_capacity(entries), places, largest: None, normals: None }
+    }
+
+    /// Says that the rows so far are normal ones, and that tangential ones follow.
+    pub(crate) fn end_normals(&mut self) {
+        self.normals = Some(self.rows());
+    }
+
+    /// Whether a row is tangential: one of the contact before it, wherever rows of contacts with friction are listed.
+    pub(crate) fn is_tangential(&self, row: usize) -> bool {
+        self.normals.is_some_and(|normals| row >= normals)
     }
 
     /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
@@ -95,6 +109,7 @@ impl<T: Real> ContactJacobian<T> {
         self.weights.clone_from(&other.weights);
         self.places.clone_from(&other.places);
         self.largest = other.largest;
+        self.normals = other.normals;
     }
 
     /// Appends a row of another one.
@@ -111,6 +126,13 @@ impl<T: Real> ContactJacobian<T> {
         self.dofs.extend(other.dofs.iter().map(|&place| list[place]));
         self.weights.extend_from_slice(&other.weights);
         self.pointers.extend(other.pointers[1..].iter().map(|end| before + end));
+    }
+
+    /// Appends some rows of another one, in which dofs are named by their place in a list.
+    pub(crate) fn append_rows(&mut self, (other, rows): (&Self, Range<usize>), list: &[usize]) {
+        for row in rows {
+            self.push_entries(other.row(row).map(|(place, weight)| (list[place], weight)));
+        }
     }
 
     /// Number of weights of all rows.

@@ -188,11 +188,11 @@ impl<T: Real> ActiveSet<T> {
             let exceeds = |i: usize, miss: T| exceeds_rounding(problem, own, i, miss);
             let open = |i: usize| singular && exceeds(i, y[i]);
             let violates = |i: usize| match problem.sets[i] {
-                AdmissibleSet::Free | AdmissibleSet::Cone2 { .. } | AdmissibleSet::Cone3 { .. } => false,
                 AdmissibleSet::NonNegative if active[i] => {
                     exceeds(i, -problem.delassus(i, i) * multipliers[i]) || open(i)
                 }
                 AdmissibleSet::NonNegative => exceeds(i, -y[i]),
+                _ => false,
             };
             violating.clear();
             violating.extend((0..size).filter(|&i| violates(i)));

@@ -26,7 +26,7 @@ impl<T: Real> BlockAcceptance<T> {
         for (rows, set) in problem.blocks() {
             let row = rows.start;
             let q = problem.offset[row];
-            let miss = if set == AdmissibleSet::Free { q.abs() } else { -q };
+            let miss = if set.is_bilateral() { q.abs() } else { -q };
             if problem.delassus(row, row) <= T::zero() && miss > accepted.max(problem.tolerance[row]) {
                 return Err(ContactFailure::NotConverged { iterations: 0, row, residual: miss });
             }
@@ -64,13 +64,22 @@ impl<T: Real> BlockAcceptance<T> {
         /// Sweeps after which the problem is looked at, whatever they have changed; an impatient caller wants the
         /// change halved by then.
         const LOOK: usize = 8;
-        let mut before = T::infinity();
+        /// Growth of the change at which sweeps diverge, as they may where W is not symmetric: what they have made is
+        /// then nothing to go on from.
+        const DIVERGES: f64 = 1e3;
+        let (mut before, mut least) = (T::infinity(), T::infinity());
         for sweep in 0..sweeps {
             if sweep % LOOK == 0 && self.accepts(problem, multipliers) {
                 return true;
             }
             let change = sweep_blocks(problem, omega, multipliers);
             *spent += 1;
+            least = least.min(change);
+            let bounded = change <= T::of(DIVERGES) * least && change.is_finite();
+            if !bounded {
+                multipliers.fill(T::zero());
+                break;
+            }
             if change <= self.accepted && self.accepts(problem, multipliers) {
                 return true;
             }
@@ -91,8 +100,27 @@ pub(super) fn failure<T: Real>(
     iterations: usize,
     multipliers: &[T],
 ) -> ContactFailure<T> {
+    if let Some(jammed) = jammed(problem) {
+        return jammed;
+    }
     let (row, residual) = problem.residual(multipliers);
     ContactFailure::NotConverged { iterations, row, residual }
+}
+
+/// The contact whose friction moves its own gap most, if by more than the normal multiplier does: with it the problem
+/// may have no solution.
+fn jammed<T: Real>(problem: &ContactProblem<'_, T>) -> Option<ContactFailure<T>> {
+    let excess = |(rows, set): (Range<usize>, AdmissibleSet)| {
+        let (row, friction) = (rows.start, set.friction()?);
+        let normal = problem.delassus(row, row);
+        let coupling = rows.skip(1).fold(T::zero(), |size, k| size.hypot(problem.delassus(row, k)));
+        let jams = T::of(friction) * coupling >= normal && coupling > T::zero();
+        let excess = T::of(friction) * coupling / normal;
+        jams.then_some((excess, ContactFailure::Jammed { row, friction, normal, coupling }))
+    };
+    let worst =
+        problem.blocks().filter_map(excess).reduce(|worst, other| if other.0 > worst.0 { other } else { worst });
+    worst.map(|(_, failure)| failure)
 }
 
 /// One sweep: each block in turn takes the multipliers that solve it while the others keep theirs, relaxed by `omega`.
@@ -103,17 +131,16 @@ fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers:
         let mut before = [T::zero(); 3];
         before[..rows.len()].copy_from_slice(&multipliers[rows.clone()]);
         let own = rows.clone();
-        match set.friction() {
-            None => relax_row(problem, (rows.start, set), omega, multipliers),
-            Some(friction) => {
-                let solved = alone(problem, rows.clone(), T::of(friction), multipliers).solve();
-                for (multiplier, solved) in multipliers[rows.clone()].iter_mut().zip(solved) {
-                    *multiplier += omega * (solved - *multiplier);
-                }
-                // (Relaxed beyond its solution a block may leave its cone.)
-                if omega > T::one() {
-                    set.project(&mut multipliers[rows]);
-                }
+        if set.friction().is_none() {
+            relax_row(problem, (rows.start, set), omega, multipliers);
+        } else {
+            let solved = alone(problem, rows.clone(), set, multipliers).solve();
+            for (multiplier, solved) in multipliers[rows.clone()].iter_mut().zip(solved) {
+                *multiplier += omega * (solved - *multiplier);
+            }
+            // (Relaxed beyond its solution a block may leave its cone.)
+            if omega > T::one() {
+                set.project(&mut multipliers[rows]);
             }
         }
         for (row, before) in own.zip(before) {
@@ -138,14 +165,23 @@ pub(super) fn relax_row<T: Real>(
 }
 
 /// A block while the others keep their multipliers.
-fn alone<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, friction: T, multipliers: &[T]) -> Cone<T> {
-    let (mut delassus, mut offset) = ([[T::zero(); 3]; 3], [T::zero(); 3]);
+fn alone<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    rows: Range<usize>,
+    set: AdmissibleSet,
+    multipliers: &[T],
+) -> Cone<T> {
+    let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
     for (i, row) in rows.clone().enumerate() {
         offset[i] = problem.gap(row, multipliers);
+        if i > 0 {
+            noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
+        }
         for (j, other) in rows.clone().enumerate() {
             delassus[i][j] = problem.delassus(row, other);
             offset[i] -= delassus[i][j] * multipliers[other];
         }
     }
-    Cone { delassus, offset, friction, tangents: rows.len() - 1 }
+    let friction = T::of(set.friction().unwrap_or(0.0));
+    Cone { delassus, offset, friction, tangents: rows.len() - 1, is_bilateral: set.is_bilateral(), noise }
 }

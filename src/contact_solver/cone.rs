@@ -13,6 +13,10 @@ pub(super) struct Cone<T> {
     pub(super) friction: T,
     /// 1 or 2.
     pub(super) tangents: usize,
+    /// Whether the gap is zero whatever p is; there is friction only where p is positive.
+    pub(super) is_bilateral: bool,
+    /// What of the tangential offset is rounding.
+    pub(super) noise: T,
 }
 
 /// Steps of the search for the direction of slip, each of which at least halves what is left every other time.
@@ -26,10 +30,14 @@ impl<T: Real> Cone<T> {
     /// y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ, so that there
     /// is a γ at which it vanishes.
     pub(super) fn solve(&self) -> [T; 3] {
-        let Self { delassus: w, offset: b, friction, tangents } = *self;
+        let Self { delassus: w, offset: b, friction, tangents, is_bilateral, noise } = *self;
         let none = [T::zero(); 3];
-        if b[0] >= T::zero() || w[0][0] <= T::zero() {
+        if w[0][0] <= T::zero() {
             return none;
+        }
+        if b[0] >= T::zero() {
+            let pulled = if is_bilateral { -b[0] / w[0][0] } else { T::zero() };
+            return [pulled, T::zero(), T::zero()];
         }
         let normal = |f: [T; 2]| -(b[0] + w[0][1] * f[0] + w[0][2] * f[1]) / w[0][0];
         if friction <= T::zero() {
@@ -40,13 +48,13 @@ impl<T: Real> Cone<T> {
         let s = |i: usize, j: usize| without(i, w[i][j], w[0][j]);
         let c = [without(1, b[1], b[0]), if tangents > 1 { without(2, b[2], b[0]) } else { T::zero() }];
         let schur = match tangents {
-            1 => [[s(1, 1), T::zero()], [T::zero(), T::one()]],
+            // (A second direction that nothing asks for, as compliant as the first.)
+            1 => [[s(1, 1), T::zero()], [T::zero(), s(1, 1)]],
             _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
         };
         let tangential = |gamma: T| solve_two(schur, gamma, c);
         let beyond = |f: [T; 2]| f[0].hypot(f[1]) - friction * normal(f);
-        let held = tangential(T::zero());
-        if beyond(held) <= T::zero() && held.iter().all(|f| f.is_finite()) {
+        if let Some(held) = hold(schur, c, noise).filter(|&held| beyond(held) <= T::zero()) {
             return [normal(held), held[0], held[1]];
         }
         if c == [T::zero(); 2] {
@@ -59,6 +67,23 @@ impl<T: Real> Cone<T> {
         let p = -b[0] / (w[0][0] + friction * along);
         [p, friction * p * direction[0], friction * p * direction[1]]
     }
+}
+
+/// S f = −c, with the least f where S is singular; nothing if no f will do, but for rounding.
+fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
+    let tiny = T::of(64.0) * T::epsilon();
+    let (trace, determinant) = (s[0][0] + s[1][1], s[0][0] * s[1][1] - s[0][1] * s[1][0]);
+    if determinant > tiny * trace * trace {
+        return Some(solve_two(s, T::zero(), c)).filter(|f| f.iter().all(|f| f.is_finite()));
+    }
+    // S = trace e eᵀ, e along its larger column.
+    let column = if s[0][0] >= s[1][1] { [s[0][0], s[1][0]] } else { [s[0][1], s[1][1]] };
+    let size = column[0].hypot(column[1]);
+    let e = if size > T::zero() { column.map(|x| x / size) } else { column };
+    let along = e[0] * c[0] + e[1] * c[1];
+    let across = (c[0] - along * e[0]).hypot(c[1] - along * e[1]);
+    let held = if trace > T::zero() { e.map(|e| -along / trace * e) } else { [T::zero(); 2] };
+    (across <= noise + tiny * c[0].hypot(c[1])).then_some(held)
 }
 
 /// The direction of the friction of a block that slides in a plane.
@@ -98,7 +123,10 @@ fn slip_direction<T: Real>(
     }
     let f = tangential(high);
     let length = f[0].hypot(f[1]);
-    if length > T::zero() { f.map(|f| f / length) } else { [T::zero(); 2] }
+    match length > T::zero() && length.is_finite() {
+        true => f.map(|f| f / length),
+        false => [T::zero(); 2],
+    }
 }
 
 /// (S + γ) f = −c.

@@ -62,6 +62,7 @@ impl<T: Real> ConeNewton<T> {
         multipliers: &mut [T],
     ) -> Result<usize, ContactFailure<T>> {
         let acceptance = BlockAcceptance::begin(problem, tolerance, multipliers)?;
+        self.make_room(problem.size());
         let mut spent = 0;
         for round in 0..ROUNDS {
             // A sweep costs about as much as the share 3/n of an iteration: at first as many as half of one, while they
@@ -79,6 +80,20 @@ impl<T: Real> ConeNewton<T> {
             return Ok(spent);
         }
         Err(failure(problem, spent, multipliers))
+    }
+
+    /// Memory for so many rows, if there have never been as many.
+    fn make_room(&mut self, size: usize) {
+        let Self { factor, statuses, rows, matrix, right, y, tried, .. } = self;
+        if matrix.capacity() < size * size {
+            factor.reserve_general(size);
+            matrix.reserve(size * size - matrix.len());
+        }
+        statuses.reserve(size.saturating_sub(statuses.len()));
+        rows.reserve(size.saturating_sub(rows.len()));
+        for values in [right, y, tried] {
+            values.reserve(size.saturating_sub(values.len()));
+        }
     }
 
     /// Newton iterations; says whether they have ended. If not, the multipliers are left as they were.
@@ -237,12 +252,16 @@ fn status<T: Real>(
     if set == AdmissibleSet::Free {
         return if own > T::zero() { Status::Held } else { Status::Open };
     }
-    if own * multipliers[first] <= y[first] {
+    if own * multipliers[first] <= y[first] && !set.is_bilateral() {
         return Status::Open;
     }
     let Some(friction) = set.friction() else { return Status::Held };
     let tangents = first + 1..first + set.rows();
     let compliance = tangents.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
+    if multipliers[first] <= T::zero() && set.is_bilateral() {
+        // Pulled: no friction.
+        return Status::Slides { direction: [T::zero(); 2], share: T::zero(), compliance };
+    }
     let mut aim = [T::zero(); 2];
     for (aim, row) in aim.iter_mut().zip(tangents) {
         *aim = compliance * multipliers[row] - y[row];

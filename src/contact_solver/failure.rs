@@ -19,6 +19,9 @@ pub(crate) fn contact_error<T: Real>(t: f64, failure: ContactFailure<T>, id: imp
         ContactFailure::NotConverged { iterations, row, residual } => {
             Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
         }
+        ContactFailure::Jammed { row, friction, normal, coupling } => {
+            Error::Jammed { t, contact: id(row), friction, normal: normal.value(), coupling: coupling.value() }
+        }
         ContactFailure::Friction { row } => Error::Incompatible {
             part: format!("the contact solver, for contact {}", id(row)),
             reason: "the contact has friction; use ActiveSet or GaussSeidel",

@@ -35,7 +35,8 @@ use std::cmp::Ordering;
 ///
 /// A pivot costs O(n²), for four unknowns a contact, and there are as a rule O(n) of them, from zero in every solve:
 /// cubic, and some 100 contacts are many. The guess is not used, so the multipliers never depend on it.
-/// [`AdmissibleSet::Cone3`] is refused ([`ContactFailure::Friction`]): a round cone is not linear.
+/// [`AdmissibleSet::Cone3`] is refused ([`ContactFailure::Friction`]): a round cone is not linear. So are contacts that
+/// do not open ([`AdmissibleSet::Held2`]): runs with friction are [uncorrected](crate::SimulationBuilder::uncorrected).
 ///
 /// Known weakness: where large coefficients leave several solutions it finds one of them, which need not be that of
 /// [`ActiveSet`](super::ActiveSet). Ties are told from differences by their rounding; where that is mistaken the path
@@ -157,7 +158,11 @@ impl<T: Real> Lemke<T> {
             let (first, tangent) = (rows.start, rows.start + 1);
             match set {
                 AdmissibleSet::Free => conditions.push(Condition::Free(first)),
-                AdmissibleSet::NonNegative | AdmissibleSet::Cone3 { .. } => conditions.push(Condition::Normal(first)),
+                // (The others have been refused.)
+                AdmissibleSet::NonNegative
+                | AdmissibleSet::Cone3 { .. }
+                | AdmissibleSet::Held2 { .. }
+                | AdmissibleSet::Held3 { .. } => conditions.push(Condition::Normal(first)),
                 AdmissibleSet::Cone2 { friction } => {
                     let friction = T::of(friction) * (roots[tangent] / roots[first]);
                     conditions.extend([
@@ -469,7 +474,7 @@ impl<T: Real> Lemke<T> {
 impl<T: Real> ContactSolver<T> for Lemke<T> {
     /// All but cones in space.
     fn admits(&self, set: AdmissibleSet) -> bool {
-        !matches!(set, AdmissibleSet::Cone3 { .. })
+        matches!(set, AdmissibleSet::NonNegative | AdmissibleSet::Free | AdmissibleSet::Cone2 { .. })
     }
 
     fn reserve(&mut self, size: usize) {

@@ -26,6 +26,17 @@ pub enum AdmissibleSet {
         /// μ, from 0.
         friction: f64,
     },
+    /// A contact in a plane that does not open: y_n = 0, with p of either sign. |f| ≤ μ max(0, p), and the slip is zero
+    /// or opposes f, as in [`Cone2`](Self::Cone2). Corrections of contacts that are closed ask for it.
+    Held2 {
+        /// μ, from 0.
+        friction: f64,
+    },
+    /// The same in space, as [`Cone3`](Self::Cone3).
+    Held3 {
+        /// μ, from 0.
+        friction: f64,
+    },
 }
 
 impl AdmissibleSet {
@@ -36,8 +47,8 @@ impl AdmissibleSet {
     pub fn rows(self) -> usize {
         match self {
             Self::NonNegative | Self::Free => 1,
-            Self::Cone2 { .. } => 2,
-            Self::Cone3 { .. } => 3,
+            Self::Cone2 { .. } | Self::Held2 { .. } => 2,
+            Self::Cone3 { .. } | Self::Held3 { .. } => 3,
         }
     }
 
@@ -45,7 +56,26 @@ impl AdmissibleSet {
     pub fn friction(self) -> Option<f64> {
         match self {
             Self::NonNegative | Self::Free => None,
-            Self::Cone2 { friction } | Self::Cone3 { friction } => Some(friction),
+            Self::Cone2 { friction }
+            | Self::Cone3 { friction }
+            | Self::Held2 { friction }
+            | Self::Held3 { friction } => Some(friction),
+        }
+    }
+
+    /// Whether the only row of a block, or its normal one, has y = 0 and a multiplier of either sign.
+    pub(crate) fn is_bilateral(self) -> bool {
+        matches!(self, Self::Free | Self::Held2 { .. } | Self::Held3 { .. })
+    }
+
+    /// The set of a contact with friction in so many tangential directions, 1 or 2: a cone, or of a contact that does
+    /// not open.
+    pub(crate) fn with_friction(friction: f64, tangents: usize, is_bilateral: bool) -> Self {
+        match (tangents, is_bilateral) {
+            (0 | 1, false) => Self::Cone2 { friction },
+            (0 | 1, true) => Self::Held2 { friction },
+            (_, false) => Self::Cone3 { friction },
+            (_, true) => Self::Held3 { friction },
         }
     }
 
@@ -74,9 +104,11 @@ impl AdmissibleSet {
         if size <= friction * *normal {
             return;
         }
-        let inside = (*normal + friction * size) / (T::one() + friction * friction);
-        *normal = inside.max(T::zero());
-        let share = if size > T::zero() { friction * *normal / size } else { T::zero() };
+        if !self.is_bilateral() {
+            let inside = (*normal + friction * size) / (T::one() + friction * friction);
+            *normal = inside.max(T::zero());
+        }
+        let share = if size > T::zero() { friction * normal.max(T::zero()) / size } else { T::zero() };
         for f in tangential {
             *f *= share;
         }
@@ -86,33 +118,33 @@ impl AdmissibleSet {
     pub(super) fn nearest<T: Real>(self, multiplier: T) -> T {
         match self {
             Self::NonNegative => multiplier.max(T::zero()),
-            Self::Free | Self::Cone2 { .. } | Self::Cone3 { .. } => multiplier,
+            _ => multiplier,
         }
     }
 
     /// By how much the y and the multipliers of a block miss their conditions (unit of y): |min(y, W_ii λ)|, or |y| of
     /// a free row; NaN if y is not finite. `compliance` is the diagonal of W.
     ///
-    /// Of a cone the larger one of |min(y_n, W_nn p)| and of |W_t f − P(W_t f − y_t)|, with P the nearest point of the
+    /// Of a cone the larger one of |min(y_n, W_nn p)| (|y_n| where it does not open) and of |W_t f − P(W_t f − y_t)|, with P the nearest point of the
     /// disc of radius W_t μ max(0, p) and W_t the larger one of the tangential rows (Alart and Curnier, Comput. Methods
     /// Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
         if let Some(friction) = self.friction() {
-            return cone_residual(T::of(friction), y, multipliers, compliance);
+            return cone_residual((T::of(friction), self.is_bilateral()), y, multipliers, compliance);
         }
         let rows = y.iter().zip(multipliers).zip(compliance);
         let misses = rows.map(|((&y, &multiplier), &compliance)| match self {
             // (`min` would prefer any number to NaN.)
             _ if !y.is_finite() => T::nan(),
             Self::Free => y.abs(),
-            Self::NonNegative | Self::Cone2 { .. } | Self::Cone3 { .. } => y.min(compliance * multiplier).abs(),
+            _ => y.min(compliance * multiplier).abs(),
         });
         misses.fold(T::zero(), |worst, miss| if miss > worst || miss.is_nan() { miss } else { worst })
     }
 }
 
 /// [`AdmissibleSet::residual`] of a cone.
-fn cone_residual<T: Real>(friction: T, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
+fn cone_residual<T: Real>((friction, is_bilateral): (T, bool), y: &[T], multipliers: &[T], compliance: &[T]) -> T {
     if y.iter().chain(multipliers).any(|x| !x.is_finite()) {
         return T::nan();
     }
@@ -127,7 +159,8 @@ fn cone_residual<T: Real>(friction: T, y: &[T], multipliers: &[T], compliance: &
     for (k, miss) in miss.iter_mut().enumerate().take(y.len() - 1) {
         *miss = tangential * multipliers[k + 1] - share * aim[k];
     }
-    y[0].min(compliance[0] * multipliers[0]).abs().max(norm(&miss))
+    let normal = if is_bilateral { y[0] } else { y[0].min(compliance[0] * multipliers[0]) };
+    normal.abs().max(norm(&miss))
 }
 
 /// The length of a tangential vector.

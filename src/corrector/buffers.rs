@@ -1,6 +1,7 @@
 //! Memory of the corrections, reserved when a simulation is built.
 
 use super::group_problem::GroupProblem;
+use super::rubbing_problem::Rubbing;
 use crate::contact::GapRates;
 use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::real::Real;
@@ -31,6 +32,11 @@ pub(crate) struct Buffers<T> {
     pub(super) group: GroupProblem<T>,
     /// S = G M⁻¹ Gᵀ of some rows.
     pub(super) s: Vec<T>,
+    /// Contacts with friction among the others.
+    pub(super) rubbing: Rubbing<T>,
+    /// Rates of slips, one a tangential row.
+    pub(super) slips: Vec<GapRates<T>>,
+    pub(super) past_slips: Vec<GapRates<T>>,
     /// Rates and gaps as the constraints give them, one a candidate.
     pub(super) rates: Vec<GapRates<T>>,
     pub(super) gaps: Vec<T>,
@@ -58,6 +64,9 @@ impl<T: Real> Buffers<T> {
             forces: reals(rows),
             group: GroupProblem::new(rows),
             s: reals(rows.min(FORESEEN) * rows.min(FORESEEN)),
+            rubbing: Rubbing::default(),
+            slips: Vec::new(),
+            past_slips: Vec::new(),
             rates: vec![GapRates::default(); rows],
             gaps: vec![T::zero(); rows],
             change: vec![T::zero(); damped],

@@ -2,6 +2,7 @@
 //! books on impulse and energy. What serves one corrector only is in the file of that corrector.
 
 mod energy;
+mod friction;
 mod parts;
 mod past;
 
@@ -75,6 +76,8 @@ pub struct Correction<'a, T: Real> {
     pub(crate) contacts: &'a mut ContactState<T>,
     /// Closed flags before this stage.
     pub(crate) was_closed: &'a [bool],
+    /// Contacts that friction held before this stage; empty without friction.
+    pub(crate) was_sticking: &'a [bool],
     pub(crate) massless: &'a [usize],
     pub(crate) prescribed: &'a [usize],
     pub(crate) buffers: &'a mut Buffers<T>,
@@ -136,6 +139,9 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_velocity_jumps(&mut self) -> Result<()> {
+        if self.rubs() {
+            return self.solve_rubbing_velocity();
+        }
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);
         let result = self.solve_jumps(&rows, Jump::Velocity, &mut impulses);
@@ -151,9 +157,9 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Widens the tolerances by the jumps that the scheme's rows make of gaps which are met only up to a few roundings:
-    /// by so much rows that depend on one another may contradict each other.
-    fn allow_rounding_of_gaps(&mut self, rows: &[usize], jump: Jump) {
+    /// The jump that the scheme's rows make of a gap which is met only up to a few roundings: by so much rows that depend
+    /// on one another may contradict each other.
+    fn rounding_of_gap(&self, row: usize, jump: Jump) -> T {
         /// Roundings of a gap that it may miss.
         const ROUNDINGS: f64 = 32.0;
         let [by_u, by_v, by_a] = self.scheme.response;
@@ -162,10 +168,8 @@ impl<T: Real> Correction<'_, T> {
                 Jump::Velocity => (by_v / by_u).abs() / self.h,
                 Jump::Acceleration => (by_a / by_u).abs() / (self.h * self.h),
             });
-        for (&row, tolerance) in rows.iter().zip(&mut self.buffers.tolerance) {
-            let magnitude = self.g.magnitude(row, &self.new.u);
-            *tolerance += per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]);
-        }
+        let magnitude = self.g.magnitude(row, &self.new.u);
+        per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row])
     }
 
     /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
@@ -192,7 +196,10 @@ impl<T: Real> Correction<'_, T> {
         x.resize(rows.len(), T::zero());
         let mut result = read.and_then(|()| self.solve(rows, &sets, x));
         if matches!(result, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
-            self.allow_rounding_of_gaps(rows, jump);
+            for (k, &row) in rows.iter().enumerate() {
+                let noise = self.rounding_of_gap(row, jump);
+                self.buffers.tolerance[k] += noise;
+            }
             x.fill(T::zero());
             result = self.solve(rows, &sets, x);
         }
@@ -207,6 +214,9 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn push_velocity(&mut self) -> Result<()> {
+        if self.rubs() {
+            return self.push_rubbing_velocity();
+        }
         let rows = std::mem::take(&mut self.buffers.closed);
         let impulses = std::mem::take(&mut self.buffers.impulses);
         let result = self.apply(&rows, &impulses);
@@ -269,8 +279,11 @@ impl<T: Real> Correction<'_, T> {
             }
             let gain = impulse * T::of(0.5) * (before + g.product(row, &new.v));
             **energy += gain;
-            // An obstacle that moves does work; what is lost is lost in its frame.
-            contacts.dissipated[row] -= gain + impulse * rates[row].rate;
+            // An obstacle that moves does work; what is lost is lost in its frame. (What friction takes is no energy of
+            // an impact.)
+            if !g.is_tangential(row) {
+                contacts.dissipated[row] -= gain + impulse * rates[row].rate;
+            }
         }
         if !change.is_empty() {
             change.fill(T::zero());
@@ -325,6 +338,9 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_acceleration_jumps(&mut self) -> Result<()> {
+        if self.rubs() {
+            return self.solve_rubbing_acceleration();
+        }
         let rows = std::mem::take(&mut self.buffers.engaged);
         let mut forces = std::mem::take(&mut self.buffers.forces);
         let result = self.solve_jumps(&rows, Jump::Acceleration, &mut forces);
@@ -336,9 +352,21 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
     pub fn push_acceleration(&mut self) {
-        let Self { buffers, contacts, projection, new, g, scheme, h, .. } = self;
+        if self.rubs() {
+            return self.push_rubbing_acceleration();
+        }
+        let rows = std::mem::take(&mut self.buffers.engaged);
+        let forces = std::mem::take(&mut self.buffers.forces);
+        self.push_forces(&rows, &forces);
+        (self.buffers.engaged, self.buffers.forces) = (rows, forces);
+    }
+
+    /// Adds forces that remove jumps to a, to the reported forces and to the impulses.
+    fn push_forces(&mut self, rows: &[usize], forces: &[T]) {
+        let Self { contacts, projection, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
-        for (&row, &force) in buffers.engaged.iter().zip(&buffers.forces) {
+        projection.prepare(g, rows);
+        for (&row, &force) in rows.iter().zip(forces) {
             projection.push(g, row, force, &mut new.a);
             contacts.lambda[row] += share * force;
             contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;

@@ -263,10 +263,13 @@ impl<T: Real> JumpProjection<T> {
     /// Sorts rows into groups that S does not couple.
     pub(crate) fn sort(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         match &self.inverse {
-            InverseMass::Lumped(inverse) => self.groups.sort(rows, self.dofs, |row| {
-                let acting = g.row(row).filter(|&(dof, weight)| weight != T::zero() && inverse[dof] != T::zero());
-                acting.map(|(dof, _)| dof)
-            }),
+            InverseMass::Lumped(inverse) => {
+                let acts_on = |row| {
+                    let acting = g.row(row).filter(|&(dof, weight)| weight != T::zero() && inverse[dof] != T::zero());
+                    acting.map(|(dof, _)| dof)
+                };
+                self.groups.sort(rows, self.dofs, |row| g.is_tangential(row), acts_on);
+            }
             InverseMass::Consistent { .. } => self.groups.together(rows.len()),
         }
         self.factored = false;

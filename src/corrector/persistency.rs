@@ -114,6 +114,10 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
         }
     }
 
+    fn check_friction(&self) -> std::result::Result<(), &'static str> {
+        Ok(())
+    }
+
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.solve_velocity_jumps()?;
         if self.parts != Parts::Acceleration {

@@ -1,7 +1,8 @@
 //! Which contact laws a scheme and a contact solver can serve, and why not the others.
 
-use crate::contact::{ContactLaw, Measure};
+use crate::contact::{ContactId, ContactLaw, Measure};
 use crate::contact_solver::{AdmissibleSet, ContactSolver};
+use crate::corrector::Corrector;
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
@@ -20,6 +21,9 @@ pub(crate) struct Admitted {
     /// Why laws that read the gap at the start of a stage are refused, if they are, and why the persistency switch is.
     pub(crate) no_start: Option<&'static str>,
     pub(crate) no_switch: Option<&'static str>,
+    /// Why friction is refused, if it is; and why beside compliant laws.
+    pub(crate) no_friction: Option<&'static str>,
+    pub(crate) no_compliant_friction: Option<&'static str>,
     /// The contact solver, and the sets that it does not take.
     pub(crate) solver: String,
     pub(crate) no_sets: Vec<AdmissibleSet>,
@@ -48,15 +52,55 @@ impl Admitted {
     }
 }
 
+impl Admitted {
+    /// Refuses friction that is no number, that has no direction, or that law, contact solver, scheme or corrections
+    /// cannot serve.
+    pub(super) fn check_friction(
+        &self,
+        contact: ContactId,
+        (friction, law, tangents): (f64, ContactLaw, usize),
+    ) -> Result<()> {
+        if !(friction >= 0.0 && friction.is_finite()) {
+            let range = "not negative and finite";
+            return Err(Error::Parameter { name: "a friction coefficient", value: friction, range });
+        }
+        let set = AdmissibleSet::with_friction(friction, tangents, false);
+        let kind = |other: &AdmissibleSet| other.rows() == set.rows();
+        let reasons = [
+            (tangents == 0 || tangents > 2)
+                .then_some("its constraint gives no tangent, or more than two: one in the plane, two in space"),
+            (!law.admits_friction()).then_some(
+                "friction goes with laws of one instant that only press: `Rigid`, `Restitution`, `Penalty`, \
+                 `PowerLaw`, `AugmentedLagrangian`",
+            ),
+            self.no_sets.iter().any(kind).then_some("the contact solver takes no friction; choose `ActiveSet`"),
+            self.no_friction,
+            self.no_compliant_friction.filter(|_| law.is_compliant()),
+        ];
+        match reasons.into_iter().flatten().next() {
+            None => Ok(()),
+            Some(reason) => Err(Error::Incompatible { part: format!("friction of contact {contact}"), reason }),
+        }
+    }
+}
+
 /// The contact laws that a scheme and a contact solver can serve.
 pub(super) fn admitted<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
     solver: &dyn ContactSolver<T>,
+    (correctors, by_default): (&[Box<dyn Corrector<T> + '_>], bool),
 ) -> Admitted {
-    let no_sets = AdmissibleSet::OF_LAWS.into_iter().filter(|&set| !solver.admits(set)).collect();
+    // (Corrections ask for contacts that do not open.)
+    let corrects = (by_default || !correctors.is_empty())
+        && tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION);
+    let kinds: &[bool] = if corrects { &[false, true] } else { &[false] };
+    let cone = |tangents| kinds.iter().map(move |&held| AdmissibleSet::with_friction(0.0, tangents, held));
+    let sets = AdmissibleSet::OF_LAWS.into_iter().chain((1..=2).flat_map(cone));
+    let no_sets = sets.filter(|&set| !solver.admits(set)).collect();
     let (integrator_name, solver) = (integrator.name(), format!("{solver:?}"));
     let mut admitted = Admitted { integrator: integrator_name, solver, no_sets, ..Admitted::default() };
+    admitted.no_friction = correctors.iter().find_map(|corrector| corrector.check_friction().err());
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
         admitted.no_prediction = Some(
@@ -65,6 +109,12 @@ pub(super) fn admitted<T: Real>(
         );
     }
     for stage in &tableau.stages {
+        if stage.increment().balance.u.z == 0.0 {
+            admitted.no_compliant_friction = Some(
+                "the scheme knows the force of a compliant law before it solves, and no multiplier holds what sticks; \
+                 choose a rigid law",
+            );
+        }
         match stage.contact {
             ContactLevel::POSITION => {}
             ContactLevel::Position { .. } => {

@@ -323,7 +323,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        let admitted = admitted(&*integrator, &tableau, &*contact_solver);
+        let by_default = self.correction == DefaultCorrection::Wanted;
+        let admitted = admitted(&*integrator, &tableau, &*contact_solver, (&self.correctors, by_default));
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         let scheme = Scheme::new(integrator, tableau, self.start_up);
         let initial = |what, values: Option<Vec<T>>| {
@@ -364,8 +365,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             let violation = Violation::Initial(self.overclosure);
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
-        let Begun { state, history, adjustment } = begun;
-        let rows = constraints.room();
+        let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
         contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
@@ -392,7 +392,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, interface)?);
             work.contact.rows.on_massless = vec![false; rows];
         }
-        work.massless = massless;
+        work.keep_massless(massless);
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
         let is_balanced = self.balance == EnergyBalance::On;

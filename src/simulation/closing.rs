@@ -1,8 +1,10 @@
 //! The end of the contact of a stage: which contacts are closed, which have opened, and their forces and impulses.
 
+use super::constraints::Constraints;
 use super::contact_rows::{Level, Part};
 use super::contact_step::{ContactStep, ContactWork};
-use crate::corrector::{Buffers, Gaps};
+use crate::contact::{ContactJacobian, GapRates};
+use crate::corrector::{Buffers, Gaps, rounding, slides};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
@@ -28,7 +30,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
-        let ContactWork { trial, rows, was_closed, closed_at_start, .. } = contact;
+        let ContactWork { trial, rows, was_closed, was_sticking, closed_at_start, .. } = contact;
         let level = Level { target: stage.contact.as_ref(), clock: *clock };
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
         if level.target.is_none() {
@@ -52,6 +54,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
+        was_sticking.clear();
+        was_sticking.extend(trial.sliding.iter().zip(&trial.closed).map(|(&slides, &closed)| closed && !slides));
         buffers.closed.clear();
         buffers.opened.clear();
         buffers.released.clear();
@@ -86,6 +90,45 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 trial.impulse[row] += impulse_weight * raw;
             }
         }
+        if !constraints.tangents().is_empty() {
+            rows.slips.resize(rows.slips.len().max(constraints.tangents().len()), GapRates::default());
+            constraints.finite_slip_rates(new.t, &new.u, &new.v, &mut rows.slips)?;
+        }
+        for row in constraints.tangents().contacts() {
+            for row in constraints.tangents().of(row) {
+                trial.impulse[row] += impulse_weight * trial.lambda_raw[row];
+            }
+            let (mut slip, mut noise) = (T::zero(), T::zero());
+            for row in constraints.tangents().of(row) {
+                let own = rows.slips[row - constraints.tangents().all().start].rate;
+                let forces = rows.curved.forces(g);
+                slip = slip.hypot(forces.product(row, &new.v) + own);
+                // (A velocity that has vanished has the rounding of what it is the sum of.)
+                let size = forces.magnitude(row, &new.v) + T::of(clock.h) * forces.magnitude(row, &new.a) + own.abs();
+                noise = noise.max(rounding(size));
+            }
+            let bound = T::of(constraints.tangents().friction(row)) * trial.lambda_raw[row];
+            trial.sliding[row] = slides(trial.tangential(row, &trial.lambda_raw), bound) && slip > noise;
+        }
         Ok(())
     }
+}
+
+/// Notes with which velocities the bodies slide on each other at the end of a step.
+pub(super) fn note_slips<T: Real>(
+    constraints: &mut Constraints<'_, T>,
+    g: &ContactJacobian<T>,
+    new: &Motion<T>,
+    contact: &mut ContactWork<T>,
+) -> Result<()> {
+    if constraints.tangents().is_empty() {
+        return Ok(());
+    }
+    let ContactWork { trial, rows, .. } = contact;
+    constraints.finite_slip_rates(new.t, &new.u, &new.v, &mut rows.slips)?;
+    let forces = rows.curved.forces(g);
+    for ((row, slip), own) in constraints.tangents().all().zip(&mut trial.slip).zip(&rows.slips) {
+        *slip = forces.product(row, &new.v) + own.rate;
+    }
+    Ok(())
 }

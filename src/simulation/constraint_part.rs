@@ -17,6 +17,8 @@ pub(super) struct Part<'a, T: Real> {
     pub(super) stale: bool,
     /// What it has said of its rates, once it was asked; forgotten when its rows change.
     pub(super) rates: Option<Rates>,
+    /// The same of the rates of slip.
+    pub(super) slip_rates: Option<Rates>,
 }
 
 impl<T: Real> Part<'_, T> {

@@ -6,8 +6,10 @@ use super::laws::Laws;
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
 use crate::contact::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride, Variation,
+    Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride, Tangents,
+    Variation,
 };
+use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{ContactState, Motion, Names};
@@ -17,10 +19,14 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(super) parts: Vec<Part<'a, T>>,
     pub(crate) ids: Vec<ContactId>,
     pub(super) laws: Laws,
+    pub(super) tangents: Tangents,
+    /// The tangents before rows were read anew.
+    old_tangents: Tangents,
     pub(super) magnitudes: Vec<T>,
     /// Rows and rates of a constraint that is evaluated at another motion.
     pub(super) scratch: Contacts<T>,
     pub(super) rates: Vec<GapRates<T>>,
+    pub(super) slip_rates: Vec<GapRates<T>>,
     pub(super) local: Local<T>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
@@ -84,7 +90,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             // (The memory of the largest.)
             scratch.clear();
             constraint.contacts(&mut scratch);
-            room += contacts.len();
+            room += contacts.len() + contacts.rubbing_rows();
             own.push(Part {
                 variation: constraint.variation(),
                 inspects: constraint.inspects(),
@@ -94,6 +100,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 contacts,
                 stale: true,
                 rates: None,
+                slip_rates: None,
             });
         }
         interface.sort_unstable();
@@ -109,9 +116,12 @@ impl<'a, T: Real> Constraints<'a, T> {
             parts: own,
             ids: Vec::with_capacity(room),
             laws: Laws::with_capacity(room),
+            tangents: Tangents::default(),
+            old_tangents: Tangents::default(),
             magnitudes: Vec::with_capacity(room),
             scratch,
             rates: vec![GapRates::default(); room],
+            slip_rates: Vec::new(),
             local,
             interface,
             places,
@@ -241,15 +251,15 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses what does not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, magnitudes, places, admitted, stale, .. } = self;
+        let Self { parts, ids, names, laws, magnitudes, places, admitted, .. } = self;
         jacobian.clear();
         laws.clear();
         magnitudes.clear();
-        *stale = true;
+        self.stale = true;
         for (constraint, part) in parts.iter_mut().enumerate() {
             let Part { contacts, dofs, .. } = part;
             if part.stale {
-                part.rates = None;
+                (part.rates, part.slip_rates) = (None, None);
                 contacts.clear();
                 part.constraint.contacts(contacts);
             }
@@ -272,16 +282,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                     return Err(Error::NotFinite { what, index: laws.len() - 1, value });
                 }
                 magnitudes.push(magnitude);
-                for (place, weight) in contacts.row(row) {
-                    let dof = match dofs.get(place) {
-                        Some(&dof) if places[dof] != UNKNOWN => dof,
-                        _ => return Err(Error::UnlistedPlace { contact, place }),
-                    };
-                    if !weight.is_finite() {
-                        let value = weight.value();
-                        return Err(Error::NotFinite { what: "a weight of a contact row (by dof)", index: dof, value });
-                    }
-                }
+                check_entries(contacts.row(row), (dofs, places), contact, "a weight of a contact row (by dof)")?;
             }
             jacobian.append(contacts.rows(), dofs);
         }
@@ -289,16 +290,50 @@ impl<'a, T: Real> Constraints<'a, T> {
             names.change();
             ids.truncate(laws.len());
         }
-        jacobian.locate(places);
-        for part in parts {
+        self.read_tangents(jacobian)?;
+        jacobian.locate(&self.places);
+        for part in &mut self.parts {
             part.stale = false;
         }
-        *stale = false;
+        self.stale = false;
         self.version += 1;
-        if self.ids.len() > self.room {
-            self.room = self.ids.len().max(2 * self.room);
+        if jacobian.rows() > self.room {
+            self.room = jacobian.rows().max(2 * self.room);
         }
         self.distribute();
+        Ok(())
+    }
+
+    /// Reads the tangential rows of contacts with friction, which stand behind those of all gaps.
+    fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
+        let Self { parts, ids, names, laws, tangents, old_tangents, places, admitted, .. } = self;
+        std::mem::swap(tangents, old_tangents);
+        tangents.clear();
+        if parts.iter().any(|part| part.contacts.has_friction()) {
+            tangents.begin(laws.len());
+            jacobian.end_normals();
+            for part in parts.iter() {
+                let Part { contacts, dofs, .. } = part;
+                for own in 0..contacts.len() {
+                    let (row, friction) = (tangents.listed(), contacts.friction(own));
+                    if friction == 0.0 {
+                        tangents.push(0.0, 0);
+                        continue;
+                    }
+                    let rows = contacts.tangents_of(own);
+                    admitted.check_friction(ids[row], (friction, laws[row], rows.len()))?;
+                    for tangent in rows.clone() {
+                        let entries = contacts.tangent_rows().row(tangent);
+                        check_entries(entries, (dofs, places), ids[row], "a weight of a tangent (by dof)")?;
+                    }
+                    tangents.push(friction, rows.len());
+                    jacobian.append_rows((contacts.tangent_rows(), rows), dofs);
+                }
+            }
+        }
+        if !tangents.has_rows_of(old_tangents) {
+            names.change();
+        }
         Ok(())
     }
 
@@ -326,12 +361,49 @@ impl<'a, T: Real> Constraints<'a, T> {
         &self.interface
     }
 
+    /// The place of a dof on the interface; none of one that is prescribed, or that contact never acts on.
+    pub(crate) fn place(&self, dof: usize) -> Option<usize> {
+        Some(self.places[dof]).filter(|&place| place < self.interface.len())
+    }
+
     /// The laws of all rows.
     pub(crate) fn laws(&self) -> &Laws {
         &self.laws
     }
 
-    /// Number of rows.
+    /// The tangential rows of contacts with friction.
+    pub(crate) fn tangents(&self) -> &Tangents {
+        &self.tangents
+    }
+
+    /// What the multipliers of a contact belong to.
+    pub(crate) fn set(&self, row: usize) -> AdmissibleSet {
+        match self.tangents.of(row).len() {
+            0 => self.laws[row].into(),
+            rows => AdmissibleSet::with_friction(self.tangents.friction(row), rows, false),
+        }
+    }
+
+    /// The contact of a row, tangential or not.
+    pub(crate) fn id_of(&self, row: usize) -> ContactId {
+        match self.ids.get(row) {
+            Some(&id) => id,
+            None => self.ids[self.tangents.owner(row)],
+        }
+    }
+
+    /// [`rows_of`](Self::rows_of) with the rows of friction of these contacts.
+    pub(crate) fn all_rows_of<'c>(
+        &'c self,
+        contacts: &'c ContactState<T>,
+    ) -> impl Iterator<Item = (usize, usize)> + 'c {
+        let rows = |(contact, row): (usize, usize)| {
+            std::iter::once((contact, row)).chain(contacts.tangents.of(contact).zip(self.tangents.of(row)))
+        };
+        self.rows_of(contacts).flat_map(rows)
+    }
+
+    /// Number of candidates: of the rows of their gaps.
     pub(crate) fn len(&self) -> usize {
         self.ids.len()
     }
@@ -365,4 +437,24 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         Ok(())
     }
+}
+
+/// Refuses (place, weight) pairs of a row that are not of the dofs that its constraint has listed, and weights that are
+/// no numbers.
+fn check_entries<T: Real>(
+    entries: impl Iterator<Item = (usize, T)>,
+    (dofs, places): (&[usize], &[usize]),
+    contact: ContactId,
+    what: &'static str,
+) -> Result<()> {
+    for (place, weight) in entries {
+        let dof = match dofs.get(place) {
+            Some(&dof) if places[dof] != UNKNOWN => dof,
+            _ => return Err(Error::UnlistedPlace { contact, place }),
+        };
+        if !weight.is_finite() {
+            return Err(Error::NotFinite { what, index: dof, value: weight.value() });
+        }
+    }
+    Ok(())
 }

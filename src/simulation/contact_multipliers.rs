@@ -21,6 +21,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, clock, constraints, g, part, .. } = self;
         let ContactWork { trial, rows, .. } = contact;
         let mut needed = false;
+        for row in constraints.tangents().all() {
+            if rows.weight[row] > T::zero() {
+                trial.lambda_raw[row] = T::zero();
+            }
+        }
         let laws = constraints.laws();
         for row in 0..constraints.len() {
             let law = &laws[row];
@@ -67,6 +72,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
             // The laws at the solution.
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
+                if self.g.is_tangential(row) {
+                    continue;
+                }
                 let law = self.constraints.law(row);
                 if law.is_nonlinear() {
                     let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
@@ -91,7 +99,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if !again {
                 for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                     if !lambda.is_finite() {
-                        let (contact, value) = (self.constraints.ids[row], lambda.value());
+                        let (contact, value) = (self.constraints.id_of(row), lambda.value());
                         return Err(Error::ContactNotFinite { t, what: "the multiplier", contact, value });
                     }
                     forces.interface_scatter(row, lambda, &mut interface.forces);
@@ -141,19 +149,20 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let count = constraints.len();
         loop {
             sorted.clear();
-            sorted.extend((0..count).filter(|&row| in_problem[row]));
+            constraints.tangents().expand((0..count).filter(|&row| in_problem[row]), sorted);
             operator.sort(forces, sorted);
             problem.clear();
             problem.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
-            for buffer in [&mut *offset, &mut *problem_tolerance] {
-                buffer.clear();
-            }
+            offset.clear();
+            problem_tolerance.clear();
             sets.clear();
             // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
             for &j in problem.iter() {
                 offset.push((y[j] + shift[j]) / weight[j]);
                 problem_tolerance.push(tolerance[j] / weight[j]);
-                sets.push(constraints.law(j).into());
+                if !forces.is_tangential(j) {
+                    sets.push(constraints.set(j));
+                }
             }
             let guess = |problem: &[usize], multipliers: &mut Vec<T>| {
                 multipliers.clear();
@@ -161,7 +170,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             };
             let InterfaceWork { pressing, response, .. } = &mut *interface;
             let mut solved = None;
-            if operator.applies(problem.len()) {
+            if operator.applies(problem.len()) && constraints.tangents().is_empty() {
                 own.clear();
                 own.extend(problem.iter().map(|&row| compliance[row] / weight[row]));
                 guess(problem, multipliers);
@@ -172,7 +181,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 statistics.contact_iterations += iterations as u64;
             } else {
                 guess(problem, multipliers);
-                let mut iterations = 0;
+                let (mut iterations, mut first_set) = (0, 0);
                 for group in 0..operator.groups().len() {
                     let range = operator.groups().range(group);
                     if range.len() > *reserved {
@@ -182,11 +191,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     let own = &problem[range.clone()];
                     let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
                     let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
-                    let (offset, sets) = (&offset[range.clone()], &sets[range.clone()]);
+                    // (A contact with friction is one block of several rows.)
+                    let blocks = own.iter().filter(|&&row| !forces.is_tangential(row)).count();
+                    let (offset, sets) = (&offset[range.clone()], &sets[first_set..first_set + blocks]);
+                    first_set += blocks;
                     let tolerance = &problem_tolerance[range.clone()];
                     let data = ContactProblem::of(delassus, offset, sets, tolerance, version);
                     let solved = solver.solve(&data, &mut multipliers[range]);
-                    let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[own[i]]));
+                    let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.id_of(own[i])));
                     iterations = iterations.max(spent?);
                 }
                 statistics.contact_iterations += iterations as u64;

@@ -19,6 +19,12 @@ pub struct ContactForce<T> {
     pub force: T,
     /// The (dof, weight) pairs of the row of G, along which the force acts and the gap is measured: its normal.
     pub row: Vec<(usize, T)>,
+    /// The friction forces along the tangents, and the velocities of the slip along them: those of
+    /// [`ContactState::friction_forces`](crate::state::ContactState::friction_forces) and
+    /// [`slip`](crate::state::ContactState::slip). Empty without friction.
+    pub friction: Vec<T>,
+    /// See [`friction`](Self::friction).
+    pub slip: Vec<T>,
     /// Rows beside it along which bodies slide, if the constraint has said them, as (dof, weight) pairs.
     pub tangents: Vec<Vec<(usize, T)>>,
     /// Where the contact is (length), if its constraint knows: nodes at the end of the step.
@@ -28,9 +34,12 @@ pub struct ContactForce<T> {
 }
 
 impl<T: Real> ContactForce<T> {
-    /// The force on each dof that the contact acts on, as (dof, force) pairs: λ times the row.
+    /// The force on the dofs that the contact acts on, as (dof, force) pairs: λ times the row, and friction times the
+    /// tangents. A dof may occur more than once.
     pub fn forces(&self) -> impl Iterator<Item = (usize, T)> + '_ {
-        self.row.iter().map(|&(dof, weight)| (dof, self.force * weight))
+        let rows =
+            std::iter::once((&self.row, self.force)).chain(self.tangents.iter().zip(self.friction.iter().copied()));
+        rows.flat_map(|(row, force)| row.iter().map(move |&(dof, weight)| (dof, force * weight)))
     }
 }
 
@@ -73,8 +82,13 @@ impl<T: Real> Simulation<'_, T> {
                 status: contacts.status(contact),
                 gap: contacts.gap[contact],
                 force: contacts.lambda[contact],
+                friction: contacts.friction_forces(contact).to_vec(),
+                slip: contacts.slip(contact).to_vec(),
                 row: self.g.row(row).collect(),
-                tangents: said.tangents(own).into_iter().map(on_system).collect(),
+                tangents: match self.constraints.tangents().of(row) {
+                    rows if rows.is_empty() => said.tangents(own).into_iter().map(on_system).collect(),
+                    rows => rows.map(|row| self.g.row(row).collect()).collect(),
+                },
                 position: said.position(own),
                 normal: said.normal(own),
             }

@@ -32,9 +32,14 @@ impl Part {
     }
 }
 
-/// Buffers of the contact problem, one entry a candidate unless said otherwise.
+/// Buffers of the contact problem, one entry a row of G unless said otherwise: a candidate, or behind all of them a
+/// tangential row.
 pub(super) struct ContactRowsWork<T> {
     pub(super) rates: Vec<GapRates<T>>,
+    /// The same of slips, one a tangential row.
+    pub(super) slips: Vec<GapRates<T>>,
+    /// Free dofs without mass.
+    pub(super) massless: Vec<usize>,
     /// What is complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
     pub(super) y: Vec<T>,
     pub(super) tolerance: Vec<T>,
@@ -86,6 +91,8 @@ impl<T: Real> ContactRowsWork<T> {
     pub(super) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
         let mut work = Self {
             rates: Vec::new(),
+            slips: Vec::new(),
+            massless: Vec::new(),
             y: Vec::new(),
             tolerance: Vec::new(),
             weight: Vec::new(),
@@ -124,6 +131,9 @@ impl<T: Real> ContactRowsWork<T> {
             values.resize(rows, T::zero());
         }
         rates.resize(rows, GapRates::default());
+        if !self.slips.is_empty() {
+            self.slips.resize(rows, GapRates::default());
+        }
         let Self { curved, measure, enabled, in_problem, on_massless, problem, sorted, sets, .. } = self;
         curved.make_room(rows, entries);
         measure.resize(rows, Measure::AsScheme);

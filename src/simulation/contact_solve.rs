@@ -76,7 +76,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 return Ok(true);
             }
             operator.follow(contact.rows.curved.version(self.constraints));
-            let before = std::mem::replace(&mut miss, self.miss(new, contact)?);
+            let before = std::mem::replace(&mut miss, self.miss(new, past, contact)?);
             contact.rows.curved.miss = miss.largest();
             if miss.is_settled::<T>(pass + 1, before) {
                 return Ok(true);
@@ -107,6 +107,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
         }
         self.evaluate(new, contact)?;
+        self.evaluate_slips(new, past, contact)?;
         self.extrapolate(new, contact);
         self.restitution(past, &mut contact.rows)
     }

@@ -26,6 +26,8 @@ pub(super) struct ContactWork<T> {
     /// Closed flags at the start of the step, and before the present stage.
     pub(super) closed_at_start: Vec<bool>,
     pub(super) was_closed: Vec<bool>,
+    /// Which contacts friction held before the present stage; empty without friction.
+    pub(super) was_sticking: Vec<bool>,
 }
 
 /// What the contact of a stage is solved with.
@@ -111,6 +113,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let [rigid, balance_u, balance_a] = self.weights();
         if self.constraints.laws().are_uniform() && self.part == Part::All {
             rows.weight.fill(rigid);
+            self.weigh_slips(rows);
             return;
         }
         for (row, law) in self.constraints.laws().iter().enumerate() {
@@ -121,6 +124,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             };
             rows.weight[row] = if self.part.takes(&rows.on_massless, row) { weight } else { T::zero() };
         }
+        self.weigh_slips(rows);
     }
 
     /// Whether d is part of the displacements of the state: explicit schemes know these before it.

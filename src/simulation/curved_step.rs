@@ -65,6 +65,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
             rows.y[row] += weight * forces.interface_product(row, &interface.tried);
             rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
         }
+        for row in self.constraints.tangents().all() {
+            let weight = rows.weight[row];
+            rows.y[row] += weight * forces.interface_product(row, &interface.tried);
+            rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
+        }
         Ok(())
     }
 
@@ -93,6 +98,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 false => T::zero(),
             };
             curved.foreseen[row] = start + weight * way;
+        }
+        for row in self.constraints.tangents().all() {
+            let way = match needed {
+                true => curved.forces(self.g).interface_product(row, &contact.interface.response),
+                false => T::zero(),
+            };
+            curved.foreseen[row] = y[row] + weight[row] * way;
         }
     }
 
@@ -140,8 +152,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
 
     /// How much gaps and forces of the rows linearized at d differ from those that were solved for. Leaves y of the
     /// rows at the d that was placed.
-    pub(super) fn miss(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> Result<Miss> {
+    pub(super) fn miss(&mut self, new: &Motion<T>, past: &[Motion<T>], contact: &mut ContactWork<T>) -> Result<Miss> {
         self.evaluate(new, contact)?;
+        self.evaluate_slips(new, past, contact)?;
         let Self { constraints, g, part, .. } = self;
         let ContactWork { rows, trial, interface, .. } = contact;
         let forces = rows.curved.forces(g);
@@ -157,6 +170,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 tolerance = constraints.gap_rounding(row, g.magnitude(row, &new.u), y);
                 scale = scale.max(y.abs());
             }
+            // (Where a gap is zero in zero coordinates nothing else is left of the way that the force has taken back.)
+            tolerance += rounding(rows.weight[row].abs() * forces.interface_magnitude(row, &interface.free));
             let pressed = lambda > T::zero() || law.is_equality();
             let miss = match pressed {
                 true => (y - rows.curved.foreseen[row]).abs(),
@@ -170,6 +185,21 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             if miss > worst.1 {
                 worst = (row, miss);
+            }
+        }
+        for row in constraints.tangents().all() {
+            let lambda = trial.lambda_raw[row];
+            forces.interface_scatter(row, lambda, &mut interface.response);
+            let owner = constraints.tangents().owner(row);
+            if trial.lambda_raw[owner] > T::zero() && rows.weight[row] > T::zero() {
+                let scale = rows.weight[row] * forces.interface_magnitude(row, &interface.increment);
+                // (What sticks has a slip of nothing but the rounding of what friction has taken back.)
+                let taken = rounding(rows.weight[row] * forces.interface_magnitude(row, &interface.free));
+                let beyond = (rows.y[row] - rows.curved.foreseen[row]).abs() - rows.tolerance[row] - taken;
+                if beyond > T::zero() {
+                    let noise = T::of(NOISE / NEAR) * rows.tolerance[row];
+                    largest = largest.max((beyond / (scale.max(rows.y[row].abs()) + noise)).value());
+                }
             }
         }
         let moved = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| (new - old).value().powi(2));

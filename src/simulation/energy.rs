@@ -23,6 +23,9 @@ pub(crate) struct Ledger<T> {
     /// Gᵀ λ at the start and at the end of a step, one entry a dof.
     contact: Vec<T>,
     next_contact: Vec<T>,
+    /// The same of friction; empty as long as there is none.
+    friction: Vec<T>,
+    next_friction: Vec<T>,
     /// Works and damping power at the end of a step that is not accepted yet.
     next: (Works<T>, T),
 }
@@ -60,6 +63,8 @@ impl<T: Real> Ledger<T> {
             next_reactions: vec![T::zero(); system.prescribed().len()],
             contact: zero(),
             next_contact: zero(),
+            friction: Vec::new(),
+            next_friction: Vec::new(),
             next: (Works::default(), T::zero()),
         };
         let energy = energy(system, state, None);
@@ -87,8 +92,13 @@ impl<T: Real> Ledger<T> {
         std::mem::swap(&mut self.load, &mut self.old_load);
         let (constraints, g) = rows;
         self.contact.fill(T::zero());
-        for (contact, row) in constraints.rows_of(&state.contacts) {
-            g.scatter(row, state.contacts.lambda[contact], &mut self.contact);
+        if !constraints.tangents().is_empty() {
+            self.friction.resize(self.contact.len(), T::zero());
+        }
+        self.friction.fill(T::zero());
+        for (contact, row) in constraints.all_rows_of(&state.contacts) {
+            let forces = if g.is_tangential(row) { &mut self.friction } else { &mut self.contact };
+            g.scatter(row, state.contacts.lambda[contact], forces);
         }
         Ok(())
     }
@@ -122,15 +132,25 @@ impl<T: Real> Ledger<T> {
         let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
         let loads = self.load.iter().zip(&self.old_load).map(|(&old, &new)| half * (old + new));
         works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
+        if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
+            self.friction.resize(u.len(), T::zero());
+        }
+        self.next_friction.resize(self.friction.len(), T::zero());
         self.next_contact.fill(T::zero());
+        self.next_friction.fill(T::zero());
         for (row, &force) in books.contacts.lambda.iter().enumerate() {
-            books.forces.scatter(row, force, &mut self.next_contact);
+            let tangential = books.forces.is_tangential(row);
+            books.forces.scatter(row, force, if tangential { &mut self.next_friction } else { &mut self.next_contact });
         }
         // The force in the middle of the step, by the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
-        let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
-        let forces = self.contact.iter().zip(&self.next_contact).map(|(&old, &new)| old + newest * (new - old));
-        works.contact += moves.zip(forces).map(|(du, f)| du * f).sum();
+        let work = |old: &[T], new: &[T]| {
+            let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
+            let forces = old.iter().zip(new).map(|(&old, &new)| old + newest * (new - old));
+            moves.zip(forces).map(|(du, f)| du * f).sum::<T>()
+        };
+        works.contact += work(&self.contact, &self.next_contact);
+        works.friction += work(&self.friction, &self.next_friction);
         works.corrections += books.corrections;
         let power = self.damping_power(system, u, v)?;
         works.damping += half * (self.power + power) * T::of(books.h);
@@ -144,11 +164,12 @@ impl<T: Real> Ledger<T> {
         std::mem::swap(&mut self.load, &mut self.old_load);
         std::mem::swap(&mut self.reactions, &mut self.next_reactions);
         std::mem::swap(&mut self.contact, &mut self.next_contact);
+        std::mem::swap(&mut self.friction, &mut self.next_friction);
     }
 
     fn works(&self, total: T) -> Works<T> {
-        let Works { load, supports, damping, contact, corrections, .. } = self.works;
-        let remainder = total - self.start - (load + supports + damping + contact + corrections);
+        let Works { load, supports, damping, contact, friction, corrections, .. } = self.works;
+        let remainder = total - self.start - (load + supports + damping + contact + friction + corrections);
         Works { remainder, ..self.works }
     }
 }
@@ -175,8 +196,8 @@ pub(crate) fn reactions<T: Real>(
     state: &State<T>,
     (constraints, g): Rows<'_, '_, T>,
 ) -> Result<Vec<T>> {
-    let mut forces = vec![T::zero(); constraints.len()];
-    for (contact, row) in constraints.rows_of(&state.contacts) {
+    let mut forces = vec![T::zero(); constraints.len() + constraints.tangents().len()];
+    for (contact, row) in constraints.all_rows_of(&state.contacts) {
         forces[row] = state.contacts.lambda[contact];
     }
     let mut residual = vec![T::zero(); system.dofs()];

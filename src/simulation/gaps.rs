@@ -2,7 +2,7 @@
 
 use super::constraint_part::{Part, gather, of};
 use super::constraints::Constraints;
-use crate::contact::{ContactLaw, GapRates, Rates, Variation};
+use crate::contact::{ContactLaw, GapRates, Rates, Tangents, Variation};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -91,6 +91,52 @@ impl<T: Real> Constraints<'_, T> {
         Ok(())
     }
 
+    /// What the slips of contacts with friction have of their own, one entry a tangential row.
+    pub(crate) fn finite_slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        let Self { parts, ids, tangents, slip_rates, local, .. } = self;
+        let (mut contact, mut filled) = (0, 0);
+        for (number, part) in parts.iter_mut().enumerate() {
+            let first = contact;
+            contact += part.contacts.len();
+            if !part.contacts.has_friction() {
+                continue;
+            }
+            let rows = part.contacts.tangent_rows().rows();
+            slip_rates.clear();
+            slip_rates.resize(rows, GapRates::default());
+            if part.slip_rates != Some(Rates::Zero) {
+                let (u, v) = (gather(&part.dofs, u, &mut local.u), gather(&part.dofs, v, &mut local.v));
+                let answer = part.constraint.slip_rates(t, u, v, slip_rates).map_err(|error| of(number, error))?;
+                match answer {
+                    Rates::Given => {}
+                    Rates::Zero => slip_rates.fill(GapRates::default()),
+                    Rates::Differences => {
+                        return Err(Error::Incompatible {
+                            part: format!("constraint {number}, with friction"),
+                            reason: "the motion of its surface along itself does not follow from differences of the \
+                                     gaps; give the rates of slip",
+                        });
+                    }
+                }
+                part.slip_rates = Some(answer);
+            }
+            for row in (first..contact).filter(|&row| !tangents.of(row).is_empty()) {
+                for rates in &slip_rates[part.contacts.tangents_of(row - first)] {
+                    for (what, value) in [("the slip rate", rates.rate), ("the slip acceleration", rates.acceleration)]
+                    {
+                        if !value.is_finite() {
+                            let value = value.value();
+                            return Err(Error::ContactNotFinite { t, what, contact: ids[row], value });
+                        }
+                    }
+                    out[filled] = *rates;
+                    filled += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Whether the constraint of a row has given its rates when they were asked for.
     pub(crate) fn gives_rates(&self, row: usize) -> bool {
         self.parts[self.ids[row].constraint].rates != Some(Rates::Differences)
@@ -108,6 +154,14 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
         self.finite_rates(t, u, v, out)
+    }
+
+    fn tangents(&self) -> &Tangents {
+        &self.tangents
+    }
+
+    fn slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        self.finite_slip_rates(t, u, v, out)
     }
 
     fn elsewhere(

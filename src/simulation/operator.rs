@@ -265,7 +265,7 @@ impl<T: Real> Operator<T> {
         match self.contact {
             ContactPath::Apart => {
                 let acts_on = |row| g.located(row).map(|(place, _)| place);
-                self.groups.sort(rows, self.interface.len(), acts_on);
+                self.groups.sort(rows, self.interface.len(), |row| g.is_tangential(row), acts_on);
             }
             ContactPath::Condensed | ContactPath::Full => self.groups.together(rows.len()),
         }

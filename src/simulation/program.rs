@@ -8,7 +8,7 @@ use crate::linear_solver::LinearSolver;
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
-use crate::tableau::{ContactLevel, MAX_PAST, Row, Rows, Stage, StageForce, Tableau};
+use crate::tableau::{ContactLevel, MAX_PAST, Row, Rows, Stage, StageForce, Tableau, U};
 use std::ops::Range;
 
 /// One term of a row: coefficient times one field of one past state.
@@ -82,6 +82,16 @@ impl<T: Real> ScaledRow<T> {
         }
         let (plain, differences) = sources[..self.terms.len()].split_at(self.plain);
         T::combine(plain, differences, &newest.u[block.clone()], out);
+    }
+
+    /// The part that comes from the past, if any does, at a dof.
+    pub(crate) fn past_at(&self, past: &[Motion<T>], dof: usize) -> Option<T> {
+        let newest = past.first().filter(|_| !self.terms.is_empty())?;
+        let term = |term: &Term<T>| {
+            let value = past[term.state].field(term.field)[dof];
+            term.c * if term.is_difference() { value - newest.u[dof] } else { value }
+        };
+        Some(self.terms.iter().map(term).sum())
     }
 
     /// Writes the part that comes from the past at some dofs; without a term nothing is written.
@@ -160,6 +170,19 @@ impl<T: Real> ContactTarget<T> {
     }
 }
 
+/// The way from the state of a stage to where contact is imposed, or from where the stage starts to its state.
+fn way<T: Real>(stage: &Stage, h: f64) -> ScaledRow<T> {
+    let increment = stage.increment();
+    ScaledRow::new(
+        match stage.contact {
+            ContactLevel::POSITION => increment.recovery.u - U[0],
+            _ => increment.contact_row() - increment.recovery.u,
+        },
+        0,
+        h,
+    )
+}
+
 /// One stage, compiled.
 #[derive(Debug)]
 pub(crate) struct CompiledStage<T> {
@@ -168,6 +191,9 @@ pub(crate) struct CompiledStage<T> {
     pub(crate) balance: Option<ScaledRows<T>>,
     /// Only where contact is not imposed on the displacements of the stage's own state.
     pub(crate) contact: Option<ContactTarget<T>>,
+    /// The way along which contact with friction slides, where that is no velocity: to where contact is imposed ahead of
+    /// the state, or in the stage.
+    pub(crate) way: ScaledRow<T>,
     pub(crate) load: f64,
     /// The fractions of the step at which the stage starts and ends.
     pub(crate) start: f64,
@@ -193,6 +219,7 @@ impl<T: Real> CompiledStage<T> {
             recovery: ScaledRows([row(1.0), row(0.0), row(0.0)]),
             balance: None,
             contact: None,
+            way: row(1.0),
             load: 1.0,
             start: 0.0,
             end: 1.0,
@@ -247,6 +274,7 @@ impl<T: Real> Program<T> {
             compiled.recovery = ScaledRows::new(&increment.recovery, h);
             compiled.balance = (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, h));
             compiled.contact = ContactTarget::new(stage, h);
+            compiled.way = way(stage, h);
         }
         Ok(())
     }
@@ -304,6 +332,7 @@ impl<T: Real> Compiler<'_, T> {
                 recovery: ScaledRows::new(&increment.recovery, self.h),
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
                 contact: ContactTarget::new(stage, self.h),
+                way: way(stage, self.h),
                 load: stage.load,
                 start: s.checked_sub(1).map_or(0.0, |before| stages[before].end),
                 end: stage.end,

@@ -81,8 +81,10 @@ pub struct Works<T> {
     pub supports: T,
     /// Work of damping (not positive).
     pub damping: T,
-    /// Work of the reported contact forces.
+    /// Work of the reported contact forces along the normals.
     pub contact: T,
+    /// Work of the reported friction forces on the bodies: not positive where obstacles do not move along themselves.
+    pub friction: T,
     /// Change of kinetic energy by corrections of velocity.
     pub corrections: T,
     /// Total energy minus energy at the start minus all of the above.
@@ -92,11 +94,12 @@ pub struct Works<T> {
 impl<T: Real> Works<T> {
     /// Refuses works that are NaN or infinite.
     pub(super) fn check(&self, t: f64) -> Result<()> {
-        let Self { load, supports, damping, contact, corrections, remainder } = *self;
+        let Self { load, supports, damping, contact, friction, corrections, remainder } = *self;
         finite(t, "the work of the load", load)?;
         finite(t, "the work of the supports", supports)?;
         finite(t, "the work of damping", damping)?;
         finite(t, "the work of contact", contact)?;
+        finite(t, "the work of friction", friction)?;
         finite(t, "the work of corrections", corrections)?;
         finite(t, "the remainder of the works", remainder)
     }

@@ -7,11 +7,11 @@ use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
 use super::scheme::Scheme;
-use super::start_problem::StartProblem;
+use super::start_problem::{StartProblem, sliding};
 use super::supports::put_initial_supports;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Gaps, JumpProjection, rounding};
+use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, rounding};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
 use crate::real::Real;
@@ -151,7 +151,7 @@ impl<T: Real> Start<'_, T> {
         RateCheck::new(constraints.len()).check(constraints, &motion, h, g)?;
         projection.reset();
         let mut contacts = ContactState::with_capacity(constraints.room());
-        contacts.reset(&constraints.ids);
+        contacts.reset(&constraints.ids, constraints.tangents());
         let mut touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
         let mut adjustment = None;
         if let Violation::Initial(_) = violation {
@@ -159,7 +159,7 @@ impl<T: Real> Start<'_, T> {
             adjustment = balance_start(parts, solver, (&mut *constraints, &mut *g), &mut motion, massless, [h, ahead])?;
             if adjustment.is_some() {
                 constraints.search(&motion, ahead, g)?;
-                contacts.reset(&constraints.ids);
+                contacts.reset(&constraints.ids, constraints.tangents());
                 touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
             }
         }
@@ -194,6 +194,7 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
+        rub_springs(constraints, g, &mut **contact_solver, projection, &mut motion, &mut contacts)?;
         if !massless.is_empty() {
             // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
             let mut forces = vec![T::zero(); dofs];
@@ -204,8 +205,8 @@ impl<T: Real> Start<'_, T> {
             let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
             let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching)?;
             problem.rows.retain(|&row| g.acts_on(row, massless));
-            problem.offset = (0..constraints.len()).map(|row| g.product(row, &forces)).collect();
-            problem.tolerance = (0..constraints.len()).map(|row| rounding(g.magnitude(row, &forces))).collect();
+            problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
+            problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
             problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
             problem.press(g, projection, &mut motion, &mut contacts);
         }
@@ -223,6 +224,47 @@ impl<T: Real> Start<'_, T> {
         problem.press(g, projection, &mut motion, &mut contacts);
         Ok(Found { motion, contacts, adjustment })
     }
+}
+
+/// The friction of springs in compression, whose forces are known: it holds what is at rest, and slows what slides.
+fn rub_springs<T: Real>(
+    constraints: &mut Constraints<'_, T>,
+    g: &ContactJacobian<T>,
+    solver: &mut dyn ContactSolver<T>,
+    projection: &mut JumpProjection<T>,
+    motion: &mut Motion<T>,
+    contacts: &mut ContactState<T>,
+) -> Result<()> {
+    let mut slips = vec![GapRates::default(); constraints.tangents().len()];
+    constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
+    let sliding = sliding(constraints, (g, &slips), motion);
+    let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+    for row in tangents.contacts().filter(|&row| constraints.law(row).is_spring() && contacts.closed[row]) {
+        let friction = T::of(tangents.friction(row));
+        let direction = sliding.iter().find(|(other, _)| *other == row).map(|(_, along)| along.map(|f| friction * f));
+        let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
+        problem.push(&Block { direction, known: Some(contacts.lambda[row]), ..block });
+        problem.demand(row, T::zero(), T::zero(), T::zero());
+        for k in tangents.of(row) {
+            let own = slips[k - tangents.all().start].acceleration;
+            let size = g.magnitude(k, &motion.a) + own.abs();
+            problem.demand(k, g.product(k, &motion.a) + own, rounding(size), T::zero());
+        }
+    }
+    if problem.rows.is_empty() {
+        return Ok(());
+    }
+    solver.reserve(problem.rows.len());
+    problem.solve((g, projection), solver, T::one(), (motion.t, |row| constraints.ids[row]))?;
+    projection.prepare(g, &problem.rows);
+    for (&row, &force) in problem.rows.iter().zip(&problem.totals).filter(|(row, _)| g.is_tangential(**row)) {
+        projection.push(g, row, force, &mut motion.a);
+        (contacts.lambda[row], contacts.lambda_raw[row]) = (force, force);
+    }
+    for (row, _) in sliding {
+        contacts.sliding[row] = contacts.closed[row];
+    }
+    Ok(())
 }
 
 /// Rounding of initial gaps, in units of that of our own sums: coordinates may have been written to a file with twelve

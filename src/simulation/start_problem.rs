@@ -4,7 +4,7 @@ use super::constraints::Constraints;
 use super::supports::finite_supports;
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
-use crate::corrector::{Gaps, JumpProjection, contact_error, rounding};
+use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, rounding, slides};
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
@@ -18,11 +18,15 @@ pub(super) struct StartProblem<T> {
     pub(super) rows: Vec<usize>,
     /// Rows that join the problem if the multipliers of the others close them.
     pub(super) waiting: Vec<usize>,
-    /// q and its rounding, one entry a candidate.
+    /// q and its rounding, one entry a row of G.
     pub(super) offset: Vec<T>,
     pub(super) tolerance: Vec<T>,
     /// Additions to the diagonal of S, one entry a candidate.
     compliance: Vec<T>,
+    /// The contacts with friction that slide, with the direction of their friction.
+    sliding: Vec<(usize, [T; 2])>,
+    /// The rows solved for, and their multipliers.
+    solved: Vec<usize>,
     lambda: Vec<T>,
 }
 
@@ -46,15 +50,21 @@ impl<T: Real> StartProblem<T> {
                 rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
             constraints.law(row).is_equality() || touching[row] && still
         });
+        let rows = rows.collect();
+        let mut slips = vec![GapRates::default(); constraints.tangents().len()];
+        constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
+        let sliding = sliding(constraints, (g, &slips), motion);
+        rates.truncate(constraints.len());
+        rates.append(&mut slips);
         let own = |row: usize| rates[row].acceleration;
         Ok(Self {
-            rows: rows.collect(),
+            rows,
             waiting: Vec::new(),
-            offset: (0..constraints.len()).map(|row| g.product(row, &motion.a) + own(row)).collect(),
-            tolerance: (0..constraints.len())
-                .map(|row| rounding(g.magnitude(row, &motion.a) + own(row).abs()))
-                .collect(),
+            offset: (0..g.rows()).map(|row| g.product(row, &motion.a) + own(row)).collect(),
+            tolerance: (0..g.rows()).map(|row| rounding(g.magnitude(row, &motion.a) + own(row).abs())).collect(),
             compliance: vec![T::zero(); constraints.len()],
+            sliding,
+            solved: Vec::new(),
             lambda: Vec::new(),
         })
     }
@@ -146,7 +156,7 @@ impl<T: Real> StartProblem<T> {
             ContactLevel::Position { .. } => constraints.gap_rounding(row, magnitude, y),
             ContactLevel::Velocity { .. } => rounding(magnitude + y.abs()),
         };
-        let tolerance: Vec<T> =
+        let mut tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
         // The stabilized bipenalty compares with the step before: the gap is taken to have been the same.
         if constraints.laws().predictive {
@@ -158,14 +168,37 @@ impl<T: Real> StartProblem<T> {
                 }
             }
         }
-        let offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
+        let mut offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
+        // The slip there, or the way until then.
+        let mut slips = vec![GapRates::default(); constraints.tangents().len()];
+        constraints.finite_slip_rates(t, &motion.u, &motion.v, &mut slips)?;
+        for (row, own) in constraints.tangents().all().zip(&slips) {
+            let slip = match contact {
+                ContactLevel::Position { .. } => {
+                    let way = g.row(row).map(|(dof, weight)| weight * (target[dof] - motion.u[dof])).sum::<T>();
+                    way + T::of(lead) * own.rate
+                }
+                ContactLevel::Velocity { .. } => g.product(row, &target) + own.rate,
+            };
+            offset.push(scale * slip);
+            tolerance.push(scale * rounding(g.magnitude(row, &target)));
+        }
         let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
         let aimed = |row: &usize| open[*row] && constraints.law(*row).needs_multiplier();
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
         // (A mean gap changes by half of the response.)
         let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(T::one(), T::zero()).0;
         let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
-        Ok(Self { rows, waiting, offset, tolerance, compliance, lambda: Vec::new() })
+        Ok(Self {
+            rows,
+            waiting,
+            offset,
+            tolerance,
+            compliance,
+            sliding: Vec::new(),
+            solved: Vec::new(),
+            lambda: Vec::new(),
+        })
     }
 
     /// Applies the multipliers and closes their contacts.
@@ -176,12 +209,18 @@ impl<T: Real> StartProblem<T> {
         motion: &mut Motion<T>,
         contacts: &mut ContactState<T>,
     ) {
-        projection.prepare(g, &self.rows);
-        for (&row, &lambda) in self.rows.iter().zip(&self.lambda) {
+        projection.prepare(g, &self.solved);
+        for (&row, &lambda) in self.solved.iter().zip(&self.lambda) {
             projection.push(g, row, lambda, &mut motion.a);
             contacts.lambda[row] = lambda;
             contacts.lambda_raw[row] = lambda;
-            contacts.closed[row] = true;
+            if !g.is_tangential(row) {
+                contacts.closed[row] = true;
+            }
+        }
+        for &row in self.rows.iter().filter(|&&row| !contacts.tangents.of(row).is_empty()) {
+            let bound = T::of(contacts.tangents.friction(row)) * contacts.lambda[row];
+            contacts.sliding[row] = slides(contacts.tangential(row, &contacts.lambda), bound);
         }
     }
 
@@ -193,25 +232,16 @@ impl<T: Real> StartProblem<T> {
         projection: &mut JumpProjection<T>,
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
-        let Self { rows, waiting, offset, tolerance, compliance, lambda } = self;
-        let mut s = Vec::new();
-        while !rows.is_empty() {
-            projection.assemble(g, rows, &mut s);
-            for (k, &row) in rows.iter().enumerate() {
-                s[k * rows.len() + k] += compliance[row];
+        self.solved.clear();
+        while !self.rows.is_empty() {
+            match constraints.tangents().is_empty() {
+                true => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
+                false => self.solve_rubbing(t, constraints, (g, &mut *projection), solver)?,
             }
-            let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
-            let sets: Vec<AdmissibleSet> = rows.iter().map(|&row| constraints.law(row).into()).collect();
-            let (q, rounded) = (pick(offset), pick(tolerance));
-            lambda.clear();
-            lambda.resize(rows.len(), T::zero());
-            solver.reserve(rows.len());
-            let problem = ContactProblem::of(&s, &q, &sets, &rounded, 0);
-            solver
-                .solve(&problem, lambda)
-                .map_err(|failure| contact_error(t, failure, |i| constraints.ids[rows[i]]))?;
+            let Self { rows, waiting, offset, tolerance, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];
-            for (&row, &lambda) in rows.iter().zip(lambda.iter()) {
+            projection.prepare(g, solved);
+            for (&row, &lambda) in solved.iter().zip(lambda.iter()) {
                 projection.push(g, row, lambda, &mut pushed);
             }
             let violated = |row: &usize| offset[*row] + g.product(*row, &pushed) < -tolerance[*row];
@@ -225,4 +255,80 @@ impl<T: Real> StartProblem<T> {
         }
         Ok(())
     }
+
+    /// Solves on the rows that take part.
+    fn solve_gaps(
+        &mut self,
+        t: f64,
+        constraints: &Constraints<'_, T>,
+        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        solver: &mut dyn ContactSolver<T>,
+    ) -> Result<()> {
+        let Self { rows, offset, tolerance, compliance, solved, lambda, .. } = self;
+        solved.clone_from(rows);
+        let mut s = Vec::new();
+        projection.assemble(g, rows, &mut s);
+        for (k, &row) in rows.iter().enumerate() {
+            s[k * rows.len() + k] += compliance[row];
+        }
+        let pick = |values: &[T]| -> Vec<T> { rows.iter().map(|&row| values[row]).collect() };
+        let sets: Vec<AdmissibleSet> = rows.iter().map(|&row| constraints.law(row).into()).collect();
+        let (q, rounded) = (pick(offset), pick(tolerance));
+        lambda.clear();
+        lambda.resize(rows.len(), T::zero());
+        solver.reserve(rows.len());
+        let problem = ContactProblem::of(&s, &q, &sets, &rounded, 0);
+        let solved = solver.solve(&problem, lambda);
+        solved.map_err(|failure| contact_error(t, failure, |i| constraints.ids[rows[i]]))?;
+        Ok(())
+    }
+
+    /// The same where contacts have friction: what slides has its direction.
+    fn solve_rubbing(
+        &mut self,
+        t: f64,
+        constraints: &Constraints<'_, T>,
+        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        solver: &mut dyn ContactSolver<T>,
+    ) -> Result<()> {
+        let Self { rows, offset, tolerance, compliance, sliding, solved, lambda, .. } = self;
+        let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+        for &row in rows.iter() {
+            let direction = sliding.iter().find(|(other, _)| *other == row).map(|(_, direction)| *direction);
+            let direction = direction.map(|along| along.map(|f| T::of(tangents.friction(row)) * f));
+            let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
+            problem.push(&Block { direction, compliance: compliance[row], ..block });
+            for row in std::iter::once(row).chain(tangents.of(row)) {
+                problem.demand(row, offset[row], tolerance[row], T::zero());
+            }
+        }
+        solver.reserve(problem.rows.len());
+        problem.solve((g, projection), solver, T::one(), (t, |row| constraints.ids[row]))?;
+        *solved = problem.rows;
+        *lambda = problem.totals;
+        Ok(())
+    }
+}
+
+/// The contacts with friction that slide at the start, with the direction of their friction: against the slip.
+pub(super) fn sliding<T: Real>(
+    constraints: &Constraints<'_, T>,
+    (g, rates): (&ContactJacobian<T>, &[GapRates<T>]),
+    motion: &Motion<T>,
+) -> Vec<(usize, [T; 2])> {
+    let tangents = constraints.tangents();
+    let mut sliding = Vec::new();
+    for row in tangents.contacts() {
+        let (mut slip, mut noise) = ([T::zero(); 2], T::zero());
+        for (slip, k) in slip.iter_mut().zip(tangents.of(row)) {
+            let own = rates[k - tangents.all().start].rate;
+            *slip = g.product(k, &motion.v) + own;
+            noise = noise.max(rounding(g.magnitude(k, &motion.v) + own.abs()));
+        }
+        let speed = slip[0].hypot(slip[1]);
+        if speed > noise {
+            sliding.push((row, slip.map(|slip| -slip / speed)));
+        }
+    }
+    sliding
 }

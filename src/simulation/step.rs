@@ -1,6 +1,6 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything as it was.
 
-use super::closing::Booking;
+use super::closing::{Booking, note_slips};
 use super::contact_rows::Part;
 use super::contact_step::ContactStep;
 use super::energy::StepBooks;
@@ -28,7 +28,7 @@ impl<T: Real> Simulation<'_, T> {
             state.contacts.make_room(constraints.room());
             contact_solver.reserve(constraints.room());
         }
-        work.contact.trial.carry_over(&state.contacts, constraints.named());
+        work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
         if let Some(ledger) = ledger {
             ledger.begin(state);
         }
@@ -63,6 +63,7 @@ impl<T: Real> Simulation<'_, T> {
         const EVERY: u64 = 64;
         let Self { constraints, g, history, work, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
+        note_slips(constraints, g, new, &mut work.contact)?;
         // (Where correctors have edited the start of the step, it is the edited one.)
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
@@ -243,6 +244,7 @@ impl<T: Real> Simulation<'_, T> {
                         backup: &mut work.backup,
                         contacts: &mut work.contact.trial,
                         was_closed: &work.contact.was_closed,
+                        was_sticking: &work.contact.was_sticking,
                         massless: &work.massless,
                         prescribed: &work.vectors.supports.dofs,
                         buffers: &mut work.correction.buffers,

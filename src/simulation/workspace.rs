@@ -93,6 +93,7 @@ impl<T: Real> Workspace<T> {
                 trial: ContactState::with_capacity(rows),
                 closed_at_start: Vec::with_capacity(rows),
                 was_closed: Vec::with_capacity(rows),
+                was_sticking: Vec::new(),
             },
             vectors: StageVectors {
                 increment: vec![T::zero(); dofs],
@@ -114,6 +115,12 @@ impl<T: Real> Workspace<T> {
             shown: [Vec::new(), Vec::new()],
             backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         }
+    }
+
+    /// Keeps the free dofs without mass.
+    pub(super) fn keep_massless(&mut self, massless: Vec<usize>) {
+        self.contact.rows.massless.clone_from(&massless);
+        self.massless = massless;
     }
 
     /// Memory for so many contacts, of so many weights in all.

@@ -1,6 +1,6 @@
 //! What a state holds of its contacts.
 
-use crate::contact::ContactId;
+use crate::contact::{ContactId, Tangents};
 use crate::real::Real;
 
 /// What a contact does.
@@ -11,8 +11,12 @@ pub enum ContactStatus {
     Open,
     /// Closed within rounding, and not pressed.
     Touching,
-    /// Pressed (or, under an equality, held).
+    /// Pressed (or, under an equality, held), without friction.
     Closed,
+    /// Pressed, and held by friction.
+    Sticking,
+    /// Pressed, and sliding: friction is μ times the force.
+    Sliding,
 }
 
 /// Which version of the names of all rows of a run a list holds: lists of one version are equal.
@@ -39,9 +43,13 @@ impl PartialEq for Names {
 }
 
 /// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
+///
+/// Where contacts have friction the multipliers of tangential rows stand behind those of all gaps: forces, impulses, λ_v
+/// and λ_a have one entry a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
     pub(crate) ids: Vec<ContactId>,
+    pub(crate) tangents: Tangents,
     /// The version of these names, if it is known.
     pub(crate) names: Names,
     pub(crate) lambda: Vec<T>,
@@ -52,6 +60,10 @@ pub struct ContactState<T> {
     pub(crate) lambda_v: Vec<T>,
     pub(crate) lambda_a: Vec<T>,
     pub(crate) dissipated: Vec<T>,
+    /// Slip, one entry a tangential row, and whether it is none but for friction's bound, one a contact; both are empty
+    /// without friction.
+    pub(crate) slip: Vec<T>,
+    pub(crate) sliding: Vec<bool>,
 }
 
 impl<T: Real> ContactState<T> {
@@ -59,6 +71,7 @@ impl<T: Real> ContactState<T> {
         let reals = || Vec::with_capacity(rows);
         Self {
             ids: Vec::with_capacity(rows),
+            tangents: Tangents::default(),
             names: Names::default(),
             lambda: reals(),
             lambda_raw: reals(),
@@ -68,6 +81,8 @@ impl<T: Real> ContactState<T> {
             lambda_v: reals(),
             lambda_a: reals(),
             dissipated: reals(),
+            slip: Vec::new(),
+            sliding: Vec::new(),
         }
     }
 
@@ -82,31 +97,46 @@ impl<T: Real> ContactState<T> {
     }
 
     /// Opens every contact of `ids`.
-    pub(crate) fn reset(&mut self, ids: &[ContactId]) {
+    pub(crate) fn reset(&mut self, ids: &[ContactId], tangents: &Tangents) {
         let n = ids.len();
         self.names = Names::default();
         self.ids.clear();
         self.ids.extend_from_slice(ids);
-        let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
-        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated] {
-            reals.clear();
-            reals.resize(n, T::zero());
+        self.tangents.copy_from(tangents);
+        let Self { lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated, slip, sliding, .. } = self;
+        let size = |values: &mut Vec<T>, count: usize| {
+            values.clear();
+            values.resize(count, T::zero());
+        };
+        for values in [lambda, lambda_raw, impulse, lambda_v, lambda_a] {
+            size(values, n + tangents.len());
         }
+        for values in [gap, dissipated] {
+            size(values, n);
+        }
+        size(slip, tangents.len());
+        sliding.clear();
+        sliding.resize(if tangents.is_empty() { 0 } else { n }, false);
         self.closed.clear();
         self.closed.resize(n, false);
     }
 
     /// Copies what belongs to the same contacts from another state; contacts it does not know are open. What every
-    /// stage sets anew (gaps, impulses, λ_v, λ_a) is anything before.
-    pub(crate) fn carry_over(&mut self, old: &Self, (ids, names): (&[ContactId], Names)) {
+    /// stage sets anew (gaps, impulses, λ_v, λ_a, slips) is anything before.
+    pub(crate) fn carry_over(&mut self, old: &Self, (ids, names): (&[ContactId], Names), tangents: &Tangents) {
         if old.names.are(names) && self.names.are(names) {
             self.lambda.copy_from_slice(&old.lambda);
             self.lambda_raw.copy_from_slice(&old.lambda_raw);
             self.closed.copy_from_slice(&old.closed);
             self.dissipated.copy_from_slice(&old.dissipated);
+            if !tangents.is_empty() {
+                // (Coefficients may have changed.)
+                self.tangents.copy_from(tangents);
+                self.sliding.copy_from_slice(&old.sliding);
+            }
             return;
         }
-        self.reset(ids);
+        self.reset(ids, tangents);
         self.names = names;
         // Candidates that come and go shift the others: the place behind the last one found is tried first.
         let sorted = old.ids.is_sorted();
@@ -119,16 +149,32 @@ impl<T: Real> ContactState<T> {
             };
             if let Some(j) = follows.or_else(elsewhere) {
                 next = j + 1;
-                self.lambda[i] = old.lambda[j];
-                self.lambda_raw[i] = old.lambda_raw[j];
                 self.closed[i] = old.closed[j];
                 self.gap[i] = old.gap[j];
-                self.impulse[i] = old.impulse[j];
-                self.lambda_v[i] = old.lambda_v[j];
-                self.lambda_a[i] = old.lambda_a[j];
                 self.dissipated[i] = old.dissipated[j];
+                let tangential = tangents.of(i).zip(old.tangents.of(j));
+                for (i, j) in std::iter::once((i, j)).chain(tangential) {
+                    self.lambda[i] = old.lambda[j];
+                    self.lambda_raw[i] = old.lambda_raw[j];
+                    self.impulse[i] = old.impulse[j];
+                    self.lambda_v[i] = old.lambda_v[j];
+                    self.lambda_a[i] = old.lambda_a[j];
+                }
+                if let (Some(now), Some(&before)) = (self.sliding.get_mut(i), old.sliding.get(j)) {
+                    *now = before;
+                }
             }
         }
+    }
+
+    /// The entries of the gaps in a list of the rows.
+    fn normal<'v>(&self, values: &'v [T]) -> &'v [T] {
+        &values[..self.ids.len()]
+    }
+
+    /// The length of what a list of the rows has for the tangents of a contact.
+    pub(crate) fn tangential(&self, contact: usize, values: &[T]) -> T {
+        values[self.tangents.of(contact)].iter().fold(T::zero(), |length, &x| length.hypot(x))
     }
 
     /// Which contact each entry belongs to.
@@ -148,12 +194,33 @@ impl<T: Real> ContactState<T> {
     /// The force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a
     /// coarse block). [`impulses`](Self::impulses) close to rounding.
     pub fn forces(&self) -> &[T] {
-        &self.lambda
+        self.normal(&self.lambda)
+    }
+
+    /// Friction forces of a contact at the instant of the state, after correction, one along each of its
+    /// [tangents](crate::contact::Contact::tangent): |f| ≤ μ λ, and they act on the bodies as f times the tangential
+    /// row. Nothing for contacts without friction. Values, as [`forces`](Self::forces) are;
+    /// [`friction_impulses`](Self::friction_impulses) close to rounding.
+    pub fn friction_forces(&self, contact: usize) -> &[T] {
+        &self.lambda[self.tangents.of(contact)]
+    }
+
+    /// Impulses of friction in the last step (force × time), corrections included, as [`impulses`](Self::impulses).
+    pub fn friction_impulses(&self, contact: usize) -> &[T] {
+        &self.impulse[self.tangents.of(contact)]
+    }
+
+    /// Velocities along the tangents with which the bodies slide on each other at the instant of the state, after
+    /// correction (length/time). Nothing for contacts without friction.
+    pub fn slip(&self, contact: usize) -> &[T] {
+        let (rows, gaps) = (self.tangents.of(contact), self.ids.len());
+        // (Contacts without friction have an empty range anywhere.)
+        &self.slip[rows.start.saturating_sub(gaps)..rows.end.saturating_sub(gaps)]
     }
 
     /// Raw multipliers of the last stage's contact problem; they decide release, and their impulse is h Σ β λ.
     pub fn raw_forces(&self) -> &[T] {
-        &self.lambda_raw
+        self.normal(&self.lambda_raw)
     }
 
     /// Whether a contact is closed: pressed (raw multiplier > 0) or touching within rounding.
@@ -166,25 +233,27 @@ impl<T: Real> ContactState<T> {
         match (self.closed[contact], self.lambda_raw[contact] == T::zero()) {
             (false, _) => ContactStatus::Open,
             (true, true) => ContactStatus::Touching,
-            (true, false) => ContactStatus::Closed,
+            (true, false) if self.tangents.of(contact).is_empty() => ContactStatus::Closed,
+            (true, false) if self.sliding[contact] => ContactStatus::Sliding,
+            (true, false) => ContactStatus::Sticking,
         }
     }
 
     /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change
     /// of the momentum that the scheme conserves ([`Simulation::momentum`](crate::Simulation::momentum)), to rounding.
     pub fn impulses(&self) -> &[T] {
-        &self.impulse
+        self.normal(&self.impulse)
     }
 
     /// The paper's λ_v of the last correction (momentum, kg m/s): it corrected the acceleration; zero without
     /// correction.
     pub fn lambda_v(&self) -> &[T] {
-        &self.lambda_v
+        self.normal(&self.lambda_v)
     }
 
     /// The paper's λ_a of the last correction (kg m): it corrected the velocity; zero without correction.
     pub fn lambda_a(&self) -> &[T] {
-        &self.lambda_a
+        self.normal(&self.lambda_a)
     }
 
     /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in

@@ -6,6 +6,7 @@ use super::contacts::{ContactState, Names};
 use super::history::{History, Trail};
 use super::read::{COUNT, count, length, number, optional, vector};
 use super::{Motion, State};
+use crate::contact::Tangents;
 use crate::contact_id::ContactId;
 use crate::error::Result;
 use crate::real::Real;
@@ -16,7 +17,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// The format that is written, and the only one that is read.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// How every file begins.
 const KIND: &str = "contact-dynamics checkpoint";
@@ -65,6 +66,10 @@ struct ContactsRecord<'r, T: Real> {
     lambda_v: Cow<'r, [T]>,
     lambda_a: Cow<'r, [T]>,
     dissipated: Cow<'r, [T]>,
+    /// For each contact with friction its number, the coefficient, and the number of its tangential rows.
+    friction: Vec<(usize, f64, usize)>,
+    slips: Cow<'r, [T]>,
+    sliding: Cow<'r, [bool]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -180,8 +185,10 @@ impl<'r, T: Real> MotionRecord<'r, T> {
 
 impl<'r, T: Real> ContactsRecord<'r, T> {
     fn of(contacts: &'r ContactState<T>) -> Self {
-        let ContactState { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, names: _ } =
+        let ContactState { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, .. } =
             contacts;
+        let ContactState { tangents, slip, sliding, names: _, .. } = contacts;
+        let friction = |contact: usize| (contact, tangents.friction(contact), tangents.of(contact).len());
         Self {
             ids: ids.iter().map(|id| [id.constraint, id.feature, id.candidate]).collect(),
             forces: lambda.into(),
@@ -192,27 +199,60 @@ impl<'r, T: Real> ContactsRecord<'r, T> {
             lambda_v: lambda_v.into(),
             lambda_a: lambda_a.into(),
             dissipated: dissipated.into(),
+            friction: tangents.contacts().map(friction).collect(),
+            slips: slip.into(),
+            sliding: sliding.into(),
         }
     }
 
     fn checked(self) -> Result<ContactState<T>> {
         let n = self.ids.len();
         let id = |[constraint, feature, candidate]: [usize; 3]| ContactId { constraint, feature, candidate };
-        let closed = self.closed.into_owned();
+        let (closed, sliding) = (self.closed.into_owned(), self.sliding.into_owned());
         length("the closed flags of a checkpoint", closed.len(), n)?;
+        let tangents = tangents(&self.friction, n)?;
+        let (m, flags) = (n + tangents.len(), if tangents.is_empty() { 0 } else { n });
+        length("the flags of sliding contacts of a checkpoint", sliding.len(), flags)?;
         Ok(ContactState {
             ids: self.ids.into_iter().map(id).collect(),
             names: Names::default(),
-            lambda: vector("the contact forces of a checkpoint", self.forces, n)?,
-            lambda_raw: vector("the raw multipliers of a checkpoint", self.raw_forces, n)?,
+            lambda: vector("the contact forces of a checkpoint", self.forces, m)?,
+            lambda_raw: vector("the raw multipliers of a checkpoint", self.raw_forces, m)?,
             closed,
             gap: vector("the gaps of a checkpoint", self.gaps, n)?,
-            impulse: vector("the impulses of a checkpoint", self.impulses, n)?,
-            lambda_v: vector("λ_v of a checkpoint", self.lambda_v, n)?,
-            lambda_a: vector("λ_a of a checkpoint", self.lambda_a, n)?,
+            impulse: vector("the impulses of a checkpoint", self.impulses, m)?,
+            lambda_v: vector("λ_v of a checkpoint", self.lambda_v, m)?,
+            lambda_a: vector("λ_a of a checkpoint", self.lambda_a, m)?,
             dissipated: vector("the dissipated energies of a checkpoint", self.dissipated, n)?,
+            slip: vector("the slips of a checkpoint", self.slips, tangents.len())?,
+            sliding,
+            tangents,
         })
     }
+}
+
+/// The tangential rows of contacts with friction among n contacts, as a file says them: in the order of the contacts.
+fn tangents(friction: &[(usize, f64, usize)], n: usize) -> Result<Tangents> {
+    let mut tangents = Tangents::default();
+    if friction.is_empty() {
+        return Ok(tangents);
+    }
+    if friction.len() > n {
+        length("the contacts with friction of a checkpoint", friction.len(), n)?;
+    }
+    tangents.begin(n);
+    for &(contact, coefficient, rows) in friction {
+        let range = tangents.listed() as u64..=(n as u64).saturating_sub(1);
+        count("a contact with friction of a checkpoint", contact as u64, range)?;
+        count("the tangents of a contact of a checkpoint", rows as u64, 1..=2)?;
+        number("a friction coefficient of a checkpoint", coefficient, "not negative and finite", |friction| {
+            friction >= 0.0 && friction.is_finite()
+        })?;
+        (tangents.listed()..contact).for_each(|_| tangents.push(0.0, 0));
+        tangents.push(coefficient, rows);
+    }
+    (tangents.listed()..n).for_each(|_| tangents.push(0.0, 0));
+    Ok(tangents)
 }
 
 /// Whether the scheme stores v or a of another time than that of the state.

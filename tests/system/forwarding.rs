@@ -228,6 +228,10 @@ impl Corrector<f64> for Remedy {
         self.0.note("check_damping");
         Ok(())
     }
+    fn check_friction(&self) -> std::result::Result<(), &'static str> {
+        self.0.note("check_friction");
+        Ok(())
+    }
     fn predicts(&self) -> bool {
         self.0.note("predicts");
         true

@@ -16,12 +16,16 @@ impl<T: Real> Correction<'_, T> {
     /// [`Error::Incompatible`](crate::Error::Incompatible) if the corrector's
     /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
-        if !self.buffers.engaged.iter().any(|&row| !self.was_closed[row]) {
+        let begins = |&row: &usize| !self.was_closed[row] || self.sticks(row) && !self.was_sticking[row];
+        if !self.buffers.engaged.iter().any(begins) {
             return Ok(());
         }
         self.backup.check()?;
         let rows = std::mem::take(&mut self.buffers.engaged);
-        let mut closing = self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row));
+        let mut closing = match self.rubs() {
+            true => self.read_slip_rates(),
+            false => self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row)),
+        };
         // States not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
         if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
@@ -29,7 +33,10 @@ impl<T: Real> Correction<'_, T> {
             for k in 1..=places {
                 for field in 0..3 {
                     if closing.is_ok() && self.scheme.read[k][field] {
-                        closing = self.project_field(k, field, &rows);
+                        closing = match self.rubs() {
+                            true => self.project_rubbing_field(k, field, &rows),
+                            false => self.project_field(k, field, &rows),
+                        };
                     }
                 }
             }

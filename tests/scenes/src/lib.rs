@@ -1,6 +1,7 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
 pub mod bars;
+pub mod bed;
 pub mod boxes;
 pub mod combinations;
 pub mod curved;
@@ -17,6 +18,7 @@ pub mod particles;
 pub mod plot;
 pub mod random;
 pub mod schemes;
+pub mod slabs;
 pub mod solids;
 pub mod sparse;
 pub mod springs;

@@ -139,13 +139,29 @@ pub struct Panel {
 
 /// A page of 2 × 2 panels under a title and a subtitle, as SVG.
 pub fn page(title: &str, subtitle: &str, panels: &[Panel; 4]) -> Result<String, Box<dyn Error>> {
-    svg((1000, 860), |canvas| {
+    titled((1000, 860), title, subtitle, panels, (2, 2))
+}
+
+/// Two panels beside each other under a title and a subtitle, as SVG.
+pub fn pair(title: &str, subtitle: &str, panels: &[Panel; 2]) -> Result<String, Box<dyn Error>> {
+    titled((1000, 453), title, subtitle, panels, (1, 2))
+}
+
+/// Rows and columns of panels.
+fn titled(
+    size: (u32, u32),
+    title: &str,
+    subtitle: &str,
+    panels: &[Panel],
+    grid: (usize, usize),
+) -> Result<String, Box<dyn Error>> {
+    svg(size, |canvas| {
         let (head, body) = canvas.split_vertically(PAGE_TITLE + PAGE_SUBTITLE);
         let bold = FontDesc::new(FontFamily::SansSerif, TITLE, FontStyle::Bold);
         head.draw_text(title, &anchored(bold, HPos::Left, VPos::Bottom), (MARGIN, PAGE_TITLE))?;
         let below = (MARGIN, PAGE_TITLE + PAGE_SUBTITLE / 2);
         head.draw_text(subtitle, &text(HPos::Left, VPos::Center), below)?;
-        for (panel, area) in panels.iter().zip(body.split_evenly((2, 2))) {
+        for (panel, area) in panels.iter().zip(body.split_evenly(grid)) {
             draw(panel, &area)?;
         }
         Ok(())

@@ -1,0 +1,128 @@
+//! Which rows of G are those of friction: tangential rows stand behind all normal ones, in the order of their contacts.
+
+use std::ops::Range;
+
+/// The tangential rows of the contacts of a run that have friction. Nothing is stored where none has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Tangents {
+    /// For each contact its first tangential row, and behind the last contact the end of all; empty without friction.
+    first: Vec<usize>,
+    /// For each contact its friction coefficient.
+    friction: Vec<f64>,
+    /// For each tangential row its contact.
+    owners: Vec<usize>,
+    contacts: usize,
+}
+
+impl Tangents {
+    /// No contact.
+    pub(crate) fn clear(&mut self) {
+        self.first.clear();
+        self.friction.clear();
+        self.owners.clear();
+        self.contacts = 0;
+    }
+
+    /// Becomes a copy of another one, in the memory there is.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.first.clone_from(&other.first);
+        self.friction.clone_from(&other.friction);
+        self.owners.clone_from(&other.owners);
+        self.contacts = other.contacts;
+    }
+
+    /// Begins the list of so many contacts, some of which have friction.
+    pub(crate) fn begin(&mut self, contacts: usize) {
+        self.clear();
+        self.contacts = contacts;
+        self.first.push(contacts);
+    }
+
+    /// Appends the next contact, with so many tangential rows.
+    pub(crate) fn push(&mut self, friction: f64, rows: usize) {
+        let contact = self.friction.len();
+        self.friction.push(friction);
+        self.owners.extend(std::iter::repeat_n(contact, rows));
+        self.first.push(self.contacts + self.owners.len());
+    }
+
+    /// Number of contacts that have been appended.
+    pub(crate) fn listed(&self) -> usize {
+        self.friction.len()
+    }
+
+    /// Whether no contact has friction.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.owners.is_empty()
+    }
+
+    /// Number of tangential rows.
+    pub(crate) fn len(&self) -> usize {
+        self.owners.len()
+    }
+
+    /// The tangential rows of a contact.
+    pub(crate) fn of(&self, contact: usize) -> Range<usize> {
+        match self.first.get(contact..contact + 2) {
+            Some(&[start, end]) => start..end,
+            _ => 0..0,
+        }
+    }
+
+    /// All tangential rows.
+    pub(crate) fn all(&self) -> Range<usize> {
+        self.contacts..self.contacts + self.owners.len()
+    }
+
+    /// The friction coefficient of a contact.
+    pub(crate) fn friction(&self, contact: usize) -> f64 {
+        self.friction.get(contact).copied().unwrap_or(0.0)
+    }
+
+    /// The contacts that have friction.
+    pub(crate) fn contacts(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.friction.len()).filter(|&contact| !self.of(contact).is_empty())
+    }
+
+    /// The contact of a tangential row.
+    pub(crate) fn owner(&self, row: usize) -> usize {
+        self.owners[row - self.contacts]
+    }
+
+    /// Appends contacts to a list of rows, each with the rows of its friction behind it.
+    pub(crate) fn expand(&self, contacts: impl Iterator<Item = usize>, rows: &mut Vec<usize>) {
+        match self.is_empty() {
+            true => rows.extend(contacts),
+            false => contacts.for_each(|contact| {
+                rows.push(contact);
+                rows.extend(self.of(contact));
+            }),
+        }
+    }
+
+    /// Whether contacts have the same rows in another list.
+    pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
+        self.first == other.first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_friction_stand_behind_those_of_the_gaps() {
+        let mut tangents = Tangents::default();
+        assert!(tangents.is_empty() && tangents.of(3).is_empty() && tangents.friction(3) == 0.0);
+        tangents.begin(3);
+        for (friction, rows) in [(0.5, 2), (0.0, 0), (0.2, 1)] {
+            tangents.push(friction, rows);
+        }
+        assert_eq!([0, 1, 2].map(|contact| tangents.of(contact)), [3..5, 5..5, 5..6]);
+        assert_eq!((tangents.all(), tangents.owner(4), tangents.owner(5)), (3..6, 0, 2));
+        assert_eq!(tangents.contacts().collect::<Vec<_>>(), [0, 2]);
+        let mut rows = Vec::new();
+        tangents.expand([0, 2].into_iter(), &mut rows);
+        assert_eq!(rows, [0, 3, 4, 2, 5]);
+    }
+}

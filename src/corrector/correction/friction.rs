@@ -1,0 +1,229 @@
+//! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both in
+//! the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
+
+use super::{Correction, Jump};
+use crate::contact::GapRates;
+use crate::contact_solver::AdmissibleSet;
+use crate::corrector::rubbing_problem::{Block, Rubbing};
+use crate::corrector::{Buffers, rounding, slides};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+impl<T: Real> Correction<'_, T> {
+    /// Whether any contact of the run has friction.
+    pub(super) fn rubs(&self) -> bool {
+        !self.constraints.0.tangents().is_empty()
+    }
+
+    /// Whether friction holds an engaged contact.
+    pub(super) fn sticks(&self, row: usize) -> bool {
+        self.contacts.sliding.get(row) == Some(&false) && !self.contacts.tangents.of(row).is_empty()
+    }
+
+    /// [`solve_velocity_jumps`](Self::solve_velocity_jumps) where contacts have friction: total impulses in the cone.
+    pub(super) fn solve_rubbing_velocity(&mut self) -> Result<()> {
+        let rows = std::mem::take(&mut self.buffers.closed);
+        // What raw multipliers have changed v by is M⁻¹ Gᵀ times this.
+        let share = T::of(self.h * self.scheme.response[1]);
+        let result = self.solve_rubbing(&rows, Jump::Velocity, share);
+        let Self { buffers, contacts, constraints, .. } = self;
+        let Buffers { engaged, impulses, rubbing, .. } = &mut **buffers;
+        engaged.clear();
+        impulses.clear();
+        for block in &rubbing.blocks {
+            let (row, totals) = (block.row, &rubbing.totals[block.places()]);
+            impulses.push(rubbing.increments[block.places().start]);
+            if block.set.is_bilateral() || totals[0] > T::zero() {
+                engaged.push(row);
+            }
+            if block.tangents > 0 {
+                let bound = T::of(constraints.0.tangents().friction(row)) * totals[0];
+                let tangents = block.places().start + 1..block.places().end;
+                let noise = T::largest(&rubbing.noise[tangents.clone()]);
+                // (What has just come to rest has friction at its bound, and nothing that it slides against.)
+                contacts.sliding[row] = slides(length(&totals[1..]), bound) && length(&rubbing.left[tangents]) > noise;
+            }
+        }
+        // (Blocks of the accelerations ask for the direction of friction.)
+        rubbing.keep_directions();
+        self.buffers.closed = rows;
+        result
+    }
+
+    /// The same of the accelerations of the engaged rows: a contact that slides goes on along the direction it has.
+    pub(super) fn solve_rubbing_acceleration(&mut self) -> Result<()> {
+        let rows = std::mem::take(&mut self.buffers.engaged);
+        let share = T::of(self.scheme.acceleration / self.scheme.balance);
+        let result = self.solve_rubbing(&rows, Jump::Acceleration, share);
+        let Buffers { forces, rubbing, .. } = &mut *self.buffers;
+        forces.clear();
+        forces.extend(rubbing.blocks.iter().map(|block| rubbing.increments[block.places().start]));
+        self.buffers.engaged = rows;
+        result
+    }
+
+    /// Solves for the totals of the contacts `rows`, of which raw multipliers have given `share` times theirs.
+    fn solve_rubbing(&mut self, rows: &[usize], jump: Jump, share: T) -> Result<()> {
+        self.read_rates()?;
+        self.read_slip_rates()?;
+        self.pose_rubbing(rows, jump, share);
+        let solved = self.solve_posed();
+        match solved {
+            Err(Error::ContradictoryContacts { .. } | Error::Contact { .. }) => {
+                for k in 0..self.buffers.rubbing.blocks.len() {
+                    let Block { row, .. } = self.buffers.rubbing.blocks[k];
+                    let (noise, place) =
+                        (self.rounding_of_gap(row, jump), self.buffers.rubbing.blocks[k].places().start);
+                    self.buffers.rubbing.tolerance[place] += noise;
+                }
+                self.solve_posed()
+            }
+            other => other,
+        }
+    }
+
+    /// Writes down the problem of the contacts `rows`, of which raw multipliers have given `share` times theirs.
+    fn pose_rubbing(&mut self, rows: &[usize], jump: Jump, share: T) {
+        let Self { buffers, constraints, contacts, g, new, .. } = self;
+        let Buffers { rubbing, rates, slips, .. } = &mut **buffers;
+        let tangents = constraints.0.tangents();
+        rubbing.clear();
+        for &row in rows {
+            let pressed = contacts.lambda_raw[row] > T::zero() || constraints.0.law(row).is_equality();
+            let (own, friction) = (tangents.of(row), tangents.friction(row));
+            let set = match (own.len(), pressed) {
+                (0, true) => AdmissibleSet::Free,
+                (0, false) => AdmissibleSet::NonNegative,
+                (count, pressed) => AdmissibleSet::with_friction(friction, count, pressed),
+            };
+            let slides = jump == Jump::Acceleration && !own.is_empty() && contacts.sliding[row];
+            let direction = slides.then(|| rubbing.direction(row).map(|f| T::of(friction) * f));
+            rubbing.push(&Block { direction, ..Block::new(row, own.len(), set) });
+            for k in std::iter::once(row).chain(own.clone()) {
+                let rate = if k == row { rates[row] } else { slips[k - tangents.all().start] };
+                let (values, own_rate) = match jump {
+                    Jump::Velocity => (&new.v, rate.rate),
+                    Jump::Acceleration => (&new.a, rate.acceleration),
+                };
+                let base = if own.is_empty() { T::zero() } else { share * contacts.lambda_raw[k] };
+                let size = g.magnitude(k, values) + own_rate.abs();
+                rubbing.demand(k, g.product(k, values) + own_rate, rounding(size), base);
+            }
+        }
+        // (The past takes each row for a block of its own.)
+        rubbing.blocks.reserve(rubbing.rows.len() - rubbing.blocks.len());
+    }
+
+    fn solve_posed(&mut self) -> Result<()> {
+        let Self { buffers, contacts, g, projection, solver, t, .. } = self;
+        let ids = &contacts.ids;
+        buffers.rubbing.solve((g, projection), &mut **solver, T::one(), (*t, |row: usize| ids[row]))
+    }
+
+    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips where contact
+    /// sticks. Where it slides the past has had the friction of the impulse that this takes.
+    pub(super) fn project_rubbing_field(&mut self, k: usize, field: usize, engaged: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, projection, solver, g, contacts, scheme, h, t, new, energy, .. } = self;
+        let Buffers { rubbing, gaps, rates, slips, past_slips, .. } = &mut **buffers;
+        let motion = &mut past[k - 1];
+        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
+        constraints.0.slip_rates(motion.t, &motion.u, &motion.v, past_slips)?;
+        let before = T::of(new.t - motion.t);
+        let tangents = constraints.0.tangents();
+        let first = tangents.all().start;
+        let slip = |row: usize| match field {
+            // From where it is now, back along the way of the obstacle.
+            0 => {
+                let now = slips[row - first];
+                let way = g.row(row).map(|(dof, weight)| weight * (motion.u[dof] - new.u[dof])).sum::<T>();
+                way - before * (now.rate - T::of(0.5) * before * now.acceleration)
+            }
+            1 => g.product(row, &motion.v) + past_slips[row - first].rate,
+            _ => g.product(row, &motion.a) + past_slips[row - first].acceleration,
+        };
+        let size = |row: usize, jump: T| {
+            let values = [&motion.u, &motion.v, &motion.a][field.min(2)];
+            rounding(g.magnitude(row, values) + jump.abs())
+        };
+        rubbing.clear();
+        for &row in engaged {
+            let own = tangents.of(row);
+            if own.is_empty() || !contacts.sliding[row] {
+                for row in std::iter::once(row).chain(own) {
+                    let jump = if row < first { gaps[row] } else { slip(row) };
+                    rubbing.push(&Block::new(row, 0, AdmissibleSet::Free));
+                    rubbing.demand(row, jump, size(row, jump), T::zero());
+                }
+            } else {
+                let direction = rubbing.direction(row).map(|f| T::of(tangents.friction(row)) * f);
+                let set = AdmissibleSet::with_friction(0.0, own.len(), true);
+                rubbing.push(&Block { direction: Some(direction), ..Block::new(row, own.len(), set) });
+                rubbing.demand(row, gaps[row], size(row, gaps[row]), T::zero());
+                own.for_each(|row| rubbing.demand(row, slip(row), size(row, slip(row)), T::zero()));
+            }
+        }
+        // A body that has come from a gap had a positive impulse: its past displacement is moved back by that.
+        let presses = if field == 0 { -T::one() } else { T::one() };
+        let owner = |row: usize| if row < first { row } else { tangents.owner(row) };
+        let ids = &contacts.ids;
+        rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[owner(row)]))?;
+        if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
+            constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
+            let jumps = rubbing.jump.iter().zip(&rubbing.left);
+            for ((&row, &impulse), (&before, &after)) in rubbing.rows.iter().zip(&rubbing.increments).zip(jumps) {
+                let gain = impulse * T::of(0.5) * (before + after);
+                let own = if row < first { rates[row].rate } else { past_slips[row - first].rate };
+                **energy += gain - impulse * own;
+                if row < first {
+                    contacts.dissipated[row] -= gain;
+                }
+            }
+        }
+        let (values, unit) = match field {
+            0 => (&mut motion.u, psi / h),
+            1 => (&mut motion.v, psi),
+            _ => (&mut motion.a, psi * h),
+        };
+        projection.prepare(g, &rubbing.rows);
+        for (&row, &multiplier) in rubbing.rows.iter().zip(&rubbing.increments) {
+            projection.push(g, row, multiplier, values);
+            contacts.impulse[row] += T::of(unit) * multiplier;
+        }
+        Ok(())
+    }
+
+    /// Reads what slips have of their own.
+    pub(super) fn read_slip_rates(&mut self) -> Result<()> {
+        let Buffers { slips, past_slips, .. } = &mut *self.buffers;
+        for rates in [&mut *slips, past_slips] {
+            rates.resize(rates.len().max(self.constraints.0.tangents().len()), GapRates::default());
+        }
+        self.constraints.0.slip_rates(self.t, &self.new.u, &self.new.v, slips)
+    }
+
+    /// Applies the impulses found along gaps and tangents.
+    pub(super) fn push_rubbing_velocity(&mut self) -> Result<()> {
+        let Rubbing { rows, increments, .. } = &mut self.buffers.rubbing;
+        let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
+        let result = self.apply(&rows, &increments);
+        for (&row, &impulse) in rows.iter().zip(&increments) {
+            self.contacts.lambda_a[row] = -T::of(self.h) * impulse;
+        }
+        (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
+        result
+    }
+
+    /// Applies the forces found along gaps and tangents.
+    pub(super) fn push_rubbing_acceleration(&mut self) {
+        let Rubbing { rows, increments, .. } = &mut self.buffers.rubbing;
+        let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
+        self.push_forces(&rows, &increments);
+        (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
+    }
+}
+
+/// The length of a tangential vector.
+fn length<T: Real>(x: &[T]) -> T {
+    x.iter().fold(T::zero(), |length, &x| length.hypot(x))
+}

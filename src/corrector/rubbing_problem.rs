@@ -1,0 +1,368 @@
+//! The contact problem of S = G M⁻¹ Gᵀ for contacts with friction among others, for total multipliers: a part of them is
+//! in the jumps already.
+
+use super::{JumpProjection, rounding};
+use crate::contact::{ContactId, ContactJacobian};
+use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, contact_error};
+use crate::dense::DenseCholesky;
+use crate::error::Result;
+use crate::real::Real;
+
+/// Whether friction of this size is that of a contact that slides: μ times its force, but for rounding.
+pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
+    friction >= T::of(1.0 - 1e-8).min(T::one() - T::of(8.0) * T::epsilon()) * bound.max(T::zero())
+}
+
+/// A contact of the problem.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block<T> {
+    /// The row of its gap, or of one equation alone.
+    pub(crate) row: usize,
+    /// Number of its tangential rows, which stand behind that.
+    pub(crate) tangents: usize,
+    pub(crate) set: AdmissibleSet,
+    /// Friction for a unit normal multiplier, where its direction is given: the contact slides.
+    pub(crate) direction: Option<[T; 2]>,
+    /// Addition to the diagonal of S in the row of the gap.
+    pub(crate) compliance: T,
+    /// The normal multiplier, where it is known and what it does is part of the jumps.
+    pub(crate) known: Option<T>,
+    /// Where its rows begin in the lists of the problem: found when it is pushed.
+    pub(crate) place: usize,
+}
+
+impl<T: Real> Block<T> {
+    /// A contact with so many tangential rows.
+    pub(crate) fn new(row: usize, tangents: usize, set: AdmissibleSet) -> Self {
+        Self { row, tangents, set, direction: None, compliance: T::zero(), known: None, place: 0 }
+    }
+
+    /// Where its rows are in the lists of the problem.
+    pub(super) fn places(&self) -> std::ops::Range<usize> {
+        self.place..self.place + 1 + self.tangents
+    }
+}
+
+/// The problem and its memory: blocks, and lists with an entry a row, block after block.
+#[derive(Debug, Default)]
+pub(crate) struct Rubbing<T> {
+    pub(super) blocks: Vec<Block<T>>,
+    /// The rows, and the block of each.
+    pub(crate) rows: Vec<usize>,
+    owners: Vec<usize>,
+    /// G x of these rows, less what is asked for, and its rounding.
+    pub(super) jump: Vec<T>,
+    pub(super) tolerance: Vec<T>,
+    /// The multipliers that the jumps contain.
+    base: Vec<T>,
+    /// The multipliers found, and what is to be added to those there are.
+    pub(crate) totals: Vec<T>,
+    pub(super) increments: Vec<T>,
+    /// What is left of the jumps, and what of it is rounding.
+    pub(super) left: Vec<T>,
+    pub(super) noise: Vec<T>,
+    /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
+    directions: Vec<(usize, [T; 2])>,
+    group: Group<T>,
+}
+
+/// How the friction of what slides enters a problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Friction {
+    /// With the normal multiplier that is solved for.
+    Follows,
+    /// As it is in the totals; or nothing slides.
+    Lags,
+}
+
+/// Rows that S couples, as a problem for a contact solver.
+#[derive(Debug, Default)]
+struct Group<T> {
+    rows: Vec<usize>,
+    s: Vec<T>,
+    /// The unknowns: for each the place of its row in the group. Of what slides there is one, the normal multiplier.
+    unknowns: Vec<usize>,
+    delassus: Vec<T>,
+    offset: Vec<T>,
+    sets: Vec<AdmissibleSet>,
+    tolerance: Vec<T>,
+    multipliers: Vec<T>,
+    factor: DenseCholesky<T>,
+    /// Rows that the factor has memory for.
+    reserved: usize,
+}
+
+type Solved<T> = std::result::Result<(), ContactFailure<T>>;
+
+impl<T: Real> Rubbing<T> {
+    /// Forgets all blocks.
+    pub(super) fn clear(&mut self) {
+        let Self { blocks, rows, owners, jump, tolerance, base, totals, increments, left, noise, .. } = self;
+        blocks.clear();
+        rows.clear();
+        owners.clear();
+        for values in [jump, tolerance, base, totals, increments, left, noise] {
+            values.clear();
+        }
+    }
+
+    /// Appends a contact, whose rows are [demanded](Self::demand) next: that of its gap, and those of its friction.
+    pub(crate) fn push(&mut self, block: &Block<T>) {
+        self.blocks.push(Block { place: self.rows.len(), ..*block });
+    }
+
+    /// Appends a row: its jump, what of it is rounding, and the multiplier that it contains.
+    pub(crate) fn demand(&mut self, row: usize, jump: T, tolerance: T, base: T) {
+        self.rows.push(row);
+        self.owners.push(self.blocks.len().saturating_sub(1));
+        self.jump.push(jump);
+        self.tolerance.push(tolerance);
+        self.base.push(base);
+    }
+
+    /// Keeps the directions of the friction found.
+    pub(super) fn keep_directions(&mut self) {
+        let Self { blocks, totals, directions, .. } = self;
+        directions.clear();
+        for block in blocks.iter().filter(|block| block.tangents > 0) {
+            let mut direction = [T::zero(); 2];
+            direction[..block.tangents].copy_from_slice(&totals[block.places()][1..]);
+            let size = direction[0].hypot(direction[1]);
+            let unit = if size > T::zero() { direction.map(|f| f / size) } else { direction };
+            directions.push((block.row, unit));
+        }
+    }
+
+    /// The direction kept of a contact; none if it was not in that problem. (Rows ascend.)
+    pub(super) fn direction(&self, row: usize) -> [T; 2] {
+        match self.directions.binary_search_by_key(&row, |&(row, _)| row) {
+            Ok(place) => self.directions[place].1,
+            Err(_) => [T::zero(); 2],
+        }
+    }
+
+    /// Finds the totals, group by group: S couples no two of them. Multipliers press if they have the sign of `presses`.
+    /// `id` names the contact of a row, for an error at time t.
+    pub(crate) fn solve(
+        &mut self,
+        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        solver: &mut dyn ContactSolver<T>,
+        presses: T,
+        (t, id): (f64, impl Fn(usize) -> ContactId),
+    ) -> Result<()> {
+        for values in [&mut self.totals, &mut self.left, &mut self.noise] {
+            values.clear();
+            values.resize(self.rows.len(), T::zero());
+        }
+        projection.sort(g, &self.rows);
+        let mut group = std::mem::take(&mut self.group);
+        let mut result = Ok(());
+        for number in 0..projection.groups().len() {
+            // (Positions of a group ascend, and a block is in one group.)
+            group.rows.clear();
+            group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
+            projection.assemble(g, &group.rows, &mut group.s);
+            let positions = projection.groups().group(number);
+            if let Err(failure) = self.solve_group(positions, &mut group, solver, presses) {
+                let owner = |unknown: usize| self.owners[positions[group.unknowns[unknown]]];
+                result = Err(contact_error(t, failure, |unknown| id(self.blocks[owner(unknown)].row)));
+                break;
+            }
+        }
+        self.group = group;
+        self.increments.clear();
+        self.increments.extend(self.totals.iter().zip(&self.base).map(|(&total, &base)| total - base));
+        result
+    }
+
+    /// Solves for the rows at these positions. Where a contact that slides would be pulled it has no friction, and the
+    /// problem is solved again.
+    fn solve_group(
+        &mut self,
+        positions: &[usize],
+        group: &mut Group<T>,
+        solver: &mut dyn ContactSolver<T>,
+        presses: T,
+    ) -> Solved<T> {
+        loop {
+            let follows = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
+            let friction = if follows { Friction::Follows } else { Friction::Lags };
+            group.pose(self, positions, friction);
+            if let Err(failure) = group.solve(solver, friction) {
+                return match group.jammed(self, positions) {
+                    Some(jammed) => Err(jammed),
+                    None if follows => self.solve_lagging(positions, group, solver, presses).map_err(|_| failure),
+                    None => Err(failure),
+                };
+            }
+            let mut again = false;
+            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
+                let position = positions[at];
+                let block = &mut self.blocks[self.owners[position]];
+                self.totals[position] = multiplier;
+                let Some(direction) = block.direction else { continue };
+                for (k, along) in direction.into_iter().enumerate().take(block.tangents) {
+                    self.totals[position + 1 + k] = along * multiplier;
+                }
+                if presses * multiplier < T::zero() && direction != [T::zero(); 2] {
+                    (block.direction, again) = (Some([T::zero(); 2]), true);
+                }
+            }
+            if !again {
+                break;
+            }
+        }
+        self.measure(positions, group);
+        Ok(())
+    }
+
+    /// Solves where the equations with the friction of what slides have no solution, since some of it would be pulled: it
+    /// keeps the friction of a pass while the others are solved for, until it has that of its own force.
+    fn solve_lagging(
+        &mut self,
+        positions: &[usize],
+        group: &mut Group<T>,
+        solver: &mut dyn ContactSolver<T>,
+        presses: T,
+    ) -> Solved<T> {
+        /// Passes, each of which takes over half of what the last one has found. What is left then is accepted: the
+        /// friction that is reported is in its cone, and the jump that it leaves is one of accelerations.
+        const PASSES: usize = 60;
+        let half = T::of(0.5);
+        for &position in positions {
+            self.totals[position] = T::zero();
+        }
+        for _ in 0..PASSES {
+            group.pose(self, positions, Friction::Lags);
+            group.solve(solver, Friction::Lags)?;
+            let (mut change, mut largest) = (T::zero(), T::zero());
+            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
+                let position = positions[at];
+                let block = &self.blocks[self.owners[position]];
+                self.totals[position] = multiplier;
+                for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
+                    let pressing = presses * (presses * multiplier).max(T::zero());
+                    let friction = &mut self.totals[position + 1 + k];
+                    let moved = half * (along * pressing - *friction);
+                    *friction += moved;
+                    (change, largest) = (change.max(moved.abs()), largest.max(friction.abs()));
+                }
+            }
+            if change <= T::of(1e-12).max(T::of(8.0) * T::epsilon()) * largest {
+                break;
+            }
+        }
+        for &at in &group.unknowns {
+            let (position, block) = (positions[at], &self.blocks[self.owners[positions[at]]]);
+            let pressing = presses * (presses * self.totals[position]).max(T::zero());
+            for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
+                self.totals[position + 1 + k] = along * pressing;
+            }
+        }
+        self.measure(positions, group);
+        Ok(())
+    }
+
+    /// Finds what is left of the jumps of a group.
+    fn measure(&mut self, positions: &[usize], group: &Group<T>) {
+        let size = positions.len();
+        for (i, &position) in positions.iter().enumerate() {
+            let (mut left, mut terms) = (self.jump[position], T::zero());
+            for (s, &other) in group.s.iter().skip(i).step_by(size).zip(positions) {
+                let (total, base) = (*s * self.totals[other], *s * self.base[other]);
+                left += total - base;
+                terms += total.abs() + base.abs();
+            }
+            (self.left[position], self.noise[position]) = (left, self.tolerance[position] + rounding(terms));
+        }
+    }
+}
+
+impl<T: Real> Group<T> {
+    /// Writes down the problem of the rows at these positions, S of which is known: an unknown for each row, but one for
+    /// each contact that slides, whose friction comes with its normal multiplier.
+    fn pose(&mut self, all: &Rubbing<T>, positions: &[usize], friction: Friction) {
+        let size = positions.len();
+        if size > self.reserved {
+            (self.factor, self.reserved) = (DenseCholesky::with_capacity(size), size);
+        }
+        let Self { s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
+        let block = |at: usize| &all.blocks[all.owners[positions[at]]];
+        for values in [&mut *delassus, offset, tolerance, multipliers] {
+            values.clear();
+        }
+        unknowns.clear();
+        sets.clear();
+        let mut at = 0;
+        while at < size {
+            let Block { tangents, set, direction, .. } = *block(at);
+            unknowns.extend(at..=at + if direction.is_some() { 0 } else { tangents });
+            sets.push(match (direction, set.is_bilateral()) {
+                (None, _) => set,
+                (Some(_), true) => AdmissibleSet::Free,
+                (Some(_), false) => AdmissibleSet::NonNegative,
+            });
+            at += 1 + tangents;
+        }
+        let known = |at: usize| block(at).known.filter(|_| block(at).place == positions[at]);
+        for &i in unknowns.iter() {
+            let entry = |j: usize| s[j * size + i];
+            if let Some(multiplier) = known(i) {
+                // S_ii (λ − known) = 0.
+                offset.push(-entry(i) * multiplier);
+                tolerance.push(T::zero());
+                delassus.extend(unknowns.iter().map(|&j| if i == j { entry(i) } else { T::zero() }));
+                continue;
+            }
+            let (mut contained, mut terms) = (T::zero(), T::zero());
+            for (j, &position) in positions.iter().enumerate() {
+                let lags = friction == Friction::Lags && block(j).direction.is_some() && block(j).place < position;
+                let base = all.base[position] - if lags { all.totals[position] } else { T::zero() };
+                contained += entry(j) * base;
+                terms += (entry(j) * base).abs();
+            }
+            offset.push(all.jump[positions[i]] - contained);
+            tolerance.push(all.tolerance[positions[i]] + rounding(terms));
+            for &j in unknowns.iter() {
+                let Block { tangents, direction, compliance, place, .. } = *block(j);
+                let mut sum = if known(j).is_some() { T::zero() } else { entry(j) };
+                if let Some(direction) = direction.filter(|_| friction == Friction::Follows) {
+                    sum += (0..tangents).map(|k| direction[k] * entry(j + 1 + k)).sum::<T>();
+                }
+                delassus.push(if i == j && positions[j] == place { sum + compliance } else { sum });
+            }
+        }
+        multipliers.resize(unknowns.len(), T::zero());
+    }
+
+    /// Solves. Equations alone, with a symmetric W, have a solution of least norm whatever rounding has made of rows that
+    /// depend on one another.
+    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
+        let Self { delassus, offset, sets, tolerance, multipliers, factor, .. } = self;
+        let size = offset.len();
+        if friction == Friction::Lags && sets.iter().all(|&set| set == AdmissibleSet::Free) {
+            let failure = |row| ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() };
+            factor.factorize(size, |i, j| delassus[i * size + j]).map_err(failure)?;
+            for (multiplier, &offset) in multipliers.iter_mut().zip(offset.iter()) {
+                *multiplier = -offset;
+            }
+            factor.solve(multipliers);
+            return Ok(());
+        }
+        solver.solve(&ContactProblem::of(delassus, offset, sets, tolerance, 0), multipliers).map(|_| ())
+    }
+
+    /// A contact that slides, and whose friction leaves it no way out.
+    fn jammed(&self, all: &Rubbing<T>, positions: &[usize]) -> Option<ContactFailure<T>> {
+        let (size, unknowns) = (positions.len(), self.unknowns.len());
+        let one = |(row, &at): (usize, &usize)| {
+            let [x, y] = all.blocks[all.owners[positions[at]]].direction?;
+            let (normal, sliding) = (self.s[at * size + at], self.delassus[row * unknowns + row]);
+            let friction = x.hypot(y);
+            let coupling = (sliding - normal).abs() / friction;
+            let jams = normal > T::zero() && sliding <= T::zero();
+            jams.then_some(ContactFailure::Jammed { row, friction: friction.value(), normal, coupling })
+        };
+        self.unknowns.iter().enumerate().find_map(one)
+    }
+}

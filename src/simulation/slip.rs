@@ -1,0 +1,133 @@
+//! What the tangential rows of contacts with friction constrain in a stage: the slip, as a length.
+//!
+//! Coulomb's law does not change when the slip is scaled by a positive number. It is taken from the velocity that the
+//! stage ends with, scaled so that the unknown has the same weight as in the gap; W is symmetric then. Where velocities
+//! do not contain the unknown, or dofs have no mass, it is the way made in the stage. It is measured along the rows
+//! along which friction acts.
+
+use super::contact_rows::ContactRowsWork;
+use super::contact_step::{ContactStep, ContactWork};
+use super::program::CompiledStage;
+use crate::contact::GapRates;
+use crate::corrector::rounding;
+use crate::error::Result;
+use crate::real::Real;
+use crate::state::Motion;
+
+/// What the slip of a stage is taken from.
+#[derive(Clone, Copy, Debug)]
+enum Source<T> {
+    /// The velocity of the state, times this.
+    Velocity(T),
+    /// What contact constrains: h times a velocity.
+    Target,
+    /// The way from the state to where contact is imposed.
+    WayAhead,
+    /// The way from where the stage starts to its state.
+    Way,
+}
+
+/// The source of a slip, and the weight of d in it.
+fn source<T: Real>(stage: &CompiledStage<T>, is_massless: bool) -> (Source<T>, T) {
+    let [by_u, by_v, _] = stage.recovery.weights();
+    match &stage.contact {
+        Some(target) if target.forecast.is_some() => (Source::Target, target.row.weight),
+        Some(target) => (Source::WayAhead, target.row.weight - by_u),
+        None if by_v > T::zero() && !is_massless => (Source::Velocity(by_u / by_v), by_u),
+        None => (Source::Way, by_u),
+    }
+}
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Sets the weights of d in the slips: those of contacts that the problem is about, whose gaps depend on d.
+    pub(super) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
+        let tangents = self.constraints.tangents();
+        for row in tangents.contacts() {
+            let is_massless = !rows.massless.is_empty() && self.g.acts_on(row, &rows.massless);
+            let (_, weight) = source(self.stage, is_massless);
+            let coupled = rows.weight[row] > T::zero();
+            rows.weight[tangents.of(row)].fill(if coupled { weight } else { T::zero() });
+            // (Candidates may have come and gone: these were other rows before.)
+            rows.compliance[tangents.of(row)].fill(T::zero());
+            rows.shift[tangents.of(row)].fill(T::zero());
+        }
+    }
+
+    /// Evaluates y of the tangential rows at the d that was [placed](Self::place).
+    pub(super) fn evaluate_slips(
+        &mut self,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, iterate, .. } = self;
+        if constraints.tangents().is_empty() {
+            return Ok(());
+        }
+        let ContactWork { rows, interface, .. } = contact;
+        let ContactRowsWork { y, tolerance, target, slips, curved, massless, .. } = rows;
+        let forces = curved.forces(g);
+        if slips.len() < constraints.tangents().len() {
+            slips.resize(constraints.tangents().len(), GapRates::default());
+        }
+        let target_time = stage.contact.as_ref().map(|target| clock.at(target.at));
+        let h = T::of(clock.h);
+        // The motion of the obstacle in the middle of the way.
+        let t = match target_time {
+            Some(t) if stage.contact.as_ref().is_some_and(|target| target.forecast.is_some()) => t,
+            Some(t) => 0.5 * (t + new.t),
+            None => new.t,
+        };
+        constraints.finite_slip_rates(t, &new.u, &new.v, slips)?;
+        let tangents = constraints.tangents();
+        for row in tangents.contacts() {
+            let is_massless = !massless.is_empty() && g.acts_on(row, massless);
+            let (source, weight) = source(stage, is_massless);
+            for k in tangents.of(row) {
+                let own = slips[k - tangents.all().start].rate;
+                (y[k], tolerance[k]) = match source {
+                    Source::Velocity(scale) => {
+                        let slip = forces.product(k, &new.v) + own;
+                        let size = forces.magnitude(k, &new.v) + own.abs();
+                        // Velocities that are differences of displacements have the rounding of those.
+                        let known = if stage.recovery.subtracts(1) { forces.magnitude(k, &new.u) } else { T::zero() };
+                        let d = &interface.increment;
+                        let added = weight * forces.interface_magnitude(k, d);
+                        (scale * slip + weight * forces.interface_product(k, d), scale * size + known + added)
+                    }
+                    Source::Target => {
+                        let size = forces.magnitude(k, target) + (h * own).abs();
+                        (forces.product(k, target) + h * own, size)
+                    }
+                    Source::WayAhead | Source::Way => {
+                        let ahead = stage.contact.as_ref();
+                        let time = T::of(ahead.map_or(stage.end - stage.start, |target| target.at - stage.end)) * h;
+                        let ends = match ahead {
+                            Some(_) => [&new.u, &*target],
+                            None => [past.first().map_or(&new.u, |start| &start.u), &new.u],
+                        };
+                        // From the terms of the scheme, which have not the rounding of displacements: what sticks must
+                        // not creep by that. (Supports, and dofs that follow statically, are where they are.)
+                        let (mut way, mut size) = (T::zero(), T::zero());
+                        for (dof, weight) in forces.row(k) {
+                            let free = constraints.place(dof).zip(stage.way.past_at(past, dof));
+                            let part = if let Some((place, past)) = free {
+                                let known = iterate.map_or(T::zero(), |d| d[dof]);
+                                past + stage.way.weight * (known + interface.increment[place])
+                            } else {
+                                size += (weight * ends[1][dof]).abs();
+                                ends[1][dof] - ends[0][dof]
+                            };
+                            way += weight * part;
+                            size += (weight * part).abs();
+                        }
+                        let terms = (time * own).abs() + weight * forces.interface_magnitude(k, &interface.increment);
+                        (way + time * own, size + terms)
+                    }
+                };
+                tolerance[k] = rounding(tolerance[k]);
+            }
+        }
+        Ok(())
+    }
+}
