@@ -1,0 +1,29 @@
+//! Friction against closed forms: oblique impact, a bar that slides on a rough bed, blocks, oscillators, wheels, discs.
+//!
+//! `cargo run --release --example friction` prints the tables and writes them and a figure (`friction.svg`), in about a
+//! minute; with `--quick` meshes are coarse and phases few.
+//!
+//! `rows.rs` has what is compared; `slab.rs` the oblique impact, `bed.rs` the bar, `exact.rs` the small cases.
+
+mod bed;
+mod exact;
+mod rows;
+mod slab;
+
+use contact_dynamics_scenes::output::Output;
+use std::error::Error;
+use std::fmt::Write;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let output = Output::from_command_line("friction")?;
+    let mut page = String::new();
+    let tables: [fn(bool) -> Vec<String>; 3] = [slab::tables, bed::tables, exact::tables];
+    for tables in tables {
+        for table in tables(output.quick) {
+            println!("{table}");
+            writeln!(page, "{table}")?;
+        }
+    }
+    output.write("friction.md", &page)?;
+    output.write("friction.svg", &slab::figure()?)
+}
