@@ -97,7 +97,8 @@ impl Preset {
     /// The mass matrix, from the consistent one.
     ///
     /// `contact` lists the dofs that become massless: those of the contact nodes, in the normal direction if it is
-    /// along an axis, otherwise in all. `groups` are those of [`mass::redistribute`]: one number a body and direction.
+    /// along an axis, otherwise in all; in all directions too where contacts have friction, for what has mass along the
+    /// surface rings there. `groups` are those of [`mass::redistribute`]: one number a body and direction.
     /// `neighbors` is the pattern of the stiffness matrix. `courant` is that of the elements at the contact, c h/h_e
     /// ([`mass::courant`] estimates it); the blend follows from it, up to the consistent mass.
     ///

@@ -33,7 +33,7 @@ pub(crate) struct Buffers<T> {
     /// S = G M⁻¹ Gᵀ of some rows.
     pub(super) s: Vec<T>,
     /// Contacts with friction among the others.
-    pub(super) rubbing: Rubbing<T>,
+    pub(super) rubbing: Box<Rubbing<T>>,
     /// Rates of slips, one a tangential row.
     pub(super) slips: Vec<GapRates<T>>,
     pub(super) past_slips: Vec<GapRates<T>>,
@@ -64,7 +64,7 @@ impl<T: Real> Buffers<T> {
             forces: reals(rows),
             group: GroupProblem::new(rows),
             s: reals(rows.min(FORESEEN) * rows.min(FORESEEN)),
-            rubbing: Rubbing::default(),
+            rubbing: Box::default(),
             slips: Vec::new(),
             past_slips: Vec::new(),
             rates: vec![GapRates::default(); rows],

@@ -204,7 +204,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// Applies the impulses found along gaps and tangents.
     pub(super) fn push_rubbing_velocity(&mut self) -> Result<()> {
-        let Rubbing { rows, increments, .. } = &mut self.buffers.rubbing;
+        let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
         let result = self.apply(&rows, &increments);
         for (&row, &impulse) in rows.iter().zip(&increments) {
@@ -216,7 +216,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// Applies the forces found along gaps and tangents.
     pub(super) fn push_rubbing_acceleration(&mut self) {
-        let Rubbing { rows, increments, .. } = &mut self.buffers.rubbing;
+        let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
         self.push_forces(&rows, &increments);
         (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
