@@ -21,9 +21,8 @@ pub(crate) struct Admitted {
     /// Why laws that read the gap at the start of a stage are refused, if they are, and why the persistency switch is.
     pub(crate) no_start: Option<&'static str>,
     pub(crate) no_switch: Option<&'static str>,
-    /// Why friction is refused, if it is; and why beside compliant laws.
+    /// Why friction is refused, if it is.
     pub(crate) no_friction: Option<&'static str>,
-    pub(crate) no_compliant_friction: Option<&'static str>,
     /// The contact solver, and the sets that it does not take.
     pub(crate) solver: String,
     pub(crate) no_sets: Vec<AdmissibleSet>,
@@ -75,7 +74,6 @@ impl Admitted {
             ),
             self.no_sets.iter().any(kind).then_some("the contact solver takes no friction; choose `ActiveSet`"),
             self.no_friction,
-            self.no_compliant_friction.filter(|_| law.is_compliant()),
         ];
         match reasons.into_iter().flatten().next() {
             None => Ok(()),
@@ -109,10 +107,10 @@ pub(super) fn admitted<T: Real>(
         );
     }
     for stage in &tableau.stages {
-        if stage.increment().balance.u.z == 0.0 {
-            admitted.no_compliant_friction = Some(
-                "the scheme knows the force of a compliant law before it solves, and no multiplier holds what sticks; \
-                 choose a rigid law",
+        if stage.contact_row().z == 0.0 && admitted.no_friction.is_none() {
+            admitted.no_friction = Some(
+                "the scheme's displacements do not contain the unknown, so that no multiplier holds what sticks; choose \
+                 another scheme",
             );
         }
         match stage.contact {

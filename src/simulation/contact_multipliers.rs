@@ -57,7 +57,20 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             needed |= coupled && violated;
         }
-        needed
+        needed | self.rub_known(contact)
+    }
+
+    /// Takes contacts into the problem whose normal force is known, for their friction; says whether there is any.
+    fn rub_known(&self, contact: &mut ContactWork<T>) -> bool {
+        let (ContactWork { trial, rows, .. }, tangents) = (contact, self.constraints.tangents());
+        let mut any = false;
+        for row in tangents.contacts() {
+            let slides = rows.weight[tangents.of(row).start] > T::zero();
+            if rows.weight[row] == T::zero() && slides && trial.lambda_raw[row] > T::zero() {
+                (rows.in_problem[row], any) = (true, true);
+            }
+        }
+        any
     }
 
     /// Solves for the multipliers. Nonlinear laws are linearized again until they are met.
@@ -72,7 +85,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             // The laws at the solution.
             let (mut worst, mut again) = ((0, T::zero()), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
-                if self.g.is_tangential(row) {
+                if self.g.is_tangential(row) || weight[row] == T::zero() {
                     continue;
                 }
                 let law = self.constraints.law(row);
@@ -94,7 +107,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 }
             }
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
-                trial.lambda_raw[row] = lambda;
+                if weight[row] > T::zero() {
+                    trial.lambda_raw[row] = lambda;
+                }
             }
             if !again {
                 for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
@@ -125,45 +140,16 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         let Self { constraints, g, solver, statistics, .. } = self;
         let ContactWork { rows, trial, interface, .. } = contact;
-        let ContactRowsWork {
-            y,
-            tolerance,
-            weight,
-            compliance,
-            shift,
-            enabled,
-            in_problem,
-            sorted,
-            reserved,
-            problem,
-            own,
-            scale,
-            versions,
-            offset,
-            curved,
-            ..
-        } = rows;
-        let forces = curved.forces(g);
-        let (sets, multipliers, problem_tolerance) =
-            (&mut rows.sets, &mut rows.multipliers, &mut rows.problem_tolerance);
         let count = constraints.len();
         loop {
-            sorted.clear();
-            constraints.tangents().expand((0..count).filter(|&row| in_problem[row]), sorted);
-            operator.sort(forces, sorted);
-            problem.clear();
-            problem.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
-            offset.clear();
-            problem_tolerance.clear();
-            sets.clear();
-            // Rows are divided by their weight, which makes W symmetric whatever the rows constrain.
-            for &j in problem.iter() {
-                offset.push((y[j] + shift[j]) / weight[j]);
-                problem_tolerance.push(tolerance[j] / weight[j]);
-                if !forces.is_tangential(j) {
-                    sets.push(constraints.set(j));
-                }
-            }
+            rows.list_problem(constraints, g, operator);
+            let (y, tolerance, weight, enabled) = (&rows.y, &rows.tolerance, &rows.weight, &rows.enabled);
+            let (compliance, shift, in_problem) = (&mut rows.compliance, &mut rows.shift, &mut rows.in_problem);
+            let (problem, offset, problem_tolerance) = (&rows.problem, &rows.offset, &rows.problem_tolerance);
+            let (own, scale, versions, reserved) =
+                (&mut rows.own, &mut rows.scale, &mut rows.versions, &mut rows.reserved);
+            let (sets, multipliers, known, forces) =
+                (&rows.sets, &mut rows.multipliers, &mut rows.known, rows.curved.forces(g));
             let guess = |problem: &[usize], multipliers: &mut Vec<T>| {
                 multipliers.clear();
                 multipliers.extend(problem.iter().map(|&row| trial.lambda_raw[row]));
@@ -189,15 +175,29 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         solver.reserve(*reserved);
                     }
                     let own = &problem[range.clone()];
-                    let compliance_of = |k: usize| compliance[own[k]] / weight[own[k]];
+                    let is_known = |row: &usize| weight[*row] == T::zero();
+                    let compliance_of = |k: usize| match is_known(&own[k]) {
+                        true => T::zero(),
+                        false => compliance[own[k]] / weight[own[k]],
+                    };
                     let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
                     // (A contact with friction is one block of several rows.)
                     let blocks = own.iter().filter(|&&row| !forces.is_tangential(row)).count();
                     let (offset, sets) = (&offset[range.clone()], &sets[first_set..first_set + blocks]);
                     first_set += blocks;
                     let tolerance = &problem_tolerance[range.clone()];
-                    let data = ContactProblem::of(delassus, offset, sets, tolerance, version);
-                    let solved = solver.solve(&data, &mut multipliers[range]);
+                    let mut data = ContactProblem::of(delassus, offset, sets, tolerance, version);
+                    let knows = !constraints.tangents().is_empty() && own.iter().any(is_known);
+                    if knows {
+                        data = known.pose(&data, |k| is_known(&own[k]).then(|| trial.lambda_raw[own[k]]));
+                    }
+                    let multipliers = &mut multipliers[range];
+                    let solved = solver.solve(&data, multipliers);
+                    if knows {
+                        // (What known forces do is part of the motion already.)
+                        let own = multipliers.iter_mut().zip(own).filter(|(_, row)| is_known(row));
+                        own.for_each(|(multiplier, _)| *multiplier = T::zero());
+                    }
                     let spent = solved.map_err(|failure| contact_error(t, failure, |i| constraints.id_of(own[i])));
                     iterations = iterations.max(spent?);
                 }

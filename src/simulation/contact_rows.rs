@@ -2,9 +2,10 @@
 
 use super::constraints::Constraints;
 use super::curved_rows::CurvedRowsWork;
+use super::operator::Operator;
 use super::program::{CompiledStage, ContactTarget};
 use crate::contact::{ContactJacobian, GapRates, Measure};
-use crate::contact_solver::{AdmissibleSet, FORESEEN};
+use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -77,6 +78,7 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) problem_tolerance: Vec<T>,
     pub(super) sets: Vec<AdmissibleSet>,
     pub(super) multipliers: Vec<T>,
+    pub(super) known: KnownForces<T>,
     /// What contact constrains, and where the gap is forecast, one entry a dof; empty for schemes that impose contact
     /// on the displacements of the new state.
     pub(super) target: Vec<T>,
@@ -116,6 +118,7 @@ impl<T: Real> ContactRowsWork<T> {
             problem_tolerance: Vec::new(),
             sets: Vec::new(),
             multipliers: Vec::new(),
+            known: KnownForces { delassus: Vec::new(), offset: Vec::new() },
             target: vec![T::zero(); target_dofs],
             forecast: vec![T::zero(); forecast_dofs],
             supports: vec![[T::zero(); 3]; supports],
@@ -147,6 +150,35 @@ impl<T: Real> ContactRowsWork<T> {
         sets.reserve(rows);
         for values in [&mut self.offset, &mut self.problem_tolerance, &mut self.multipliers] {
             values.reserve(rows);
+        }
+    }
+
+    /// Lists the rows of the problem, group by group, and its data. Rows are divided by their weight, which makes W
+    /// symmetric whatever the rows constrain.
+    pub(super) fn list_problem(
+        &mut self,
+        constraints: &Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        operator: &mut Operator<T>,
+    ) {
+        let Self { y, tolerance, weight, shift, in_problem, sorted, problem, offset, sets, curved, .. } = self;
+        let forces = curved.forces(g);
+        sorted.clear();
+        constraints.tangents().expand((0..constraints.len()).filter(|&row| in_problem[row]), sorted);
+        operator.sort(forces, sorted);
+        problem.clear();
+        problem.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
+        offset.clear();
+        self.problem_tolerance.clear();
+        sets.clear();
+        for &j in problem.iter() {
+            // (A normal force that is known has no weight.)
+            let known = weight[j] == T::zero();
+            offset.push(if known { T::zero() } else { (y[j] + shift[j]) / weight[j] });
+            self.problem_tolerance.push(if known { T::zero() } else { tolerance[j] / weight[j] });
+            if !forces.is_tangential(j) {
+                sets.push(constraints.set(j));
+            }
         }
     }
 
@@ -292,6 +324,35 @@ impl<T: Real> ContactRowsWork<T> {
             }
         }
         Ok(())
+    }
+}
+
+/// A contact problem some normal multipliers of which are known: rows of their own, λ = the force.
+pub(super) struct KnownForces<T> {
+    delassus: Vec<T>,
+    offset: Vec<T>,
+}
+
+impl<T: Real> KnownForces<T> {
+    /// The problem with the rows of which `force` knows the multiplier uncoupled from all others.
+    pub(super) fn pose<'p>(
+        &'p mut self,
+        problem: &ContactProblem<'p, T>,
+        force: impl Fn(usize) -> Option<T>,
+    ) -> ContactProblem<'p, T> {
+        let (Self { delassus, offset }, size) = (self, problem.size());
+        delassus.clear();
+        offset.clear();
+        for i in 0..size {
+            let known = force(i);
+            let entry = |j: usize| match (i == j, known.is_some() || force(j).is_some()) {
+                (false, true) => T::zero(),
+                _ => problem.delassus(i, j),
+            };
+            delassus.extend((0..size).map(entry));
+            offset.push(known.map_or(problem.offset[i], |force| -problem.delassus(i, i) * force));
+        }
+        ContactProblem::of(delassus, offset, problem.sets, problem.tolerance, 0)
     }
 }
 

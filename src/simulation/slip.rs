@@ -39,14 +39,16 @@ fn source<T: Real>(stage: &CompiledStage<T>, is_massless: bool) -> (Source<T>, T
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Sets the weights of d in the slips: those of contacts that the problem is about, whose gaps depend on d.
+    /// Sets the weights of d in the slips: those of contacts that the problem is about.
     pub(super) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
         let tangents = self.constraints.tangents();
         for row in tangents.contacts() {
             let is_massless = !rows.massless.is_empty() && self.g.acts_on(row, &rows.massless);
             let (_, weight) = source(self.stage, is_massless);
-            let coupled = rows.weight[row] > T::zero();
-            rows.weight[tangents.of(row)].fill(if coupled { weight } else { T::zero() });
+            // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
+            let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
+            let rubs = rows.weight[row] > T::zero() || knows;
+            rows.weight[tangents.of(row)].fill(if rubs { weight } else { T::zero() });
             // (Candidates may have come and gone: these were other rows before.)
             rows.compliance[tangents.of(row)].fill(T::zero());
             rows.shift[tangents.of(row)].fill(T::zero());

@@ -54,43 +54,60 @@ fn oblique_impacts_of_a_particle() {
     }
 }
 
-/// Friction is μ times the force of a spring, and what sticks is held by a multiplier.
+/// Friction is μ times the force of a spring, and what sticks is held by a multiplier: by implicit schemes, and by
+/// explicit ones, which know the force before they solve.
 #[test]
 fn compliant_laws_rub_too() {
-    for law in [
-        ContactLaw::Penalty { stiffness: 1e4 },
-        ContactLaw::PowerLaw { stiffness: 1e5, exponent: 1.5 },
-        ContactLaw::AugmentedLagrangian { stiffness: 1e4, augmentations: 3 },
-    ] {
-        for (pull, status) in [(2.0, ContactStatus::Sticking), (8.0, ContactStatus::Sliding)] {
-            let block = masses(vec![2.0; 2], vec![pull, -20.0]).unwrap();
-            let depth = match law {
-                ContactLaw::PowerLaw { .. } => (20.0_f64 / 1e5).powf(2.0 / 3.0),
-                _ => 20.0 / 1e4,
-            };
-            let floor = LinearRows::new().row(law, &[(1, 1.0)], 0.0).friction(0.3, &[&[(0, 1.0)]]);
-            let mut run = run(block, Box::new(Newmark::trapezoidal()), 0.01, vec![0.0; 2])
-                .displacement(vec![
-                    0.0,
-                    if matches!(law, ContactLaw::AugmentedLagrangian { .. }) { 0.0 } else { -depth },
-                ])
-                .constraint(floor)
-                .build()
-                .unwrap();
-            run.run_until(1.0, &mut ()).unwrap();
-            let contacts = run.state().contacts();
-            if matches!(law, ContactLaw::AugmentedLagrangian { .. }) {
-                // (It begins with a bounce.)
-                continue;
+    for scheme in schemes().filter(|scheme| scheme.name() != "Moreau–Jean(1)") {
+        for law in [ContactLaw::Penalty { stiffness: 1e4 }, ContactLaw::PowerLaw { stiffness: 1e5, exponent: 1.5 }] {
+            for (pull, status) in [(2.0, ContactStatus::Sticking), (8.0, ContactStatus::Sliding)] {
+                let block = masses(vec![2.0; 2], vec![pull, -20.0]).unwrap();
+                let depth = match law {
+                    ContactLaw::PowerLaw { .. } => (20.0_f64 / 1e5).powf(2.0 / 3.0),
+                    _ => 20.0 / 1e4,
+                };
+                let floor = LinearRows::new().row(law, &[(1, 1.0)], 0.0).friction(0.3, &[&[(0, 1.0)]]);
+                let mut run = run(block, (scheme.make)(), 0.01, vec![0.0; 2])
+                    .displacement(vec![0.0, -depth])
+                    .constraint(floor)
+                    .build()
+                    .unwrap();
+                run.run_until(1.0, &mut ()).unwrap();
+                let (contacts, name) = (run.state().contacts(), scheme.name());
+                let expected = if status == ContactStatus::Sliding { 0.5 * (pull - 6.0) / 2.0 } else { 0.0 };
+                let way = run.state().displacement()[0];
+                assert!((way - expected).abs() < 1e-9, "{name} {law:?} {way} {expected}");
+                assert_eq!(contacts.status(0), status, "{name} {law:?}");
+                let friction = if status == ContactStatus::Sliding { -6.0 } else { -pull };
+                assert!((contacts.friction_forces(0)[0] - friction).abs() < 1e-9, "{name} {law:?} {friction}");
             }
-            let expected = if status == ContactStatus::Sliding { 0.5 * (pull - 6.0) / 2.0 } else { 0.0 };
-            assert!(
-                (run.state().displacement()[0] - expected).abs() < 1e-9,
-                "{law:?} {:?}",
-                run.state().displacement()
-            );
-            assert_eq!(contacts.status(0), status, "{law:?}");
         }
+    }
+}
+
+/// A ball thrown at a spring: friction is μ times its force as long as the ball slides, and what it takes is μ times what
+/// the spring gives; rigid contacts beside it go on as they would.
+#[test]
+fn springs_take_what_they_should() {
+    for scheme in schemes() {
+        let balls = masses(vec![1.0; 4], vec![0.0, 0.0, 0.0, -GRAVITY]).unwrap();
+        let floor = LinearRows::new()
+            .row(ContactLaw::Penalty { stiffness: 400.0 }, &[(1, 1.0)], 0.05)
+            .friction(0.2, &[&[(0, 1.0)]])
+            .unilateral(&[(3, 1.0)], 0.0)
+            .friction(0.1, &[&[(2, 1.0)]]);
+        let mut run = run(balls, (scheme.make)(), 2e-3, vec![3.0, -1.0, 3.0, 0.0]).constraint(floor).build().unwrap();
+        let mut impulse = [0.0; 2];
+        while run.state().time() < 0.5 {
+            run.step().unwrap();
+            let contacts = run.state().contacts();
+            impulse[0] += contacts.friction_impulses(0)[0];
+            impulse[1] += contacts.impulses()[0];
+        }
+        let (v, name) = (run.state().velocity(), scheme.name());
+        assert!((impulse[0] / impulse[1] + 0.2).abs() < 1e-12 && impulse[1] > 1.5, "{name} {impulse:?}");
+        assert!((v[0] - 3.0 - impulse[0]).abs() < 1e-12 && (v[1] + 1.0 - impulse[1]).abs() < 1e-12, "{name} {v:?}");
+        assert!((v[2] - 2.5).abs() < 1e-11, "{name} {v:?}");
     }
 }
 

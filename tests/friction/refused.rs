@@ -4,7 +4,7 @@ use super::{masses, run};
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapRates, Rates};
 use contact_dynamics::contact_solver::{Pivoting, ProjectedGradient};
 use contact_dynamics::corrector::Release;
-use contact_dynamics::{CentralDifference, Error, LinearRows, Newmark, Result, SimulationBuilder};
+use contact_dynamics::{CentralDifference, Error, LinearRows, Newmark, Result, SimulationBuilder, TchamwaWielgosz};
 
 /// A floor with this law and friction along one tangent.
 fn floor(law: ContactLaw, friction: f64) -> LinearRows<'static, f64> {
@@ -31,6 +31,10 @@ fn what_cannot_be_served_is_refused() {
         let block = masses(vec![1.0; 2], vec![0.0, -1.0]).unwrap();
         run(block, Box::new(CentralDifference), 0.1, vec![0.0; 2])
     };
+    let without = || {
+        let block = masses(vec![1.0; 2], vec![0.0, -1.0]).unwrap();
+        run(block, Box::new(TchamwaWielgosz::new(1.03).unwrap()), 0.1, vec![0.0; 2])
+    };
     for (builder, says) in [
         (scene().constraint(rigid()), "taken"),
         (scene().constraint(floor(ContactLaw::Rigid, -0.1)), "a friction coefficient is -1e-1"),
@@ -42,7 +46,8 @@ fn what_cannot_be_served_is_refused() {
         (scene().constraint(rigid()).contact_solver(ProjectedGradient::default()), "choose `ActiveSet`"),
         (scene().constraint(rigid()).corrector(Release), "knows nothing of friction"),
         (explicit().constraint(rigid()), "taken"),
-        (explicit().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "choose a rigid law"),
+        (explicit().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "taken"),
+        (without().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "choose another scheme"),
     ] {
         let found = refusal(builder);
         assert!(found.contains(says), "{found} / {says}");
