@@ -24,8 +24,8 @@ pub enum ContactFailure<T> {
         /// Its residual, in the unit of y.
         residual: T,
     },
-    /// A contact for which friction leaves no way out (Painlevé): sliding on, every force that presses closes the gap by
-    /// more than it opens it, μ |W_nt| ≥ W_nn, and the problem was not solved.
+    /// A contact for which friction leaves no way out (Painlevé): sliding on, every force that presses closes the gap
+    /// by more than it opens it, μ |W_nt| ≥ W_nn, and the problem was not solved.
     Jammed {
         /// The first row of the contact.
         row: usize,

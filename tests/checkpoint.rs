@@ -633,8 +633,8 @@ fn a_fall_with_the_correction_of_the_past_goes_on_bit_for_bit() {
     go_on(&mut run, |checkpoint| build().resume_from(checkpoint).build().unwrap(), 100, "block");
 }
 
-/// Masses that slide and stick, one of them not rough: friction forces, slips and flags are part of the file, and a file
-/// with wrong ones is refused.
+/// Masses that slide and stick, one of them not rough: friction forces, slips and flags are part of the file, and a
+/// file with wrong ones is refused.
 #[test]
 fn friction_goes_on_too() {
     let scene = || {

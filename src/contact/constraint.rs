@@ -113,12 +113,12 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Rates::Differences)
     }
 
-    /// The parts of the slip, and of its rate, that do not come from v and a, one entry a tangent, in the order in which
-    /// [`contacts`](Self::contacts) gives them: slip = H v + `rate`, and where contact sticks H a + `acceleration` = 0.
-    /// For an obstacle whose points at the contact move with velocity w and acceleration b these are −t·w and −t·b, t
-    /// the direction of the tangent. Asked of constraints with [friction](super::Contact::friction) only. Default:
-    /// [`Rates::Zero`], as of obstacles at rest, and of bodies whose dofs are all in H. ([`Rates::Differences`] is no
-    /// answer here.)
+    /// The parts of the slip, and of its rate, that do not come from v and a, one entry a tangent, in the order in
+    /// which [`contacts`](Self::contacts) gives them: slip = H v + `rate`, and where contact sticks H a +
+    /// `acceleration` = 0. For an obstacle whose points at the contact move with velocity w and acceleration b these
+    /// are −t·w and −t·b, t the direction of the tangent. Asked of constraints with
+    /// [friction](super::Contact::friction) only. Default: [`Rates::Zero`], as of obstacles at rest, and of bodies
+    /// whose dofs are all in H. ([`Rates::Differences`] is no answer here.)
     ///
     /// # Errors
     ///

@@ -152,11 +152,11 @@ impl<'a, T: Real> GapFunction<'a, T> {
         self
     }
 
-    /// Gives friction to the row that was added last: the coefficient μ, from 0, and a function for the rows along which
-    /// it slides, one in the plane, `tangents` = 2 orthonormal ones in space. It is called with t, the displacements of
-    /// the dofs of the row, and a slice for the weights of the tangents, one tangent after the other, whose product with
-    /// the velocities of the dofs is the slip; it returns the velocities of the obstacle along them and its
-    /// accelerations, zero for one at rest.
+    /// Gives friction to the row that was added last: the coefficient μ, from 0, and a function for the rows along
+    /// which it slides, one in the plane, `tangents` = 2 orthonormal ones in space. It is called with t, the
+    /// displacements of the dofs of the row, and a slice for the weights of the tangents, one tangent after the other,
+    /// whose product with the velocities of the dofs is the slip; it returns the velocities of the obstacle along them
+    /// and its accelerations, zero for one at rest.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -305,10 +305,9 @@ impl<T: Real> ContactConstraint<T> for GapFunction<'_, T> {
             for (x, &(dof, _)) in x.iter_mut().zip(&*entries) {
                 *x = u[dof];
             }
-            let [velocity, acceleration] = function(t, x, &mut weights[..entries.len() * rows.len()]);
-            for (k, rates) in rates.by_ref().take(rows.len()).enumerate() {
-                let of = |along: [T; 2]| along.get(k).map_or(T::zero(), |x| -*x);
-                *rates = GapRates { rate: of(velocity), acceleration: of(acceleration) };
+            let drag = function(t, x, &mut weights[..entries.len() * rows.len()]);
+            for (rates, dragged) in rates.by_ref().take(rows.len()).zip(GapRates::dragged(drag)) {
+                *rates = dragged;
             }
         }
         Ok(Rates::Given)

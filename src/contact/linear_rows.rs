@@ -221,7 +221,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
     #[must_use]
     pub fn friction(mut self, coefficient: f64, tangents: &[&[(usize, T)]]) -> Self {
         let Some(row) = self.laws.len().checked_sub(1) else { return self };
-        self.frictions.retain(|friction| friction.row != row);
+        // (Only the last one can be of the last row.)
+        self.frictions.pop_if(|friction| friction.row == row);
         let first = self.tangents.rows();
         for entries in tangents {
             let entries = entries.iter().map(|&(dof, weight)| (self.dofs.place(dof), weight));
@@ -232,8 +233,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
-    /// Lets the obstacle of the row that was added last move along its tangents, as a belt does: the closure returns its
-    /// velocities along them at t, and its accelerations. Nothing if the row has no [`friction`](Self::friction).
+    /// Lets the obstacle of the row that was added last move along its tangents, as a belt does: the closure returns
+    /// its velocities along them at t, and its accelerations. Nothing if the row has no [`friction`](Self::friction).
     #[must_use]
     pub fn dragging(mut self, drag: impl FnMut(f64) -> [[T; 2]; 2] + Send + 'a) -> Self {
         let row = self.laws.len().wrapping_sub(1);
@@ -296,7 +297,7 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
         for (row, &law) in self.laws.iter().enumerate() {
             let mut contact = contacts.push_row((row, 0), law, (&self.jacobian, row));
             contact.magnitude(self.coordinates);
-            while let Some(friction) = frictions.next_if(|friction| friction.row == row) {
+            if let Some(friction) = frictions.next_if(|friction| friction.row == row) {
                 contact.friction(friction.coefficient);
                 for tangent in friction.tangents.clone() {
                     contact.tangent_row((&self.tangents, tangent));
@@ -345,10 +346,9 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
         }
         let mut rates = rates.iter_mut();
         for friction in &mut self.frictions {
-            let [velocity, acceleration] = friction.drag.as_mut().map_or([[T::zero(); 2]; 2], |drag| drag(t));
-            for (k, rates) in rates.by_ref().take(friction.tangents.len()).enumerate() {
-                let of = |along: [T; 2]| along.get(k).map_or(T::zero(), |x| -*x);
-                *rates = GapRates { rate: of(velocity), acceleration: of(acceleration) };
+            let drag = friction.drag.as_mut().map_or([[T::zero(); 2]; 2], |drag| drag(t));
+            for (rates, dragged) in rates.by_ref().take(friction.tangents.len()).zip(GapRates::dragged(drag)) {
+                *rates = dragged;
             }
         }
         Ok(Rates::Given)

@@ -274,8 +274,8 @@ impl<T: Real> NodeToFacet<T> {
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of a node against the point of the facet that
-    /// it stands on: bodies that turn together do not slip.
+    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of a node against the point of the facet
+    /// that it stands on: bodies that turn together do not slip.
     ///
     /// ```
     /// use contact_dynamics::contact::{Contacts, NodeToFacet};
@@ -284,12 +284,12 @@ impl<T: Real> NodeToFacet<T> {
     /// // A node in the middle of a segment, and touching it.
     /// let coordinates = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]];
     /// let dofs = [[0, 1], [2, 3], [4, 5]];
-    /// let mut contact =
-    ///     NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[1, 0]])?.friction(0.3);
+    /// let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[1, 0]])?.friction(0.3);
     /// contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0)?;
     /// let contacts = Contacts::of(&contact);
     /// assert_eq!((contacts.friction(0), contacts.tangents(0).len()), (0.3, 1));
-    /// let slip: f64 = contacts.tangents(0)[0].iter().map(|&(place, w)| w * [5.0, 0.0, 5.0, 0.0, 5.0, 0.0][place]).sum();
+    /// let v = [5.0, 0.0, 5.0, 0.0, 5.0, 0.0];
+    /// let slip: f64 = contacts.tangents(0)[0].iter().map(|&(place, weight)| weight * v[place]).sum();
     /// assert_eq!(slip, 0.0); // all of them move along the segment
     /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
@@ -436,7 +436,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let vertices = surface.facets()[stand.facet].nodes();
             let [x, y, _] = stand.normal;
             let tangents = match self.dimension {
-                2 => [[y, -x, 0.0], [0.0; 3]],
+                2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
                 _ => across(stand.normal),
             };
             for tangent in tangents.into_iter().take(self.dimension - 1) {

@@ -156,8 +156,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         Ok(contact)
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0, for all nodes. Slip is the velocity of a node against the points
-    /// of the surface: those move with the obstacle ([`moving`](Self::moving), [`dragging`](Self::dragging)).
+    /// Coulomb's friction with a coefficient μ, from 0, for all nodes. Slip is the velocity of a node against the
+    /// points of the surface: those move with the obstacle ([`moving`](Self::moving), [`dragging`](Self::dragging)).
     ///
     /// ```
     /// use contact_dynamics::contact::{NodesOnObstacle, Plane};
@@ -185,7 +185,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Friction with a coefficient that depends on the place of the node in space: it is that of the start of each step.
+    /// Friction with a coefficient that depends on the place of the node in space: it is that of the start of each
+    /// step.
     #[must_use]
     pub fn friction_at(mut self, coefficient: impl Fn([T; D]) -> f64 + Send + 'a) -> Self {
         self.roughness = Some(Box::new(coefficient));

@@ -360,8 +360,8 @@ pub(super) fn dot<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> T {
     x.into_iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Orthonormal directions across a unit normal: one in the plane, two in space (others are zero). Across an axis they are
-/// axes.
+/// Orthonormal directions across a unit normal: one in the plane, two in space (others are zero). Across an axis they
+/// are axes.
 pub(super) fn across<T: Real, const D: usize>(normal: [T; D]) -> [[T; D]; 2] {
     let mut directions = [[T::zero(); D]; 2];
     if D == 2 {

@@ -12,6 +12,13 @@ pub struct GapRates<T> {
     pub acceleration: T,
 }
 
+impl<T: Real> GapRates<T> {
+    /// The rates of slip along the tangents of an obstacle with those velocities and accelerations along them.
+    pub(super) fn dragged([velocities, accelerations]: [[T; 2]; 2]) -> [Self; 2] {
+        std::array::from_fn(|k| Self { rate: -velocities[k], acceleration: -accelerations[k] })
+    }
+}
+
 /// The rows of G, stored row by row.
 ///
 /// ```

@@ -125,9 +125,9 @@ impl AdmissibleSet {
     /// By how much the y and the multipliers of a block miss their conditions (unit of y): |min(y, W_ii λ)|, or |y| of
     /// a free row; NaN if y is not finite. `compliance` is the diagonal of W.
     ///
-    /// Of a cone the larger one of |min(y_n, W_nn p)| (|y_n| where it does not open) and of |W_t f − P(W_t f − y_t)|, with P the nearest point of the
-    /// disc of radius W_t μ max(0, p) and W_t the larger one of the tangential rows (Alart and Curnier, Comput. Methods
-    /// Appl. Mech. Eng. 92, 1991).
+    /// Of a cone the larger one of |min(y_n, W_nn p)| (|y_n| where it does not open) and of |W_t f − P(W_t f − y_t)|,
+    /// with P the nearest point of the disc of radius W_t μ max(0, p) and W_t the larger one of the tangential rows
+    /// (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
         if let Some(friction) = self.friction() {
             return cone_residual((T::of(friction), self.is_bilateral()), y, multipliers, compliance);

@@ -157,8 +157,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// The jump that the scheme's rows make of a gap which is met only up to a few roundings: by so much rows that depend
-    /// on one another may contradict each other.
+    /// The jump that the scheme's rows make of a gap which is met only up to a few roundings: by so much rows that
+    /// depend on one another may contradict each other.
     fn rounding_of_gap(&self, row: usize, jump: Jump) -> T {
         /// Roundings of a gap that it may miss.
         const ROUNDINGS: f64 = 32.0;

@@ -1,5 +1,5 @@
-//! The contact problem of S = G M⁻¹ Gᵀ for contacts with friction among others, for total multipliers: a part of them is
-//! in the jumps already.
+//! The contact problem of S = G M⁻¹ Gᵀ for contacts with friction among others, for total multipliers: a part of them
+//! is in the jumps already.
 
 use super::{JumpProjection, rounding};
 use crate::contact::{ContactId, ContactJacobian};
@@ -141,8 +141,8 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// Finds the totals, group by group: S couples no two of them. Multipliers press if they have the sign of `presses`.
-    /// `id` names the contact of a row, for an error at time t.
+    /// Finds the totals, group by group: S couples no two of them. Multipliers press if they have the sign of
+    /// `presses`. `id` names the contact of a row, for an error at time t.
     pub(crate) fn solve(
         &mut self,
         (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
@@ -216,8 +216,8 @@ impl<T: Real> Rubbing<T> {
         Ok(())
     }
 
-    /// Solves where the equations with the friction of what slides have no solution, since some of it would be pulled: it
-    /// keeps the friction of a pass while the others are solved for, until it has that of its own force.
+    /// Solves where the equations with the friction of what slides have no solution, since some of it would be pulled:
+    /// it keeps the friction of a pass while the others are solved for, until it has that of its own force.
     fn solve_lagging(
         &mut self,
         positions: &[usize],
@@ -279,8 +279,8 @@ impl<T: Real> Rubbing<T> {
 }
 
 impl<T: Real> Group<T> {
-    /// Writes down the problem of the rows at these positions, S of which is known: an unknown for each row, but one for
-    /// each contact that slides, whose friction comes with its normal multiplier.
+    /// Writes down the problem of the rows at these positions, S of which is known: an unknown for each row, but one
+    /// for each contact that slides, whose friction comes with its normal multiplier.
     fn pose(&mut self, all: &Rubbing<T>, positions: &[usize], friction: Friction) {
         let size = positions.len();
         if size > self.reserved {
@@ -335,8 +335,8 @@ impl<T: Real> Group<T> {
         multipliers.resize(unknowns.len(), T::zero());
     }
 
-    /// Solves. Equations alone, with a symmetric W, have a solution of least norm whatever rounding has made of rows that
-    /// depend on one another.
+    /// Solves. Equations alone, with a symmetric W, have a solution of least norm whatever rounding has made of rows
+    /// that depend on one another.
     fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
         let Self { delassus, offset, sets, tolerance, multipliers, factor, .. } = self;
         let size = offset.len();

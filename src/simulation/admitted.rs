@@ -49,9 +49,7 @@ impl Admitted {
             Some(reason) => Err(Error::Incompatible { part: self.integrator.clone(), reason }),
         }
     }
-}
 
-impl Admitted {
     /// Refuses friction that is no number, that has no direction, or that law, contact solver, scheme or corrections
     /// cannot serve.
     pub(super) fn check_friction(

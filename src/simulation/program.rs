@@ -191,8 +191,8 @@ pub(crate) struct CompiledStage<T> {
     pub(crate) balance: Option<ScaledRows<T>>,
     /// Only where contact is not imposed on the displacements of the stage's own state.
     pub(crate) contact: Option<ContactTarget<T>>,
-    /// The way along which contact with friction slides, where that is no velocity: to where contact is imposed ahead of
-    /// the state, or in the stage.
+    /// The way along which contact with friction slides, where that is no velocity: to where contact is imposed ahead
+    /// of the state, or in the stage.
     pub(crate) way: ScaledRow<T>,
     pub(crate) load: f64,
     /// The fractions of the step at which the stage starts and ends.

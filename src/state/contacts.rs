@@ -44,8 +44,8 @@ impl PartialEq for Names {
 
 /// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
 ///
-/// Where contacts have friction the multipliers of tangential rows stand behind those of all gaps: forces, impulses, λ_v
-/// and λ_a have one entry a row.
+/// Where contacts have friction the multipliers of tangential rows stand behind those of all gaps: forces, impulses,
+/// λ_v and λ_a have one entry a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
     pub(crate) ids: Vec<ContactId>,

@@ -22,8 +22,8 @@ fn impacts_with_restitution() {
     }
 }
 
-/// Plastic impact of a particle on a rough floor, at any phase of the step: the impulses are in the cone, and so is what
-/// is left.
+/// Plastic impact of a particle on a rough floor, at any phase of the step: the impulses are in the cone, and so is
+/// what is left.
 #[test]
 fn oblique_impacts_of_a_particle() {
     for scheme in schemes().filter(Listed::takes_corrections) {
@@ -85,8 +85,8 @@ fn compliant_laws_rub_too() {
     }
 }
 
-/// A ball thrown at a spring: friction is μ times its force as long as the ball slides, and what it takes is μ times what
-/// the spring gives; rigid contacts beside it go on as they would.
+/// A ball thrown at a spring: friction is μ times its force as long as the ball slides, and what it takes is μ times
+/// what the spring gives; rigid contacts beside it go on as they would.
 #[test]
 fn springs_take_what_they_should() {
     for scheme in schemes() {
@@ -162,8 +162,8 @@ fn a_turning_drum_carries() {
         let turning = move |_: f64, [x, y]: [f64; 2]| [[-spin * y, spin * x], [-spin * spin * x, -spin * spin * y]];
         builder.constraint(nodes.friction(friction).dragging(turning)).build().unwrap()
     };
-    // It goes round with the drum until its weight pulls more than friction holds, g sin α = μ (g cos α + ω² R), that is
-    // until α = .878.
+    // It goes round with the drum until its weight pulls more than friction holds, g sin α = μ (g cos α + ω² R), that
+    // is until α = .878.
     let mut places = Vec::new();
     for by_function in [false, true] {
         let mut run: Simulation<'_, f64> = build(by_function);

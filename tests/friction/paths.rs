@@ -38,8 +38,8 @@ fn the_coulomb_oscillator_turns_where_it_should() {
     }
 }
 
-/// On a belt a mass on a spring sticks until the spring pulls with f, then slides around f: with one coefficient it comes
-/// to an oscillation in which its velocity just reaches that of the belt, or less.
+/// On a belt a mass on a spring sticks until the spring pulls with f, then slides around f: with one coefficient it
+/// comes to an oscillation in which its velocity just reaches that of the belt, or less.
 #[test]
 fn a_belt_carries_an_oscillator_to_its_limit() {
     let scheme = schemes().find(|scheme| scheme.name() == "Newmark(0.25, 0.5)").unwrap();
@@ -112,8 +112,9 @@ fn units_do_not_matter() {
     }
 }
 
-/// Mode coupling: a mass on two springs that are not along the floor, pressed onto a spring that slides on a belt. Friction
-/// makes the stiffness unsymmetric, K = [k₁₁, k₁₂ + μ k₃; k₁₂, k₂₂], and above a threshold of μ vibrations grow.
+/// Mode coupling: a mass on two springs that are not along the floor, pressed onto a spring that slides on a belt.
+/// Friction makes the stiffness unsymmetric, K = [k₁₁, k₁₂ + μ k₃; k₁₂, k₂₂], and above a threshold of μ vibrations
+/// grow.
 #[test]
 fn modes_couple_above_the_threshold() {
     let ([k11, k12, k22], k3, load) = ([2.0, -0.3, 1.0], 1.2, 10.0);

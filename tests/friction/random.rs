@@ -85,8 +85,8 @@ fn scenes_by_chance() {
     assert!(largest_growth(|| Box::new(Composite), 1..300) < 0.03);
 }
 
-/// The numbering of nodes and contacts does not matter beyond rounding, nor does a velocity that all have in common with
-/// the floor.
+/// The numbering of nodes and contacts does not matter beyond rounding, nor does a velocity that all have in common
+/// with the floor.
 #[test]
 fn order_and_frame_do_not_matter() {
     let go = |order: [usize; 2], frame: f64| {

@@ -1,4 +1,5 @@
-//! Oblique impact of a slab on a rough wall: smooth friction by every scheme that takes corrections, and by the presets.
+//! Oblique impact of a slab on a rough wall: smooth friction by every scheme that takes corrections, and by the
+//! presets.
 
 use contact_dynamics::{PersistencyCorrection, Preset};
 use contact_dynamics_scenes::schemes;

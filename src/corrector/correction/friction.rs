@@ -1,5 +1,5 @@
-//! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both in
-//! the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
+//! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both
+//! in the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
 
 use super::{Correction, Jump};
 use crate::contact::GapRates;
@@ -120,8 +120,8 @@ impl<T: Real> Correction<'_, T> {
         buffers.rubbing.solve((g, projection), &mut **solver, T::one(), (*t, |row: usize| ids[row]))
     }
 
-    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips where contact
-    /// sticks. Where it slides the past has had the friction of the impulse that this takes.
+    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips where
+    /// contact sticks. Where it slides the past has had the friction of the impulse that this takes.
     pub(super) fn project_rubbing_field(&mut self, k: usize, field: usize, engaged: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, projection, solver, g, contacts, scheme, h, t, new, energy, .. } = self;
         let Buffers { rubbing, gaps, rates, slips, past_slips, .. } = &mut **buffers;
