@@ -6,6 +6,7 @@ mod correction;
 mod group_problem;
 mod jump_projection;
 mod laursen_love;
+mod nonsmooth_splitting;
 mod persistency;
 mod prediction;
 mod release;
@@ -21,6 +22,7 @@ pub use correction::Correction;
 pub(crate) use correction::{Erased, Scheme};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
+pub use nonsmooth_splitting::NonsmoothSplitting;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
@@ -93,6 +95,13 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none")
     }
 
+    /// Whether it takes the forces of closed contacts out of the accelerations, and leaves those of the smooth motion.
+    /// Those of the start are without them then, and friction holds the way made in a stage, not its velocity, which
+    /// the correction changes. Default: the forces stay.
+    fn leaves_smooth_motion(&self) -> bool {
+        false
+    }
+
     /// Whether [`predict`](Self::predict) does anything; memory for it is reserved only then.
     fn predicts(&self) -> bool {
         false
@@ -143,6 +152,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn check_friction(&self) -> std::result::Result<(), &'static str> {
         (**self).check_friction()
+    }
+    fn leaves_smooth_motion(&self) -> bool {
+        (**self).leaves_smooth_motion()
     }
     fn predicts(&self) -> bool {
         (**self).predicts()

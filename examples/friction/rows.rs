@@ -1,5 +1,6 @@
 //! Schemes and corrections by name, and tables of what is measured of them.
 
+use contact_dynamics::corrector::NonsmoothSplitting;
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result,
     TimeIntegrator,
@@ -31,17 +32,25 @@ pub(crate) enum Correction {
     None,
     Persistency,
     History,
+    Splitting,
 }
 
 impl Correction {
-    pub(crate) const ALL: [Self; 3] = [Self::None, Self::Persistency, Self::History];
+    pub(crate) const ALL: [Self; 4] = [Self::None, Self::Persistency, Self::History, Self::Splitting];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::None => "–",
             Self::Persistency => "λ_v/λ_a",
             Self::History => "λ_v/λ_a + history",
+            Self::Splitting => "nonsmooth splitting",
         }
+    }
+
+    /// Whether it can act with a scheme.
+    pub(crate) fn serves(self, scheme: Scheme) -> bool {
+        let tableau = (scheme.make)().tableau();
+        self != Self::Splitting || tableau.depth() == 1 && tableau.stages.len() == 1
     }
 
     pub(crate) fn correctors(self) -> Vec<Box<dyn Corrector<f64>>> {
@@ -49,6 +58,7 @@ impl Correction {
             Self::None => Vec::new(),
             Self::Persistency => vec![Box::new(PersistencyCorrection::new())],
             Self::History => vec![Box::new(PersistencyCorrection::with_history_projection())],
+            Self::Splitting => vec![Box::new(NonsmoothSplitting)],
         }
     }
 }

@@ -24,8 +24,8 @@ const IMPLICIT: [Make; 6] = [COMPOSITE, TRAPEZOIDAL, CHUNG_HULBERT_09, CHUNG_HUL
 /// All rows: presets, then those without correction, those with one, those on other masses.
 pub(crate) fn all() -> Vec<Combination> {
     use Correction::{
-        History, Implicit, LaursenLove, Persistency, Release, Stabilized, StabilizedClosed, TaylorPapadopoulos,
-        ZeroAcceleration,
+        History, Implicit, LaursenLove, Persistency, Release, Splitting, Stabilized, StabilizedClosed,
+        TaylorPapadopoulos, ZeroAcceleration,
     };
     let tapered = Treatment::RedistributedBlend(Takers::Tapered);
     let mut rows = vec![
@@ -53,6 +53,7 @@ pub(crate) fn all() -> Vec<Combination> {
         &[Release, TaylorPapadopoulos, ZeroAcceleration],
         &lumped,
     );
+    add(&[TRAPEZOIDAL, CHUNG_HULBERT_09, CHUNG_HULBERT_08], &[Splitting], &lumped);
     add(&[TRAPEZOIDAL, CHUNG_HULBERT_08], &[Implicit, Stabilized, StabilizedClosed], &lumped);
     add(&[COMPOSITE, TRAPEZOIDAL, CHUNG_HULBERT_08], &[History], &[Treatment::Consistent, Treatment::Blend]);
     let redistributed = [Takers::Neighbors, Takers::Uniform, Takers::LeastSquares].map(Treatment::Redistributed);

@@ -40,14 +40,11 @@ impl<T: Real> Corrector<T> for ContactImplicit {
     }
 
     fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        let moves = |row: fn(&Rows) -> f64| tableau.stages.iter().map(|stage| row(&stage.recovery)).sum::<f64>();
-        match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < 1e-12 {
-            true => Ok(()),
-            false => {
-                Err("damping would act on the impulse that it adds to v only in the next step; choose a scheme with \
-                          γ = 2β, as the trapezoidal rule")
-            }
-        }
+        adds_no_velocity(tableau)
+    }
+
+    fn leaves_smooth_motion(&self) -> bool {
+        true
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
@@ -115,6 +112,10 @@ impl<T: Real> Corrector<T> for ContactStabilized {
         step.project(self.extent)
     }
 
+    fn leaves_smooth_motion(&self) -> bool {
+        true
+    }
+
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         act_implicitly(step)
     }
@@ -126,6 +127,16 @@ pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static st
     match tableau.depth() == 1 && tableau.stages.len() == 1 {
         true => Ok(()),
         false => Err("it needs a scheme of one stage that reads the last state alone"),
+    }
+}
+
+/// Refuses schemes by which a constant force of contact, taken out of the acceleration, leaves v to be changed.
+pub(super) fn adds_no_velocity(tableau: &Tableau) -> std::result::Result<(), &'static str> {
+    let moves = |row: fn(&Rows) -> f64| tableau.stages.iter().map(|stage| row(&stage.recovery)).sum::<f64>();
+    match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < 1e-12 {
+        true => Ok(()),
+        false => Err("damping would act on the impulse that it adds to v only in the next step; choose a scheme with \
+                      γ = 2β, as the trapezoidal rule"),
     }
 }
 

@@ -117,6 +117,15 @@ enum Jump {
     Acceleration,
 }
 
+/// What pressed contacts may do with the velocities that they are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pressed {
+    /// Nothing: their jumps vanish both ways.
+    Stays,
+    /// They may part, as those do that touch.
+    MayPart,
+}
+
 /// A borrowed system, debug-printable.
 pub(crate) struct Erased<'a, T: Real>(pub(crate) &'a mut dyn System<T>);
 
@@ -140,7 +149,7 @@ impl<T: Real> Correction<'_, T> {
     /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_velocity_jumps(&mut self) -> Result<()> {
         if self.rubs() {
-            return self.solve_rubbing_velocity();
+            return self.solve_rubbing_velocity(Pressed::Stays);
         }
         let rows = std::mem::take(&mut self.buffers.closed);
         let mut impulses = std::mem::take(&mut self.buffers.impulses);

@@ -20,7 +20,7 @@ use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, InitialOverclosure, Start, Violation};
 use super::supports::put_initial_supports;
-use super::tangent::{At, TangentOf};
+use super::tangent::At;
 use super::workspace::{ContactSize, Workspace};
 #[cfg(doc)]
 use crate::analysis;
@@ -351,6 +351,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
         let mut projection = start::projection(&*system, dofs, constraints.room())?;
+        let is_smooth = self.correctors.iter().any(Corrector::leaves_smooth_motion);
         let begun = if let Some((state, history)) = resumed {
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
             constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
@@ -360,8 +361,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             RateCheck::new(constraints.len()).check(&mut constraints, &state.motion, history.clock.h, &g)?;
             Begun { state, history, adjustment: None }
         } else {
-            let (solver, massless) = (&mut *contact_solver, &massless[..]);
-            let start = Start { system: &mut *system, contact_solver: solver, scheme: &scheme, h, t, massless };
+            let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
+            let start = Start { system, contact_solver, scheme: &scheme, h, t, massless, is_smooth };
             let violation = Violation::Initial(self.overclosure);
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
@@ -377,8 +378,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
 
         let (interface, unit) = (constraints.interface(), Unit::of(&constraints));
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
-        let h = history.clock.h;
+        let (at, h) = (At::state(&state.motion), history.clock.h);
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
         let program = compiler.compile(&scheme.tableau)?;
         let is_known = history.known == scheme.depth;

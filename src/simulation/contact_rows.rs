@@ -39,6 +39,8 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) rates: Vec<GapRates<T>>,
     /// The same of slips, one a tangential row.
     pub(super) slips: Vec<GapRates<T>>,
+    /// Whether slips are measured by the way in the stage, though velocities contain the unknown.
+    pub(super) slides_by_way: bool,
     /// Free dofs without mass.
     pub(super) massless: Vec<usize>,
     /// What is complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
@@ -94,6 +96,7 @@ impl<T: Real> ContactRowsWork<T> {
         let mut work = Self {
             rates: Vec::new(),
             slips: Vec::new(),
+            slides_by_way: false,
             massless: Vec::new(),
             y: Vec::new(),
             tolerance: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::judge::Verdict;
 use super::run::Simulation;
-use super::tangent::{At, TangentOf};
+use super::tangent::At;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::{History, State};
@@ -70,7 +70,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Compiles the programs for h again; they are compiled for `other`.
     fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
         let Self { system, scheme, program, startup, state, .. } = self;
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
+        let at = At::state(&state.motion);
         program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
         match startup {
             Some(startup) => startup.set_step_size(&scheme.starter.stages, &mut **system, other, h, at),

@@ -8,10 +8,10 @@ use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, Start, Violation};
-use super::tangent::{At, TangentOf};
+use super::tangent::At;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::FORESEEN;
-use crate::corrector::{Gaps, JumpProjection, no_response};
+use crate::corrector::{Corrector, Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
 use crate::real::Real;
 use crate::state::{History, Motion, Pace, State, Trail};
@@ -80,7 +80,7 @@ impl<T: Real> Simulation<'_, T> {
         }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
-        let at = At { t: state.motion.t, u: &state.motion.u, v: &state.motion.v, of: TangentOf::State };
+        let at = At::state(&state.motion);
         program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
         if let Some(startup) = startup
             && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h, at)
@@ -160,11 +160,15 @@ impl<T: Real> Simulation<'_, T> {
 
     fn begin_anew(&mut self) -> Result<()> {
         let (h, t) = (self.history.clock.h, self.time());
-        let Self { system, constraints, g, contact_solver, scheme, startup, state, history, work, .. } = self;
+        let Self { system, constraints, g, contact_solver, correctors, scheme, startup, state, .. } = self;
+        let (history, work) = (&mut self.history, &mut self.work);
+        let is_smooth = correctors.iter().any(Corrector::leaves_smooth_motion);
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
         let mut projection = start::projection(&**system, u.len(), constraints.room())?;
-        let start = Start { system: &mut **system, contact_solver: &mut **contact_solver, scheme, h, t, massless };
+        let (system, contact_solver) = (&mut **system, &mut **contact_solver);
+        let start =
+            Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme, h, t, massless, is_smooth };
         let Begun { state: begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
         work.contact.rows.reserved = constraints.room().min(FORESEEN);
@@ -172,8 +176,8 @@ impl<T: Real> Simulation<'_, T> {
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {
             let (interface, unit) = (constraints.interface(), Unit::of(constraints));
-            let at = At { t, u: &begun.motion.u, v: &begun.motion.v, of: TangentOf::State };
-            let mut compiler = Compiler { system: &mut **system, solver: &*self.linear_solver, h, at, interface, unit };
+            let at = At::state(&begun.motion);
+            let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
             let program = compiler.start(&scheme.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);
@@ -181,7 +185,7 @@ impl<T: Real> Simulation<'_, T> {
             *startup = None;
         }
         if let Some(ledger) = &mut self.ledger {
-            ledger.restart(&mut **system, &begun, (constraints, g))?;
+            ledger.restart(system, &begun, (constraints, g))?;
         }
         let (pace, clock) = (history.pace, history.clock);
         (*state, *history) = (begun, past);

@@ -2,8 +2,8 @@
 //!
 //! Coulomb's law does not change when the slip is scaled by a positive number. It is taken from the velocity that the
 //! stage ends with, scaled so that the unknown has the same weight as in the gap; W is symmetric then. Where velocities
-//! do not contain the unknown, or dofs have no mass, it is the way made in the stage. It is measured along the rows
-//! along which friction acts.
+//! do not contain the unknown, dofs have no mass, or corrections take contact forces out of the accelerations, it is
+//! the way made in the stage. It is measured along the rows along which friction acts.
 
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::{ContactStep, ContactWork};
@@ -28,12 +28,12 @@ enum Source<T> {
 }
 
 /// The source of a slip, and the weight of d in it.
-fn source<T: Real>(stage: &CompiledStage<T>, is_massless: bool) -> (Source<T>, T) {
+fn source<T: Real>(stage: &CompiledStage<T>, by_way: bool) -> (Source<T>, T) {
     let [by_u, by_v, _] = stage.recovery.weights();
     match &stage.contact {
         Some(target) if target.forecast.is_some() => (Source::Target, target.row.weight),
         Some(target) => (Source::WayAhead, target.row.weight - by_u),
-        None if by_v > T::zero() && !is_massless => (Source::Velocity(by_u / by_v), by_u),
+        None if by_v > T::zero() && !by_way => (Source::Velocity(by_u / by_v), by_u),
         None => (Source::Way, by_u),
     }
 }
@@ -44,7 +44,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let tangents = self.constraints.tangents();
         for row in tangents.contacts() {
             let is_massless = !rows.massless.is_empty() && self.g.acts_on(row, &rows.massless);
-            let (_, weight) = source(self.stage, is_massless);
+            let (_, weight) = source(self.stage, is_massless || rows.slides_by_way);
             // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
             let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
             let rubs = rows.weight[row] > T::zero() || knows;
@@ -67,7 +67,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             return Ok(());
         }
         let ContactWork { rows, interface, .. } = contact;
-        let ContactRowsWork { y, tolerance, target, slips, curved, massless, .. } = rows;
+        let ContactRowsWork { y, tolerance, target, slips, curved, massless, slides_by_way, .. } = rows;
         let forces = curved.forces(g);
         if slips.len() < constraints.tangents().len() {
             slips.resize(constraints.tangents().len(), GapRates::default());
@@ -84,7 +84,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
             let is_massless = !massless.is_empty() && g.acts_on(row, massless);
-            let (source, weight) = source(stage, is_massless);
+            let (source, weight) = source(stage, is_massless || *slides_by_way);
             for k in tangents.of(row) {
                 let own = slips[k - tangents.all().start].rate;
                 (y[k], tolerance[k]) = match source {

@@ -28,6 +28,8 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) t: f64,
     /// Free dofs without mass.
     pub(super) massless: &'s [usize],
+    /// Whether accelerations are those of the smooth motion, without the forces of closed contacts.
+    pub(super) is_smooth: bool,
 }
 
 /// How bodies that overlap at the start are treated, in rigid contacts and equality rows. (Mesh generators leave small
@@ -91,6 +93,15 @@ impl<T: Real> Start<'_, T> {
     ) -> Result<Begun<T>> {
         let (scheme, h, t) = (self.scheme, self.h, self.t);
         let Found { mut motion, contacts, adjustment } = self.motion(u, v, constraints, g, projection, violation)?;
+        if self.is_smooth {
+            for (row, &force) in contacts.lambda.iter().enumerate() {
+                let owner = if g.is_tangential(row) { constraints.tangents().owner(row) } else { row };
+                if constraints.law(owner).leaves_jumps() && !g.acts_on(owner, self.massless) {
+                    projection.prepare(g, &[row]);
+                    projection.push(g, row, -force, &mut motion.a);
+                }
+            }
+        }
         let depth = scheme.depth;
         let mut slots = vec![Motion::zero(motion.u.len()); scheme.slots()];
         straight_past(&motion, h, &mut slots[1..depth]);
@@ -136,7 +147,7 @@ impl<T: Real> Start<'_, T> {
         projection: &mut JumpProjection<T>,
         violation: Violation,
     ) -> Result<Found<T>> {
-        let Self { system, contact_solver, scheme, h, t, massless } = self;
+        let Self { system, contact_solver, scheme, h, t, massless, .. } = self;
         let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::mass::{self, Mass};
 use crate::real::Real;
 use crate::sparse::Combination;
+use crate::state::Motion;
 use crate::system::{Linearity, Path, System, TangentWeights};
 
 /// Where a tangent is taken.
@@ -13,6 +14,13 @@ pub(crate) struct At<'m, T> {
     pub(crate) u: &'m [T],
     pub(crate) v: &'m [T],
     pub(crate) of: TangentOf<'m, T>,
+}
+
+impl<'m, T> At<'m, T> {
+    /// A motion, and the force there.
+    pub(crate) fn state(motion: &'m Motion<T>) -> Self {
+        Self { t: motion.t, u: &motion.u, v: &motion.v, of: TangentOf::State }
+    }
 }
 
 /// The force that a tangent belongs to.

@@ -86,10 +86,12 @@ impl<T: Real> Workspace<T> {
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
         let supports = Supports::of(system);
+        let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
+        contact_rows.slides_by_way = correctors.iter().any(Corrector::leaves_smooth_motion);
         Self {
             contact: ContactWork {
                 interface: InterfaceWork::new(interface),
-                rows: ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len()),
+                rows: contact_rows,
                 trial: ContactState::with_capacity(rows),
                 closed_at_start: Vec::with_capacity(rows),
                 was_closed: Vec::with_capacity(rows),

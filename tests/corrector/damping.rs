@@ -1,7 +1,7 @@
 //! Corrections of velocity in bodies with damping: bounded at any step, consistent at small ones.
 #![allow(clippy::float_cmp)] // forces that are exactly zero
 
-use contact_dynamics::corrector::{ContactImplicit, ContactStabilized, LaursenLove, Release};
+use contact_dynamics::corrector::{ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release};
 use contact_dynamics::{
     Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
     Simulation, TimeIntegrator,
@@ -15,11 +15,12 @@ type Make = fn() -> Box<dyn TimeIntegrator>;
 type Named = (&'static str, fn() -> Correctors);
 
 /// Every corrector that changes velocities of bodies with damping.
-const CORRECTIONS: [Named; 6] = [
+const CORRECTIONS: [Named; 7] = [
     ("λ_v/λ_a", || vec![Box::new(PersistencyCorrection::new())]),
     ("history", || vec![Box::new(PersistencyCorrection::with_history_projection())]),
     ("release", || vec![Box::new(Release)]),
     ("both", || vec![Box::new(PersistencyCorrection::with_history_projection()), Box::new(Release)]),
+    ("splitting", || vec![Box::new(NonsmoothSplitting)]),
     ("implicit", || vec![Box::new(ContactImplicit)]),
     ("Laursen–Love", || vec![Box::new(LaursenLove)]),
 ];

@@ -3,7 +3,7 @@
 use contact_dynamics::contact::ContactId;
 use contact_dynamics::contact_solver::{ContactFailure, GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::corrector::{
-    ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
+    ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::observer::{ContactRecorder, DofRecorder, EnergyRecorder};
 use contact_dynamics::partitioned::{Frame, Interface, Side};
@@ -54,7 +54,7 @@ fn parts_of_the_crate_are_moved_and_shared() {
     shared::<(Composite, Newmark, GeneralizedAlpha, Bathe, Gssss, Houbolt, Park, Bdf2, Oalts, NohBathe)>();
     shared::<(CentralDifference, CdLagrange, ChungLee, HulbertChung, TchamwaWielgosz, MoreauJean, EnergyMomentum)>();
     shared::<(PersistencyCorrection, ContactImplicit, ContactStabilized, LaursenLove, Release)>();
-    shared::<(TaylorPapadopoulos, ZeroAcceleration)>();
+    shared::<(TaylorPapadopoulos, ZeroAcceleration, NonsmoothSplitting)>();
     shared::<(Automatic, Cholesky, Diagonal, Tridiagonal, Lu, ConjugateGradients)>();
     shared::<(ActiveSet<f64>, Pivoting<f64>, GaussSeidel, ProjectedGradient<f64>)>();
     shared::<(Interface<f64>, Side<'static, f64>)>();

@@ -232,6 +232,10 @@ impl Corrector<f64> for Remedy {
         self.0.note("check_friction");
         Ok(())
     }
+    fn leaves_smooth_motion(&self) -> bool {
+        self.0.note("leaves_smooth_motion");
+        true
+    }
     fn predicts(&self) -> bool {
         self.0.note("predicts");
         true

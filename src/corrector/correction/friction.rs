@@ -1,7 +1,7 @@
 //! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both
 //! in the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
 
-use super::{Correction, Jump};
+use super::{Correction, Jump, Pressed};
 use crate::contact::GapRates;
 use crate::contact_solver::AdmissibleSet;
 use crate::corrector::rubbing_problem::{Block, Rubbing};
@@ -21,11 +21,11 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// [`solve_velocity_jumps`](Self::solve_velocity_jumps) where contacts have friction: total impulses in the cone.
-    pub(super) fn solve_rubbing_velocity(&mut self) -> Result<()> {
+    pub(in crate::corrector) fn solve_rubbing_velocity(&mut self, pressed: Pressed) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
         // What raw multipliers have changed v by is M⁻¹ Gᵀ times this.
         let share = T::of(self.h * self.scheme.response[1]);
-        let result = self.solve_rubbing(&rows, Jump::Velocity, share);
+        let result = self.solve_rubbing(&rows, (Jump::Velocity, pressed), share);
         let Self { buffers, contacts, constraints, .. } = self;
         let Buffers { engaged, impulses, rubbing, .. } = &mut **buffers;
         engaged.clear();
@@ -54,7 +54,7 @@ impl<T: Real> Correction<'_, T> {
     pub(super) fn solve_rubbing_acceleration(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.engaged);
         let share = T::of(self.scheme.acceleration / self.scheme.balance);
-        let result = self.solve_rubbing(&rows, Jump::Acceleration, share);
+        let result = self.solve_rubbing(&rows, (Jump::Acceleration, Pressed::Stays), share);
         let Buffers { forces, rubbing, .. } = &mut *self.buffers;
         forces.clear();
         forces.extend(rubbing.blocks.iter().map(|block| rubbing.increments[block.places().start]));
@@ -63,10 +63,10 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Solves for the totals of the contacts `rows`, of which raw multipliers have given `share` times theirs.
-    fn solve_rubbing(&mut self, rows: &[usize], jump: Jump, share: T) -> Result<()> {
+    fn solve_rubbing(&mut self, rows: &[usize], (jump, pressed): (Jump, Pressed), share: T) -> Result<()> {
         self.read_rates()?;
         self.read_slip_rates()?;
-        self.pose_rubbing(rows, jump, share);
+        self.pose_rubbing(rows, (jump, pressed), share);
         let solved = self.solve_posed();
         match solved {
             Err(Error::ContradictoryContacts { .. } | Error::Contact { .. }) => {
@@ -83,13 +83,14 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Writes down the problem of the contacts `rows`, of which raw multipliers have given `share` times theirs.
-    fn pose_rubbing(&mut self, rows: &[usize], jump: Jump, share: T) {
+    fn pose_rubbing(&mut self, rows: &[usize], (jump, presses): (Jump, Pressed), share: T) {
         let Self { buffers, constraints, contacts, g, new, .. } = self;
         let Buffers { rubbing, rates, slips, .. } = &mut **buffers;
         let tangents = constraints.0.tangents();
         rubbing.clear();
         for &row in rows {
-            let pressed = contacts.lambda_raw[row] > T::zero() || constraints.0.law(row).is_equality();
+            let held = presses == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
+            let pressed = held || constraints.0.law(row).is_equality();
             let (own, friction) = (tangents.of(row), tangents.friction(row));
             let set = match (own.len(), pressed) {
                 (0, true) => AdmissibleSet::Free,
@@ -105,7 +106,9 @@ impl<T: Real> Correction<'_, T> {
                     Jump::Velocity => (&new.v, rate.rate),
                     Jump::Acceleration => (&new.a, rate.acceleration),
                 };
-                let base = if own.is_empty() { T::zero() } else { share * contacts.lambda_raw[k] };
+                // (Alone a row that stays closed takes any multiplier.)
+                let is_any = own.is_empty() && presses == Pressed::Stays;
+                let base = if is_any { T::zero() } else { share * contacts.lambda_raw[k] };
                 let size = g.magnitude(k, values) + own_rate.abs();
                 rubbing.demand(k, g.product(k, values) + own_rate, rounding(size), base);
             }
@@ -195,6 +198,9 @@ impl<T: Real> Correction<'_, T> {
 
     /// Reads what slips have of their own.
     pub(super) fn read_slip_rates(&mut self) -> Result<()> {
+        if self.constraints.0.tangents().is_empty() {
+            return Ok(());
+        }
         let Buffers { slips, past_slips, .. } = &mut *self.buffers;
         for rates in [&mut *slips, past_slips] {
             rates.resize(rates.len().max(self.constraints.0.tangents().len()), GapRates::default());
@@ -203,7 +209,7 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Applies the impulses found along gaps and tangents.
-    pub(super) fn push_rubbing_velocity(&mut self) -> Result<()> {
+    pub(in crate::corrector) fn push_rubbing_velocity(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
         let result = self.apply(&rows, &increments);

@@ -2,7 +2,7 @@
 
 use crate::masses::{Body, MassMatrix, Treatment};
 use contact_dynamics::corrector::{
-    ContactImplicit, ContactStabilized, LaursenLove, Release, TaylorPapadopoulos, ZeroAcceleration,
+    ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Result, TimeIntegrator, mass};
 
@@ -17,6 +17,7 @@ pub enum Correction {
     History,
     Release,
     TaylorPapadopoulos,
+    Splitting,
     Implicit,
     Stabilized,
     StabilizedClosed,
@@ -32,6 +33,7 @@ impl Correction {
             Self::History => "λ_v/λ_a + history",
             Self::Release => "λ_v/λ_a + history, release",
             Self::TaylorPapadopoulos => "Taylor–Papadopoulos",
+            Self::Splitting => "nonsmooth splitting",
             Self::Implicit => "contact-implicit",
             Self::Stabilized => "contact-stabilized",
             Self::StabilizedClosed => "contact-stabilized (closed)",
@@ -49,6 +51,7 @@ impl Correction {
             Self::History => vec![history()],
             Self::Release => vec![history(), Box::new(Release)],
             Self::TaylorPapadopoulos => vec![Box::new(TaylorPapadopoulos::new(transit)?)],
+            Self::Splitting => vec![Box::new(NonsmoothSplitting)],
             Self::Implicit => vec![Box::new(ContactImplicit)],
             Self::Stabilized => vec![Box::new(ContactStabilized::new())],
             Self::StabilizedClosed => vec![Box::new(ContactStabilized::improved())],
