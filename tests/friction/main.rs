@@ -1,6 +1,7 @@
 //! Runs with friction, against closed forms.
 
 mod bed;
+mod bodies;
 mod generalized;
 mod incline;
 mod laws;

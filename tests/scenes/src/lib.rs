@@ -12,6 +12,7 @@ pub mod hyperelastic;
 pub mod large;
 pub mod masses;
 pub mod measure;
+pub mod mindlin;
 pub mod on_system;
 pub mod output;
 pub mod particles;
@@ -26,6 +27,7 @@ pub mod squeeze;
 pub mod tables;
 pub mod timing;
 pub mod truss;
+pub mod two_slabs;
 pub mod wall_bar;
 
 pub use bars::{Bars, MassKind};

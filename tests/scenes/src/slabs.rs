@@ -47,8 +47,13 @@ impl Slab {
         self.velocity[1] - friction / (self.density * self.speeds[1])
     }
 
-    /// The matrix of two dofs a node, x and y, from that of an element: diagonal and off-diagonal entries.
-    fn assemble(&self, element: [[f64; 2]; 2]) -> contact_dynamics::faer::sparse::SparseColMat<usize, f64> {
+    /// Number of dofs: x and y of each node, from the wall on.
+    pub(crate) fn dofs(&self) -> usize {
+        2 * self.elements + 2
+    }
+
+    /// The entries of a matrix from those of an element, diagonal and off-diagonal of x and y.
+    fn entries(&self, element: [[f64; 2]; 2]) -> Vec<(usize, usize, f64)> {
         let mut entries = Vec::new();
         for e in 0..self.elements {
             for (k, [own, other]) in element.into_iter().enumerate() {
@@ -56,12 +61,29 @@ impl Slab {
                 entries.extend([(i, i, own), (j, j, own), (i, j, other), (j, i, other)]);
             }
         }
-        matrix(2 * self.elements + 2, entries)
+        entries
     }
 
-    fn stiffness(&self) -> contact_dynamics::faer::sparse::SparseColMat<usize, f64> {
+    /// The entries of K.
+    pub(crate) fn stiffness(&self) -> Vec<(usize, usize, f64)> {
         let size = self.length / self.elements as f64;
-        self.assemble(self.speeds.map(|c| [1.0, -1.0].map(|sign| sign * self.density * c * c / size)))
+        self.entries(self.speeds.map(|c| [1.0, -1.0].map(|sign| sign * self.density * c * c / size)))
+    }
+
+    /// Its lumped mass.
+    pub(crate) fn mass(&self) -> Vec<f64> {
+        let mut mass = vec![self.density * self.length / self.elements as f64; self.dofs()];
+        let last = mass.len() - 2;
+        for dof in [0, 1, last, last + 1] {
+            mass[dof] *= 0.5;
+        }
+        mass
+    }
+
+    /// Its velocity: toward the wall, and along it.
+    pub(crate) fn velocities(&self) -> impl Iterator<Item = f64> {
+        let [toward, along] = self.velocity;
+        (0..self.dofs()).map(move |dof| if dof % 2 == 0 { -toward } else { along })
     }
 
     /// A run that begins with the slab this far from the wall.
@@ -72,8 +94,7 @@ impl Slab {
         h: f64,
         gap: f64,
     ) -> SimulationBuilder<'static, f64> {
-        let [toward, along] = self.velocity;
-        let velocity = (0..2 * self.elements + 2).map(|dof| if dof % 2 == 0 { -toward } else { along }).collect();
+        let velocity = self.velocities().collect();
         let wall = LinearRows::new().unilateral(&[(0, 1.0)], gap).friction(self.friction, &[&[(1, 1.0)]]);
         Simulation::builder(system, scheme, h).velocity(velocity).constraint(wall)
     }
@@ -90,13 +111,7 @@ impl Slab {
         h: f64,
         gap: f64,
     ) -> Result<Simulation<'static, f64>> {
-        let size = self.length / self.elements as f64;
-        let mut mass = vec![self.density * size; 2 * self.elements + 2];
-        let last = mass.len() - 2;
-        for dof in [0, 1, last, last + 1] {
-            mass[dof] *= 0.5;
-        }
-        let system = LinearSystem::lumped(mass, self.stiffness())?;
+        let system = LinearSystem::lumped(self.mass(), matrix(self.dofs(), self.stiffness()))?;
         self.scene(system, scheme, h, gap).correctors(correctors).build()
     }
 
@@ -107,10 +122,10 @@ impl Slab {
     /// Those of the builder.
     pub fn preset(&self, preset: Preset, h: f64, gap: f64) -> Result<Simulation<'static, f64>> {
         let size = self.length / self.elements as f64;
-        let m = self.assemble([[self.density * size / 3.0, self.density * size / 6.0]; 2]);
-        let k = self.stiffness();
+        let m = matrix(self.dofs(), self.entries([[self.density * size / 3.0, self.density * size / 6.0]; 2]));
+        let k = matrix(self.dofs(), self.stiffness());
         let courant = mass::courant(Mass::Consistent(m.as_ref()), k.as_ref(), h)?[0];
-        let groups: Vec<_> = (0..2 * self.elements + 2).map(|dof| dof % 2).collect();
+        let groups: Vec<_> = (0..self.dofs()).map(|dof| dof % 2).collect();
         let m = preset.mass(m.as_ref(), k.symbolic(), &[0, 1], &groups, courant)?;
         let system = LinearSystem::new(m, k)?;
         self.scene(system, preset.integrator(), h, gap).correctors(preset.correctors()).build()

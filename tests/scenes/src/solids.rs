@@ -94,6 +94,24 @@ impl Solid<3> {
     /// A quarter of a ball of radius `radius` around (0, 0, radius), x, y ≥ 0, of elements that become smaller toward
     /// the pole in the origin: `cells` of them along x, y and z.
     pub fn quarter_ball(radius: f64, cells: [usize; 3], finest: f64, material: Material) -> Self {
+        Self::ball_part(radius, (cells, cells), finest, material, |x| x)
+    }
+
+    /// Half of a ball, as [`quarter_ball`](Self::quarter_ball) with y ≥ 0 alone; `cells` along x are those of a side.
+    pub fn half_ball(radius: f64, cells: [usize; 3], finest: f64, material: Material) -> Self {
+        let [x, y, z] = cells;
+        Self::ball_part(radius, (cells, [2 * x, y, z]), finest, material, |x| 2.0 * x - 1.0)
+    }
+
+    /// Part of a ball in a grid of `all` cells; `cells` are those from the pole outward, and `across` places x in
+    /// [0, 1] across the pole.
+    fn ball_part(
+        radius: f64,
+        (cells, all): ([usize; 3], [usize; 3]),
+        finest: f64,
+        material: Material,
+        across: fn(f64) -> f64,
+    ) -> Self {
         let graded = |x: f64, ratio: f64| (ratio.powf(x) - 1.0) / (ratio - 1.0);
         // Ratio of the largest to the smallest element such that the smallest is `finest`.
         let ratio = |cells: usize, length: f64| {
@@ -106,8 +124,9 @@ impl Solid<3> {
             low
         };
         let ratios = [ratio(cells[0], 0.7 * radius), ratio(cells[1], 0.7 * radius), ratio(cells[2], 2.0 * radius)];
-        Self::grid(cells, material, |x| {
-            let [px, py] = [graded(x[0], ratios[0]), graded(x[1], ratios[1])];
+        Self::grid(all, material, |x| {
+            let side = across(x[0]);
+            let [px, py] = [side.signum() * graded(side.abs(), ratios[0]), graded(x[1], ratios[1])];
             let pz = 2.0 * graded(x[2], ratios[2]) - 1.0;
             // The cube [−1, 1]³ mapped to the ball.
             let [a, b, c] = [px * px, py * py, pz * pz];
