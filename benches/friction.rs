@@ -19,7 +19,7 @@ const FRICTION: f64 = 0.4;
 type Rows = (Vec<f64>, Vec<f64>);
 
 fn main() {
-    let arguments = Arguments::read(&[4, 8, 12, 16], &[3]);
+    let arguments = Arguments::read(&[4, 8, 12, 16, 24, 32, 55], &[3]);
     println!(
         "{:<26} {:>9} {:>18} {:>18} {:>18} {:>9}",
         "", "contacts", "frictionless ms", "ActiveSet ms (its)", "GaussSeidel ms", "ratio"

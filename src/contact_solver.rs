@@ -14,6 +14,7 @@ mod many_rows;
 mod pivoting;
 mod problem;
 mod projected_gradient;
+mod sweeps;
 
 pub use crate::contact_failure::ContactFailure;
 pub use active_set::ActiveSet;

@@ -48,6 +48,10 @@ pub trait Kernels: Sized {
     fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]);
     /// `out = Σ c x + Σ c (x − y)` in one pass, summed in this order; without a term nothing is written.
     fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]);
+    /// Σ x y of several x of one length, in one pass.
+    fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N];
+    /// `out += Σ c x` of several x of one length, in one pass.
+    fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]);
     /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether what was written is
     /// finite.
     fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
@@ -170,6 +174,12 @@ macro_rules! kernels {
             }
             fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]) {
                 vector::combine(terms, differences, y, out);
+            }
+            fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N] {
+                vector::products(x, y)
+            }
+            fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]) {
+                vector::add_all(c, x, out);
             }
             fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool {
                 vector::recover(weights, d, motion, a)

@@ -7,23 +7,29 @@ use crate::real::Real;
 impl<T: Real> ContactProblem<'_, T> {
     /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
     pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
-        /// Rows and columns that are looked at together: what lies across the diagonal is then near in memory too.
+        /// Rows and columns that are looked at together. What lies across the diagonal is read row by row first: columns
+        /// of a large W are lines of memory that push each other out of the cache.
         const TILE: usize = 32;
         let size = self.size();
         let mut worst = (share, None);
+        let mut across = [[T::zero(); TILE]; TILE];
+        let root = |i: usize| if i < size { self.delassus(i, i).abs().sqrt() } else { T::zero() };
         let tiles = (0..size).step_by(TILE);
         for (first, columns) in tiles.flat_map(|first| (0..=first).step_by(TILE).map(move |columns| (first, columns))) {
-            for i in first..(first + TILE).min(size) {
-                for j in columns..(columns + TILE).min(i) {
-                    let (w, mirrored) = (self.delassus(i, j), self.delassus(j, i));
-                    let difference = (w - mirrored).abs();
-                    // (Most pairs are equal bit for bit: no root for these.)
-                    if difference > T::zero() {
-                        let own = self.delassus(i, i);
-                        let scale = (own * self.delassus(j, j)).abs().sqrt().max(w.abs() + mirrored.abs());
-                        if difference > worst.0 * scale {
-                            worst = (difference / scale, Some((i, j)));
-                        }
+            let (end, last) = ((first + TILE).min(size), (columns + TILE).min(size));
+            for (across, j) in across.iter_mut().zip(columns..last) {
+                across[..end - first].copy_from_slice(&self.row(j)[first..end]);
+            }
+            let roots: [T; TILE] = std::array::from_fn(|k| root(columns + k));
+            for i in first..end {
+                let own = root(i);
+                for (k, &w) in self.row(i)[columns..last.min(i)].iter().enumerate() {
+                    let mirrored = across[k][i - first];
+                    let (difference, own) = ((w - mirrored).abs(), own * roots[k]);
+                    let sum = w.abs() + mirrored.abs();
+                    let scale = if own > sum { own } else { sum };
+                    if difference > worst.0 * scale {
+                        worst = (difference / scale, Some((i, columns + k)));
                     }
                 }
             }

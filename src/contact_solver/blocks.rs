@@ -1,6 +1,6 @@
-//! Problems with cones, block by block: when they count as solved, and sweeps over their blocks.
+//! Problems with cones, block by block: when they count as solved, sweeps until they are, and why they are not.
 
-use super::cone::Cone;
+use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::real::Real;
 use std::ops::Range;
@@ -14,14 +14,14 @@ pub(super) struct BlockAcceptance<T> {
 
 impl<T: Real> BlockAcceptance<T> {
     /// Begins at zero: where there are several solutions the guess must not choose. Refuses what no iteration could
-    /// mend, as that of the other sets does.
+    /// mend, as that of the other sets does. (That W is finite shows in the result.)
     pub(super) fn begin(
         problem: &ContactProblem<'_, T>,
         tolerance: T,
         multipliers: &mut [T],
     ) -> Result<Self, ContactFailure<T>> {
         multipliers.fill(T::zero());
-        problem.check_finite(false)?;
+        problem.check_finite(true)?;
         let Self { accepted } = Self::of(problem, tolerance);
         for (rows, set) in problem.blocks() {
             let row = rows.start;
@@ -56,37 +56,38 @@ impl<T: Real> BlockAcceptance<T> {
     pub(super) fn sweep(
         &self,
         problem: &ContactProblem<'_, T>,
-        omega: T,
+        (memory, omega): (&mut Sweeps<T>, T),
         sweeps: usize,
         impatient: bool,
         (spent, multipliers): (&mut usize, &mut [T]),
     ) -> bool {
-        /// Sweeps after which the problem is looked at, whatever they have changed; an impatient caller wants the
-        /// change halved by then.
+        /// Sweeps after which the change has to be half of what it was; else it may be all rounding already.
         const LOOK: usize = 8;
         /// Growth of the change at which sweeps diverge, as they may where W is not symmetric: what they have made is
         /// then nothing to go on from.
         const DIVERGES: f64 = 1e3;
         let (mut before, mut least) = (T::infinity(), T::infinity());
-        for sweep in 0..sweeps {
-            if sweep % LOOK == 0 && self.accepts(problem, multipliers) {
-                return true;
-            }
-            let change = sweep_blocks(problem, omega, multipliers);
+        memory.begin(problem, multipliers);
+        for sweep in 1..=sweeps {
+            let change = memory.sweep(problem, omega, multipliers);
             *spent += 1;
             least = least.min(change);
-            let bounded = change <= T::of(DIVERGES) * least && change.is_finite();
-            if !bounded {
+            let diverges = !(change <= T::of(DIVERGES) * least && change.is_finite());
+            let stalls = sweep % LOOK == 0 && change > T::of(0.5) * before;
+            if diverges {
                 multipliers.fill(T::zero());
-                break;
-            }
-            if change <= self.accepted && self.accepts(problem, multipliers) {
+            } else if (change <= self.accepted || stalls) && self.accepts(problem, multipliers) {
                 return true;
             }
-            if sweep % LOOK == LOOK - 1 {
-                if impatient && change > T::of(0.5) * before {
-                    break;
-                }
+            if (change <= self.accepted || (diverges || stalls) && memory.is_mistaken(problem)) && memory.read_all() {
+                memory.begin(problem, multipliers);
+                (before, least) = (T::infinity(), T::infinity());
+                continue;
+            }
+            if diverges || stalls && impatient {
+                break;
+            }
+            if sweep % LOOK == 0 {
                 before = change;
             }
         }
@@ -100,6 +101,9 @@ pub(super) fn failure<T: Real>(
     iterations: usize,
     multipliers: &[T],
 ) -> ContactFailure<T> {
+    if let Err(failure) = problem.check_finite(false) {
+        return failure;
+    }
     if let Some(jammed) = jammed(problem) {
         return jammed;
     }
@@ -121,67 +125,4 @@ fn jammed<T: Real>(problem: &ContactProblem<'_, T>) -> Option<ContactFailure<T>>
     let worst =
         problem.blocks().filter_map(excess).reduce(|worst, other| if other.0 > worst.0 { other } else { worst });
     worst.map(|(_, failure)| failure)
-}
-
-/// One sweep: each block in turn takes the multipliers that solve it while the others keep theirs, relaxed by `omega`.
-/// Returns the largest change of a multiplier, times its own compliance.
-fn sweep_blocks<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
-    let mut largest = T::zero();
-    for (rows, set) in problem.blocks() {
-        let mut before = [T::zero(); 3];
-        before[..rows.len()].copy_from_slice(&multipliers[rows.clone()]);
-        let own = rows.clone();
-        if set.friction().is_none() {
-            relax_row(problem, (rows.start, set), omega, multipliers);
-        } else {
-            let solved = alone(problem, rows.clone(), set, multipliers).solve();
-            for (multiplier, solved) in multipliers[rows.clone()].iter_mut().zip(solved) {
-                *multiplier += omega * (solved - *multiplier);
-            }
-            // (Relaxed beyond its solution a block may leave its cone.)
-            if omega > T::one() {
-                set.project(&mut multipliers[rows]);
-            }
-        }
-        for (row, before) in own.zip(before) {
-            largest = largest.max(problem.delassus(row, row) * (multipliers[row] - before).abs());
-        }
-    }
-    largest
-}
-
-/// A row without friction closes its gap, as far as its multiplier may; without W_ii it is left out.
-pub(super) fn relax_row<T: Real>(
-    problem: &ContactProblem<'_, T>,
-    (row, set): (usize, AdmissibleSet),
-    omega: T,
-    multipliers: &mut [T],
-) {
-    let diagonal = problem.delassus(row, row);
-    if diagonal > T::zero() {
-        let correction = omega * problem.gap(row, multipliers) / diagonal;
-        multipliers[row] = set.nearest(multipliers[row] - correction);
-    }
-}
-
-/// A block while the others keep their multipliers.
-fn alone<T: Real>(
-    problem: &ContactProblem<'_, T>,
-    rows: Range<usize>,
-    set: AdmissibleSet,
-    multipliers: &[T],
-) -> Cone<T> {
-    let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
-    for (i, row) in rows.clone().enumerate() {
-        offset[i] = problem.gap(row, multipliers);
-        if i > 0 {
-            noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
-        }
-        for (j, other) in rows.clone().enumerate() {
-            delassus[i][j] = problem.delassus(row, other);
-            offset[i] -= delassus[i][j] * multipliers[other];
-        }
-    }
-    let friction = T::of(set.friction().unwrap_or(0.0));
-    Cone { delassus, offset, friction, tangents: rows.len() - 1, is_bilateral: set.is_bilateral(), noise }
 }

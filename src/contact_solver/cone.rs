@@ -17,6 +17,8 @@ pub(super) struct Cone<T> {
     pub(super) is_bilateral: bool,
     /// What of the tangential offset is rounding.
     pub(super) noise: T,
+    /// The friction there is: where it slides on, the solution is near.
+    pub(super) guess: [T; 2],
 }
 
 /// Steps of the search for the direction of slip, each of which at least halves what is left every other time.
@@ -30,7 +32,7 @@ impl<T: Real> Cone<T> {
     /// y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ, so that there
     /// is a γ at which it vanishes.
     pub(super) fn solve(&self) -> [T; 3] {
-        let Self { delassus: w, offset: b, friction, tangents, is_bilateral, noise } = *self;
+        let Self { delassus: w, offset: b, friction, tangents, is_bilateral, noise, guess } = *self;
         let none = [T::zero(); 3];
         if w[0][0] <= T::zero() {
             return none;
@@ -52,16 +54,18 @@ impl<T: Real> Cone<T> {
             1 => [[s(1, 1), T::zero()], [T::zero(), s(1, 1)]],
             _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
         };
-        let tangential = |gamma: T| solve_two(schur, gamma, c);
-        let beyond = |f: [T; 2]| f[0].hypot(f[1]) - friction * normal(f);
+        let beyond = |f: [T; 2]| norm(f) - friction * normal(f);
         if let Some(held) = hold(schur, c, noise).filter(|&held| beyond(held) <= T::zero()) {
             return [normal(held), held[0], held[1]];
         }
         if c == [T::zero(); 2] {
             return [normal([T::zero(); 2]), T::zero(), T::zero()];
         }
-        let direction =
-            if tangents == 1 { [-c[0].signum(), T::zero()] } else { slip_direction(schur, tangential, beyond) };
+        let direction = if tangents == 1 {
+            [-c[0].signum(), T::zero()]
+        } else {
+            slip_direction(schur, c, guess, |f| friction * normal(f))
+        };
         // In this direction the block is on the rim of its cone, and its gap is zero, to rounding.
         let along = w[0][1] * direction[0] + w[0][2] * direction[1];
         let p = -b[0] / (w[0][0] + friction * along);
@@ -78,54 +82,69 @@ fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
     }
     // S = trace e eᵀ, e along its larger column.
     let column = if s[0][0] >= s[1][1] { [s[0][0], s[1][0]] } else { [s[0][1], s[1][1]] };
-    let size = column[0].hypot(column[1]);
+    let size = norm(column);
     let e = if size > T::zero() { column.map(|x| x / size) } else { column };
     let along = e[0] * c[0] + e[1] * c[1];
-    let across = (c[0] - along * e[0]).hypot(c[1] - along * e[1]);
+    let across = norm([c[0] - along * e[0], c[1] - along * e[1]]);
     let held = if trace > T::zero() { e.map(|e| -along / trace * e) } else { [T::zero(); 2] };
-    (across <= noise + tiny * c[0].hypot(c[1])).then_some(held)
+    (across <= noise + tiny * norm(c)).then_some(held)
 }
 
-/// The direction of the friction of a block that slides in a plane.
-fn slip_direction<T: Real>(
-    schur: [[T; 2]; 2],
-    tangential: impl Fn(T) -> [T; 2],
-    beyond: impl Fn([T; 2]) -> T,
-) -> [T; 2] {
-    let two = T::of(2.0);
-    let size = (schur[0][0] + schur[1][1]).abs();
-    let (mut low, mut high) = (T::zero(), if size > T::zero() { size } else { T::one() });
+/// The direction of the friction of a block that slides in a plane: that of f(γ), −(S + γ)⁻¹ c, at the γ at which
+/// |f| = μ p. With |f| nearly proportional to 1/(S + γ) the quotient μ p/|f| is nearly linear in γ, so that Newton's
+/// method on it, begun anywhere, ends in a few steps; they are kept in the interval in which the solution is.
+fn slip_direction<T: Real>(schur: [[T; 2]; 2], c: [T; 2], guess: [T; 2], bound: impl Fn([T; 2]) -> T) -> [T; 2] {
+    let (two, size) = (T::of(2.0), (schur[0][0] + schur[1][1]).abs());
+    let (mut low, mut high) = (T::zero(), T::infinity());
+    // The slip S g + c of the guess g is −γ g for the solution.
+    let along = |k: usize| guess[k] * (schur[k][0] * guess[0] + schur[k][1] * guess[1] + c[k]);
+    let gamma = -(along(0) + along(1)) / (guess[0] * guess[0] + guess[1] * guess[1]);
+    let mut gamma = if gamma > T::zero() && gamma.is_finite() { gamma } else { T::zero() };
+    let mut f = solve_two(schur, gamma, c);
     for _ in 0..STEPS {
-        if beyond(tangential(high)) < T::zero() {
+        let (length, radius) = (norm(f), bound(f));
+        if length >= radius {
+            low = gamma;
+        } else {
+            high = gamma;
+        }
+        // d f/d γ = −(S + γ)⁻¹ f.
+        let slope = solve_two(schur, gamma, f);
+        let length_slope = (f[0] * slope[0] + f[1] * slope[1]) / length;
+        let radius_slope = bound(slope) - bound([T::zero(); 2]);
+        let step = (length - radius) * length / (radius_slope * length - radius * length_slope);
+        let next = gamma + step;
+        // (NaN is in no interval.)
+        let next = if next >= low && next <= high {
+            next
+        } else if high.is_finite() {
+            low + (high - low) / two
+        } else {
+            two * two * low.max(size).max(T::min_positive_value())
+        };
+        let moved = (next - gamma).abs();
+        gamma = next;
+        f = solve_two(schur, gamma, c);
+        if moved <= T::of(4.0) * T::epsilon() * (gamma + size) {
             break;
         }
-        (low, high) = (high, two * two * high);
     }
-    // Regula falsi, and a halving where it gains less than that.
-    let (mut below, mut above) = (beyond(tangential(low)), beyond(tangential(high)));
-    for _ in 0..STEPS {
-        let width = high - low;
-        if width <= T::of(4.0) * T::epsilon() * high {
-            break;
-        }
-        let guess = low + width * (below / (below - above));
-        let middle = low + width / two;
-        for gamma in [guess, middle] {
-            if gamma > low && gamma < high {
-                let value = beyond(tangential(gamma));
-                if value >= T::zero() {
-                    (low, below) = (gamma, value);
-                } else {
-                    (high, above) = (gamma, value);
-                }
-            }
-        }
-    }
-    let f = tangential(high);
-    let length = f[0].hypot(f[1]);
+    let length = norm(f);
     match length > T::zero() && length.is_finite() {
         true => f.map(|f| f / length),
         false => [T::zero(); 2],
+    }
+}
+
+/// The length of a vector, whatever its unit. (The `hypot` of a library takes longer than the rest of a block.)
+pub(super) fn norm<T: Real>([x, y]: [T; 2]) -> T {
+    let (x, y) = (x.abs(), y.abs());
+    let (most, least) = if x > y { (x, y) } else { (y, x) };
+    if most > T::zero() && most.is_finite() {
+        let share = least / most;
+        most * (T::one() + share * share).sqrt()
+    } else {
+        x + y
     }
 }
 

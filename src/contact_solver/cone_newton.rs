@@ -1,6 +1,7 @@
 //! Contact problems with friction by a semismooth Newton method: open, stick and slip as states of the blocks.
 
 use super::blocks::{BlockAcceptance, failure};
+use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
@@ -10,6 +11,7 @@ use crate::real::Real;
 /// solved by proximal steps, each of which has a positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
+    sweeps: Sweeps<T>,
     factor: DenseCholesky<T>,
     /// What each block is, and the rows of those that are not open.
     statuses: Vec<Status<T>>,
@@ -63,19 +65,25 @@ impl<T: Real> ConeNewton<T> {
     ) -> Result<usize, ContactFailure<T>> {
         let acceptance = BlockAcceptance::begin(problem, tolerance, multipliers)?;
         self.make_room(problem.size());
+        self.sweeps.reset();
         let mut spent = 0;
         for round in 0..ROUNDS {
             // A sweep costs about as much as the share 3/n of an iteration: at first as many as half of one, while they
             // converge.
             let sweeps = if round == 0 { FIRST_SWEEPS.max(problem.size() / 6) } else { MORE_SWEEPS };
-            if acceptance.sweep(problem, T::one(), sweeps, true, (&mut spent, multipliers))
-                || self.newton(problem, &acceptance, &mut spent, multipliers)
-            {
+            if acceptance.sweep(problem, (&mut self.sweeps, T::one()), sweeps, true, (&mut spent, multipliers)) {
+                return Ok(spent);
+            }
+            if round == 0 {
+                // (What sweeps have solved is finite.)
+                problem.check_finite(false)?;
+            }
+            if self.newton(problem, &acceptance, &mut spent, multipliers) {
                 return Ok(spent);
             }
         }
         if self.proximal(problem, (&acceptance, tolerance), &mut spent, multipliers)
-            || acceptance.sweep(problem, T::one(), LAST_SWEEPS, false, (&mut spent, multipliers))
+            || acceptance.sweep(problem, (&mut self.sweeps, T::one()), LAST_SWEEPS, false, (&mut spent, multipliers))
         {
             return Ok(spent);
         }
@@ -153,7 +161,7 @@ impl<T: Real> ConeNewton<T> {
             let step = ContactProblem::of(&shifted, &offset, problem.sets, problem.tolerance, 0);
             let own = BlockAcceptance::of(&step, tolerance);
             let ended = self.newton(&step, &own, spent, multipliers)
-                || own.sweep(&step, T::one(), MORE_SWEEPS, false, (&mut *spent, multipliers))
+                || own.sweep(&step, (&mut self.sweeps, T::one()), MORE_SWEEPS, false, (&mut *spent, multipliers))
                 || self.newton(&step, &own, spent, multipliers);
             solved = acceptance.accepts(problem, multipliers);
             if solved {

@@ -1,7 +1,8 @@
 //! Projected Gauss–Seidel: row by row, robust, for many rows and moderate accuracy.
 
 use super::acceptance::Settings;
-use super::blocks::{BlockAcceptance, failure, relax_row};
+use super::blocks::{BlockAcceptance, failure};
+use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -14,10 +15,10 @@ use crate::real::Real;
 /// ```
 ///
 /// C. W. Cryer, The solution of a quadratic programming problem using systematic overrelaxation (SIAM J. Control 9,
-/// 1971). It needs no memory, and O(n²) operations a sweep. It converges for every positive semi-definite W if the
-/// problem has a solution and 0 < ω < 2 (Luo and Tseng, SIAM J. Control Optim. 29, 1991, and J. Optim. Theory Appl. 72,
-/// 1992), hence with redundant rows too. y is then unique, the multipliers are not: it finds those that its sweeps
-/// reach, which depend on the guess and on the order of the rows.
+/// 1971). It needs no memory (with friction two numbers a row), and O(n²) operations a sweep. It converges for every
+/// positive semi-definite W if the problem has a solution and 0 < ω < 2 (Luo and Tseng, SIAM J. Control Optim. 29,
+/// 1991, and J. Optim. Theory Appl. 72, 1992), hence with redundant rows too. y is then unique, the multipliers are
+/// not: it finds those that its sweeps reach, which depend on the guess and on the order of the rows.
 ///
 /// A W that is not symmetric it takes as well, but the theorem is then for diagonally dominant W only (Cottle, Pang and
 /// Stone, The Linear Complementarity Problem, ch. 5, for H-matrices); weakly coupled rows are such. Where sweeps do not
@@ -49,11 +50,12 @@ use crate::real::Real;
 pub struct GaussSeidel<T = f64> {
     relaxation: T,
     settings: Settings<T>,
+    memory: Sweeps<T>,
 }
 
 impl<T: Real> Default for GaussSeidel<T> {
     fn default() -> Self {
-        Self { relaxation: T::one(), settings: Settings::default() }
+        Self { relaxation: T::one(), settings: Settings::default(), memory: Sweeps::default() }
     }
 }
 
@@ -90,16 +92,31 @@ impl<T: Real> GaussSeidel<T> {
 impl<T: Real> GaussSeidel<T> {
     /// Sweeps over blocks, for problems with friction.
     fn solve_blocks(
-        &self,
+        &mut self,
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let acceptance = BlockAcceptance::begin(problem, self.settings.tolerance(), multipliers)?;
         let (limit, mut spent) = (self.settings.iterations, 0);
-        match acceptance.sweep(problem, self.relaxation, limit, false, (&mut spent, multipliers)) {
+        self.memory.reset();
+        match acceptance.sweep(problem, (&mut self.memory, self.relaxation), limit, false, (&mut spent, multipliers)) {
             true => Ok(spent),
             false => Err(failure(problem, spent, multipliers)),
         }
+    }
+}
+
+/// A row without friction closes its gap, as far as its multiplier may; without W_ii it is left out.
+fn relax_row<T: Real>(
+    problem: &ContactProblem<'_, T>,
+    (row, set): (usize, AdmissibleSet),
+    omega: T,
+    multipliers: &mut [T],
+) {
+    let diagonal = problem.delassus(row, row);
+    if diagonal > T::zero() {
+        let correction = omega * problem.gap(row, multipliers) / diagonal;
+        multipliers[row] = set.nearest(multipliers[row] - correction);
     }
 }
 

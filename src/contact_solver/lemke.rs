@@ -503,6 +503,7 @@ impl<T: Real> ContactSolver<T> for Lemke<T> {
             return Err(ContactFailure::Friction { row: rows.start });
         }
         let acceptance = BlockAcceptance::begin(problem, Settings::default().tolerance(), multipliers)?;
+        problem.check_finite(false)?;
         let mut pivots = self.pose(problem);
         // Far above anything seen.
         let limit = 100 + 20 * self.conditions.len();

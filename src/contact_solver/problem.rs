@@ -1,5 +1,6 @@
 //! The complementarity problem of a step.
 
+use super::cone;
 use crate::contact::ContactLaw;
 use crate::dense::dot;
 use crate::error::{Error, Result};
@@ -165,7 +166,10 @@ fn cone_residual<T: Real>((friction, is_bilateral): (T, bool), y: &[T], multipli
 
 /// The length of a tangential vector.
 fn norm<T: Real>(x: &[T]) -> T {
-    x.iter().fold(T::zero(), |length, &x| length.hypot(x))
+    match *x {
+        [x, y] => cone::norm([x, y]),
+        _ => x.first().map_or(T::zero(), |x| x.abs()),
+    }
 }
 
 impl From<ContactLaw> for AdmissibleSet {

@@ -50,6 +50,64 @@ pub(crate) fn recover<T: Scalar>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3]
     Arch::new().dispatch(Recover(weights, d, motion, a))
 }
 
+/// Σ x y of several x of one length, in one pass.
+#[inline]
+pub(crate) fn products<T: Scalar, const N: usize>(x: [&[T]; N], y: &[T]) -> [T; N] {
+    Arch::new().dispatch(Products(x, y))
+}
+
+/// `out += Σ c x` of several x of one length, in one pass.
+#[inline]
+pub(crate) fn add_all<T: Scalar, const N: usize>(c: [T; N], x: [&[T]; N], out: &mut [T]) {
+    Arch::new().dispatch(AddAll(c, x, out));
+}
+
+struct Products<'a, T, const N: usize>([&'a [T]; N], &'a [T]);
+
+impl<T: Scalar, const N: usize> WithSimd for Products<'_, T, N> {
+    type Output = [T; N];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [T; N] {
+        let Self(x, y) = self;
+        let x = x.map(|x| &x[..y.len()]);
+        let whole = y.len() - y.len() % LANES;
+        let mut sums = [[T::zero(); LANES]; N];
+        for start in (0..whole).step_by(LANES) {
+            let y = &y[start..start + LANES];
+            for (sums, x) in sums.iter_mut().zip(x) {
+                let x = &x[start..start + LANES];
+                for lane in 0..LANES {
+                    sums[lane] += x[lane] * y[lane];
+                }
+            }
+        }
+        let mut k = 0;
+        sums.map(|sums| {
+            let rest = x[k][whole..].iter().zip(&y[whole..]).map(|(&x, &y)| x * y).sum::<T>();
+            k += 1;
+            sums.into_iter().sum::<T>() + rest
+        })
+    }
+}
+
+struct AddAll<'a, T, const N: usize>([T; N], [&'a [T]; N], &'a mut [T]);
+
+impl<T: Scalar, const N: usize> WithSimd for AddAll<'_, T, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self(c, x, out) = self;
+        let x = x.map(|x| &x[..out.len()]);
+        for (i, out) in out.iter_mut().enumerate() {
+            for k in 0..N {
+                *out += c[k] * x[k][i];
+            }
+        }
+    }
+}
+
 struct Combine<'a, T>(&'a [(T, &'a [T])], &'a [(T, &'a [T])], &'a [T], &'a mut [T]);
 
 impl<T: Scalar> WithSimd for Combine<'_, T> {

@@ -197,6 +197,52 @@ fn many_contacts_by_newton_and_by_sweeps() {
     }
 }
 
+/// Sweeps take W for symmetric until its result is refused: by much and by little, in all rows and in one entry.
+#[test]
+fn an_unsymmetric_operator_is_read_as_a_whole() {
+    let mut random = Congruential(31);
+    for contacts in [2, 5, 12] {
+        for skew in [1e-9, 1e-3, 0.3] {
+            for single in [false, true] {
+                let (size, sets) = (3 * contacts, vec![cone(3, 0.4); contacts]);
+                let mut w = semidefinite(&mut random, size, size, size as f64);
+                for (i, j) in (0..size).flat_map(|i| (0..i).map(move |j| (i, j))) {
+                    let x = skew * random.signed();
+                    if !single || (i, j) == (size - 1, 0) {
+                        w[i * size + j] += x;
+                        w[j * size + i] -= x;
+                    }
+                }
+                let q: Vec<f64> = (0..size).map(|i| if i % 3 == 0 { -1.0 } else { random.signed() }).collect();
+                for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+                    let found = solve(solver, (&w, &q, &sets)).unwrap();
+                    check(&w, &q, &sets, &found, 1e-10, &format!("{solver:?} {contacts} {skew} {single}"));
+                }
+            }
+        }
+    }
+}
+
+/// A number that is none is found wherever it stands, and said with its row.
+#[test]
+fn an_operator_that_is_not_finite_is_refused() {
+    let mut random = Congruential(32);
+    let (size, sets) = (9, vec![cone(3, 0.4); 3]);
+    let sound = semidefinite(&mut random, size, size, 9.0);
+    let q: Vec<f64> = (0..size).map(|i| if i % 3 == 0 { -1.0 } else { random.signed() }).collect();
+    for entry in 0..size * size {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let mut w = sound.clone();
+            w[entry] = bad;
+            for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+                let failure = solve(solver, (&w, &q, &sets)).unwrap_err();
+                let ContactFailure::NotConverged { row, residual, .. } = failure else { panic!("{failure:?}") };
+                assert!(row == entry / size && residual.is_nan(), "{entry} {row} {residual}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_guess_chooses_nothing() {
     let mut random = Congruential(17);

@@ -1,0 +1,149 @@
+//! Sweeps over the blocks of a problem with cones: each in turn takes the multipliers that solve it while the others
+//! keep theirs.
+
+use super::cone::Cone;
+use super::{AdmissibleSet, ContactProblem};
+use crate::real::Real;
+use std::ops::Range;
+
+/// The memory of sweeps. A symmetric W they read once, row by row up to the diagonal: what the blocks behind one do to
+/// it was summed when their rows were read, in the sweep before. A W is taken for symmetric until a result shows that it
+/// is not.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sweeps<T> {
+    /// Whether W is known not to be symmetric.
+    is_unsymmetric: bool,
+    /// Σ W λ over the blocks behind that of a row: of the multipliers that they have, and of those that this sweep
+    /// gives them.
+    behind: Vec<T>,
+    next: Vec<T>,
+}
+
+impl<T: Real> Sweeps<T> {
+    /// Forgets what it knows of another problem.
+    pub(super) fn reset(&mut self) {
+        self.is_unsymmetric = false;
+    }
+
+    /// Whether a W that is not symmetric is taken for symmetric.
+    pub(super) fn is_mistaken(&self, problem: &ContactProblem<'_, T>) -> bool {
+        /// Roundings by which a symmetric W may differ across its diagonal.
+        const ROUNDED: f64 = 64.0;
+        !self.is_unsymmetric && problem.asymmetry(T::of(ROUNDED) * T::epsilon()).is_some()
+    }
+
+    /// From now on W is read as a whole; says whether it was not before.
+    pub(super) fn read_all(&mut self) -> bool {
+        !std::mem::replace(&mut self.is_unsymmetric, true)
+    }
+
+    /// Begins with these multipliers.
+    pub(super) fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) {
+        if !self.is_unsymmetric {
+            for values in [&mut self.behind, &mut self.next] {
+                values.clear();
+                values.resize(problem.size(), T::zero());
+            }
+            if multipliers.iter().any(|&multiplier| multiplier != T::zero()) {
+                for (rows, _) in problem.blocks() {
+                    spread(problem, rows, multipliers, &mut self.behind);
+                }
+            }
+        }
+    }
+
+    /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier, times its own compliance.
+    pub(super) fn sweep(&mut self, problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
+        let mut largest = T::zero();
+        for (rows, set) in problem.blocks() {
+            let block = self.alone(problem, rows.clone(), set, multipliers);
+            let own = &mut multipliers[rows.clone()];
+            let mut solved = [T::zero(); 3];
+            if set.friction().is_some() {
+                solved = block.solve();
+            } else if block.delassus[0][0] > T::zero() {
+                solved[0] = -block.offset[0] / block.delassus[0][0];
+            } else {
+                // Nothing moves its gap.
+                solved[0] = own[0];
+            }
+            for (k, (multiplier, solved)) in own.iter_mut().zip(solved).enumerate() {
+                let before = *multiplier;
+                *multiplier += omega * (solved - before);
+                if set.friction().is_none() {
+                    *multiplier = set.nearest(*multiplier);
+                }
+                largest = largest.max(block.delassus[k][k] * (*multiplier - before).abs());
+            }
+            // (Relaxed beyond its solution a block may leave its cone.)
+            if omega > T::one() && set.friction().is_some() {
+                set.project(own);
+            }
+            if !self.is_unsymmetric {
+                spread(problem, rows, multipliers, &mut self.next);
+            }
+        }
+        if !self.is_unsymmetric {
+            std::mem::swap(&mut self.behind, &mut self.next);
+            self.next.fill(T::zero());
+        }
+        largest
+    }
+
+    /// A block while the others keep their multipliers.
+    fn alone(
+        &self,
+        problem: &ContactProblem<'_, T>,
+        rows: Range<usize>,
+        set: AdmissibleSet,
+        multipliers: &[T],
+    ) -> Cone<T> {
+        let (first, size) = (rows.start, rows.len());
+        let reads = if self.is_unsymmetric { problem.size() } else { first };
+        let mut offset = products(problem, rows.clone(), &multipliers[..reads]);
+        let (mut delassus, mut noise, mut guess) = ([[T::zero(); 3]; 3], T::zero(), [T::zero(); 2]);
+        for (i, row) in rows.enumerate() {
+            delassus[i][..size].copy_from_slice(&problem.row(row)[first..first + size]);
+            offset[i] += problem.offset[row];
+            if self.is_unsymmetric {
+                for (&w, &multiplier) in delassus[i].iter().zip(&multipliers[first..first + size]) {
+                    offset[i] -= w * multiplier;
+                }
+            } else {
+                offset[i] += self.behind[row];
+            }
+            if i > 0 {
+                noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
+                guess[i - 1] = multipliers[row];
+            }
+        }
+        let friction = T::of(set.friction().unwrap_or(0.0));
+        Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
+    }
+}
+
+/// Rows of W times the multipliers of the first rows.
+fn products<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multipliers: &[T]) -> [T; 3] {
+    let (row, mut sums) = (|k: usize| &problem.row(rows.start + k)[..multipliers.len()], [T::zero(); 3]);
+    match rows.len() {
+        1 => sums[..1].copy_from_slice(&T::products([row(0)], multipliers)),
+        2 => sums[..2].copy_from_slice(&T::products([row(0), row(1)], multipliers)),
+        _ => sums = T::products([row(0), row(1), row(2)], multipliers),
+    }
+    sums
+}
+
+/// Adds what the multipliers of a block do to the rows before it.
+fn spread<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multipliers: &[T], sums: &mut [T]) {
+    let own = &multipliers[rows.clone()];
+    if own.iter().all(|&multiplier| multiplier == T::zero()) {
+        return;
+    }
+    let (row, sums) = (|k: usize| &problem.row(rows.start + k)[..rows.start], &mut sums[..rows.start]);
+    match *own {
+        [a] => T::add_all([a], [row(0)], sums),
+        [a, b] => T::add_all([a, b], [row(0), row(1)], sums),
+        [a, b, c, ..] => T::add_all([a, b, c], [row(0), row(1), row(2)], sums),
+        [] => {}
+    }
+}
