@@ -7,8 +7,8 @@ use crate::real::Real;
 impl<T: Real> ContactProblem<'_, T> {
     /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
     pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
-        /// Rows and columns that are looked at together. What lies across the diagonal is read row by row first: columns
-        /// of a large W are lines of memory that push each other out of the cache.
+        /// Rows and columns that are looked at together. What lies across the diagonal is read row by row first:
+        /// columns of a large W are lines of memory that push each other out of the cache.
         const TILE: usize = 32;
         let size = self.size();
         let mut worst = (share, None);

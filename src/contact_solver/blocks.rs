@@ -51,6 +51,20 @@ impl<T: Real> BlockAcceptance<T> {
         })
     }
 
+    /// Whether multipliers that are all zero solve the problem: y is q then.
+    fn accepts_idle(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
+        multipliers.iter().all(|&multiplier| multiplier == T::zero())
+            && problem.blocks().all(|(rows, set)| {
+                let (mut compliance, mut noise) = ([T::zero(); 3], T::zero());
+                for (compliance, row) in compliance.iter_mut().zip(rows.clone()) {
+                    *compliance = problem.delassus(row, row);
+                    noise = noise.max(problem.rounding_idle(row));
+                }
+                let (q, none) = (&problem.offset[rows.clone()], &multipliers[rows.clone()]);
+                set.residual(q, none, &compliance[..rows.len()]) <= self.accepted.max(T::of(2.0) * noise)
+            })
+    }
+
     /// Sweeps until the problem is solved, or so many; says whether it is, and counts them. An `impatient` one ends too
     /// where sweeps hardly change less than those before.
     pub(super) fn sweep(
@@ -66,28 +80,39 @@ impl<T: Real> BlockAcceptance<T> {
         /// Growth of the change at which sweeps diverge, as they may where W is not symmetric: what they have made is
         /// then nothing to go on from.
         const DIVERGES: f64 = 1e3;
+        // Where no force is needed but for rounding there is none: one that rounding asks for would choose a friction.
+        if self.accepts_idle(problem, multipliers) {
+            return true;
+        }
         let (mut before, mut least) = (T::infinity(), T::infinity());
         memory.begin(problem, multipliers);
-        for sweep in 1..=sweeps {
+        let mut left = sweeps;
+        while left > 0 {
+            left -= 1;
             let change = memory.sweep(problem, omega, multipliers);
             *spent += 1;
             least = least.min(change);
             let diverges = !(change <= T::of(DIVERGES) * least && change.is_finite());
-            let stalls = sweep % LOOK == 0 && change > T::of(0.5) * before;
-            if diverges {
-                multipliers.fill(T::zero());
-            } else if (change <= self.accepted || stalls) && self.accepts(problem, multipliers) {
+            let looks = (sweeps - left).is_multiple_of(LOOK);
+            let stalls = looks && change > T::of(0.5) * before;
+            if !diverges && (change <= self.accepted || stalls) && self.accepts(problem, multipliers) {
                 return true;
             }
-            if (change <= self.accepted || (diverges || stalls) && memory.is_mistaken(problem)) && memory.read_all() {
+            let ends = diverges || stalls && impatient || left == 0;
+            if (ends || stalls || change <= self.accepted) && memory.is_mistaken(problem) {
+                // All of it was wrong.
+                multipliers.fill(T::zero());
                 memory.begin(problem, multipliers);
-                (before, least) = (T::infinity(), T::infinity());
+                (before, least, left) = (T::infinity(), T::infinity(), sweeps);
                 continue;
             }
-            if diverges || stalls && impatient {
+            if diverges {
+                multipliers.fill(T::zero());
+            }
+            if ends {
                 break;
             }
-            if sweep % LOOK == 0 {
+            if looks {
                 before = change;
             }
         }

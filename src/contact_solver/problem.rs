@@ -299,7 +299,16 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     /// What of y_i is rounding: its tolerance, and that of the sum `(W λ + q)_i` itself.
     pub fn rounding(&self, i: usize, multipliers: &[T]) -> T {
         let terms = self.row(i).iter().zip(multipliers).map(|(&w, &lambda)| (w * lambda).abs());
-        self.tolerance[i] + T::of(32.0) * T::epsilon() * (self.offset[i].abs() + terms.sum::<T>())
+        self.rounding_of(i, self.offset[i].abs() + terms.sum::<T>())
+    }
+
+    /// The same of multipliers that are zero.
+    pub(super) fn rounding_idle(&self, i: usize) -> T {
+        self.rounding_of(i, self.offset[i].abs())
+    }
+
+    fn rounding_of(&self, i: usize, terms: T) -> T {
+        self.tolerance[i] + T::of(32.0) * T::epsilon() * terms
     }
 
     /// The row, or first row of a block, that misses its conditions most, and by how much (unit of y): the largest

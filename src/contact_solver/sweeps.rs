@@ -7,12 +7,12 @@ use crate::real::Real;
 use std::ops::Range;
 
 /// The memory of sweeps. A symmetric W they read once, row by row up to the diagonal: what the blocks behind one do to
-/// it was summed when their rows were read, in the sweep before. A W is taken for symmetric until a result shows that it
-/// is not.
+/// it was summed when their rows were read, in the sweep before. A W is taken for symmetric until a result shows that
+/// it is not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweeps<T> {
-    /// Whether W is known not to be symmetric.
-    is_unsymmetric: bool,
+    /// Whether W is symmetric, if that is known.
+    is_symmetric: Option<bool>,
     /// Σ W λ over the blocks behind that of a row: of the multipliers that they have, and of those that this sweep
     /// gives them.
     behind: Vec<T>,
@@ -22,24 +22,29 @@ pub(super) struct Sweeps<T> {
 impl<T: Real> Sweeps<T> {
     /// Forgets what it knows of another problem.
     pub(super) fn reset(&mut self) {
-        self.is_unsymmetric = false;
+        self.is_symmetric = None;
     }
 
-    /// Whether a W that is not symmetric is taken for symmetric.
-    pub(super) fn is_mistaken(&self, problem: &ContactProblem<'_, T>) -> bool {
+    /// Whether W was taken for symmetric, and is not; from then on it is read as a whole.
+    pub(super) fn is_mistaken(&mut self, problem: &ContactProblem<'_, T>) -> bool {
         /// Roundings by which a symmetric W may differ across its diagonal.
         const ROUNDED: f64 = 64.0;
-        !self.is_unsymmetric && problem.asymmetry(T::of(ROUNDED) * T::epsilon()).is_some()
+        if self.is_symmetric.is_some() {
+            return false;
+        }
+        let symmetric = problem.asymmetry(T::of(ROUNDED) * T::epsilon()).is_none();
+        self.is_symmetric = Some(symmetric);
+        !symmetric
     }
 
-    /// From now on W is read as a whole; says whether it was not before.
-    pub(super) fn read_all(&mut self) -> bool {
-        !std::mem::replace(&mut self.is_unsymmetric, true)
+    /// Whether W is read up to its diagonal.
+    fn reads_half(&self) -> bool {
+        self.is_symmetric != Some(false)
     }
 
     /// Begins with these multipliers.
     pub(super) fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) {
-        if !self.is_unsymmetric {
+        if self.reads_half() {
             for values in [&mut self.behind, &mut self.next] {
                 values.clear();
                 values.resize(problem.size(), T::zero());
@@ -79,11 +84,11 @@ impl<T: Real> Sweeps<T> {
             if omega > T::one() && set.friction().is_some() {
                 set.project(own);
             }
-            if !self.is_unsymmetric {
+            if self.reads_half() {
                 spread(problem, rows, multipliers, &mut self.next);
             }
         }
-        if !self.is_unsymmetric {
+        if self.reads_half() {
             std::mem::swap(&mut self.behind, &mut self.next);
             self.next.fill(T::zero());
         }
@@ -99,18 +104,18 @@ impl<T: Real> Sweeps<T> {
         multipliers: &[T],
     ) -> Cone<T> {
         let (first, size) = (rows.start, rows.len());
-        let reads = if self.is_unsymmetric { problem.size() } else { first };
+        let reads = if self.reads_half() { first } else { problem.size() };
         let mut offset = products(problem, rows.clone(), &multipliers[..reads]);
         let (mut delassus, mut noise, mut guess) = ([[T::zero(); 3]; 3], T::zero(), [T::zero(); 2]);
         for (i, row) in rows.enumerate() {
             delassus[i][..size].copy_from_slice(&problem.row(row)[first..first + size]);
             offset[i] += problem.offset[row];
-            if self.is_unsymmetric {
+            if self.reads_half() {
+                offset[i] += self.behind[row];
+            } else {
                 for (&w, &multiplier) in delassus[i].iter().zip(&multipliers[first..first + size]) {
                     offset[i] -= w * multiplier;
                 }
-            } else {
-                offset[i] += self.behind[row];
             }
             if i > 0 {
                 noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());

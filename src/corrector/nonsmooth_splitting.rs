@@ -22,10 +22,10 @@ use crate::tableau::Tableau;
 ///
 /// The step of the scheme itself, with its multiplier λ and its response r of (u, h v, h² a) to a multiplier, solves
 /// the first two with ã' = a' − r_a M⁻¹ Gᵀ λ (theory, section 16), and a projection of the velocity as in λ_v/λ_a the
-/// third: Λ = h r_v λ + its impulse. So the two problems are solved one after the other, which for linear systems is the
-/// decoupled form (Cosimo, Galvez, Cavalieri, Cardona, Brüls, Multibody Syst. Dyn. 48, 2020) without its splitting
-/// error. Differences to [`PersistencyCorrection`](super::PersistencyCorrection): a contact that presses may part in the
-/// same step, and the next step reads an acceleration without contact.
+/// third: Λ = h r_v λ + its impulse. So the two problems are solved one after the other, which for linear systems is
+/// the decoupled form (Cosimo, Galvez, Cavalieri, Cardona, Brüls, Multibody Syst. Dyn. 48, 2020) without its splitting
+/// error. Differences to [`PersistencyCorrection`](super::PersistencyCorrection): a contact that presses may part in
+/// the same step, and the next step reads an acceleration without contact.
 ///
 /// The reported force is Λ/h, the mean of a step; in that of an impact it contains the impact. The acceleration of the
 /// state is that of the smooth motion: of a body at rest under its weight that of the fall. Linear momentum is
