@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::results::{Energy, Statistics};
-use crate::state::State;
+use crate::state::{ContactStatus, State};
 
 /// Whether a run goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -237,19 +237,53 @@ impl<T: Real> Observer<T> for DofRecorder<T> {
     }
 }
 
-/// Records the total contact force (sum of the reported multipliers), the raw one, and the impulse over time.
+/// Records the total contact force (sum of the reported multipliers), the raw one, and the impulse over time; where
+/// contacts have friction, the sum of its sizes, and how many of them stick and slide.
+///
+/// ```
+/// use contact_dynamics::observer::ContactRecorder;
+/// use contact_dynamics::faer::sparse::SparseColMat;
+/// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+///
+/// // A block of 2 kg slides over a floor until friction has stopped it, at t = 0.1.
+/// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[])?;
+/// let mut run = Simulation::builder(
+///     LinearSystem::lumped(vec![2.0; 2], free)?.load(|_, f| f[1] = -20.0),
+///     Newmark::trapezoidal(),
+///     0.01,
+/// )
+/// .velocity(vec![0.25, 0.0])
+/// .constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.25, &[&[(0, 1.0)]]))
+/// .build()?;
+/// let mut recorder = ContactRecorder::new();
+/// run.run_until(0.2, &mut recorder)?;
+/// assert!((recorder.friction()[3] - 5.0).abs() < 1e-12 && recorder.friction()[15].abs() < 1e-12);
+/// assert!(recorder.sliding()[3] == 1 && recorder.sticking()[15] == 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct ContactRecorder<T> {
     times: Vec<f64>,
     forces: Vec<T>,
     raw_forces: Vec<T>,
     impulses: Vec<T>,
+    friction: Vec<T>,
+    sticking: Vec<usize>,
+    sliding: Vec<usize>,
 }
 
 impl<T: Real> ContactRecorder<T> {
     /// An empty recorder.
     pub fn new() -> Self {
-        Self { times: Vec::new(), forces: Vec::new(), raw_forces: Vec::new(), impulses: Vec::new() }
+        Self {
+            times: Vec::new(),
+            forces: Vec::new(),
+            raw_forces: Vec::new(),
+            impulses: Vec::new(),
+            friction: Vec::new(),
+            sticking: Vec::new(),
+            sliding: Vec::new(),
+        }
     }
 
     /// Times of the recorded steps.
@@ -271,6 +305,22 @@ impl<T: Real> ContactRecorder<T> {
     pub fn impulses(&self) -> &[T] {
         &self.impulses
     }
+
+    /// Σ |f| over the contacts (force), f the friction after correction. (Its directions are in
+    /// [`ContactState::friction_forces`](crate::ContactState::friction_forces).)
+    pub fn friction(&self) -> &[T] {
+        &self.friction
+    }
+
+    /// Number of contacts with friction that stick.
+    pub fn sticking(&self) -> &[usize] {
+        &self.sticking
+    }
+
+    /// Number of contacts with friction that slide.
+    pub fn sliding(&self) -> &[usize] {
+        &self.sliding
+    }
 }
 
 impl<T: Real> Observer<T> for ContactRecorder<T> {
@@ -280,6 +330,12 @@ impl<T: Real> Observer<T> for ContactRecorder<T> {
         self.forces.push(contacts.forces().iter().copied().sum());
         self.raw_forces.push(contacts.raw_forces().iter().copied().sum());
         self.impulses.push(contacts.impulses().iter().copied().sum());
+        let size = |contact| contacts.friction_forces(contact).iter().fold(T::zero(), |size, &f| size.hypot(f));
+        let all = 0..contacts.ids().len();
+        let count = |status| all.clone().filter(|&contact| contacts.status(contact) == status).count();
+        self.friction.push(all.clone().map(size).sum());
+        self.sticking.push(count(ContactStatus::Sticking));
+        self.sliding.push(count(ContactStatus::Sliding));
         Ok(Control::Continue)
     }
 }

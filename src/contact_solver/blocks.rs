@@ -99,12 +99,17 @@ impl<T: Real> BlockAcceptance<T> {
                 return true;
             }
             let ends = diverges || stalls && impatient || left == 0;
-            if (ends || stalls || change <= self.accepted) && memory.is_mistaken(problem) {
+            let converges = change <= self.accepted;
+            if (ends || stalls || converges) && memory.is_mistaken(problem) {
                 // All of it was wrong.
                 multipliers.fill(T::zero());
                 memory.begin(problem, multipliers);
                 (before, least, left) = (T::infinity(), T::infinity(), sweeps);
                 continue;
+            }
+            if converges {
+                // It is not accepted: rounding of W across its diagonal.
+                memory.read_all();
             }
             if diverges {
                 multipliers.fill(T::zero());

@@ -37,6 +37,11 @@ impl<T: Real> Sweeps<T> {
         !symmetric
     }
 
+    /// From the next sweep on reads W as a whole.
+    pub(super) fn read_all(&mut self) {
+        self.is_symmetric = Some(false);
+    }
+
     /// Whether W is read up to its diagonal.
     fn reads_half(&self) -> bool {
         self.is_symmetric != Some(false)

@@ -21,6 +21,10 @@ pub struct GapJacobianError {
     /// Largest difference between the part of g̈ that comes from moving with v and its difference quotient
     /// (length/time²); zero if v is.
     pub acceleration: f64,
+    /// How far the tangents of contacts with friction are from orthonormal rows, orthogonal to that of the gap and as
+    /// long as it: the largest product of two rows over their lengths, or difference of a length from that of the gap's
+    /// row over the latter. μ belongs to such tangents, and the cone over them is round.
+    pub tangents: f64,
     /// Rows that some displacement made vanish, compared as far as they were there.
     pub rows_lost: usize,
     /// Searches that said [`Candidates::Unchanged`] though identities or G had changed: a run would go on with the old
@@ -81,6 +85,7 @@ pub fn gap_jacobian<T: Real>(
         worst: ((0, 0), 0),
         rate: 0.0,
         acceleration: 0.0,
+        tangents: (0..rows).map(|row| skewness(&found, row)).fold(0.0, f64::max),
         rows_lost: 0,
         unreported: 0,
     };
@@ -152,6 +157,25 @@ pub fn gap_jacobian<T: Real>(
     error.unreported = watched.unreported;
     error.rows_lost = lost.iter().filter(|&&lost| lost).count();
     Ok(error)
+}
+
+/// How far the tangents of a contact with friction are from orthonormal ones.
+fn skewness<T: Real>(contacts: &Contacts<T>, contact: usize) -> f64 {
+    if contacts.friction(contact) == 0.0 {
+        return 0.0;
+    }
+    let gap: Vec<(usize, T)> = contacts.row(contact).collect();
+    let rows = [vec![gap], contacts.tangents(contact)].concat();
+    let product = |i: usize, j: usize| -> f64 {
+        let with = |&(dof, weight): &(usize, T)| {
+            rows[j].iter().filter(|other| other.0 == dof).map(|other| (weight * other.1).value()).sum::<f64>()
+        };
+        rows[i].iter().map(with).sum()
+    };
+    let length = |i: usize| product(i, i).sqrt();
+    let pairs = (0..rows.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let skew = pairs.map(|(i, j)| (product(i, j) / (length(i) * length(j))).abs());
+    skew.chain((1..rows.len()).map(|i| (length(i) / length(0) - 1.0).abs())).fold(0.0, f64::max)
 }
 
 /// A constraint, and what its last search has found.

@@ -12,6 +12,7 @@ mod resumed;
 mod slab;
 mod solids;
 mod systems;
+mod tangents;
 
 use contact_dynamics::{LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator};
 use contact_dynamics_scenes::schemes::{self, Listed};
