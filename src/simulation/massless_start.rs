@@ -5,7 +5,7 @@ use super::massless::{Columns, Embedded, is_damped};
 use super::operator::Operator;
 use crate::contact::{Candidates, ContactJacobian};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
-use crate::corrector::{Gaps, contact_error};
+use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
@@ -28,8 +28,10 @@ pub struct StartAdjustment<T> {
 const ITERATIONS: usize = 30;
 
 /// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method: f_b + Gᵀ
-/// λ = 0, 0 ≤ g ⊥ λ ≥ 0. Those that are in balance to rounding are left alone, bit for bit, and so are those that
-/// damping acts on: their displacements are initial values of their own.
+/// λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they were given. Those that are in balance
+/// to rounding are left alone, bit for bit, and so are those that damping acts on: their displacements are initial
+/// values of their own. With it comes what gaps may miss, as far as it is rounding of the ways that contact has taken
+/// back.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
     solver: &mut dyn ContactSolver<T>,
@@ -37,7 +39,7 @@ pub(super) fn balance_start<T: Real>(
     motion: &mut Motion<T>,
     dofs: &[usize],
     [h, ahead]: [f64; 2],
-) -> Result<Option<StartAdjustment<T>>> {
+) -> Result<Option<(StartAdjustment<T>, T)>> {
     if dofs.is_empty() || is_damped(system, dofs)? {
         return Ok(None);
     }
@@ -47,7 +49,7 @@ pub(super) fn balance_start<T: Real>(
     let interface = constraints.interface().to_vec();
     let mut residual = vec![T::zero(); motion.u.len()];
     let (mut on_interface, mut forces) = (vec![T::zero(); interface.len()], vec![T::zero(); interface.len()]);
-    let mut first = T::zero();
+    let (mut first, mut missed) = (T::zero(), T::zero());
     for iteration in 0..ITERATIONS {
         system.force(t, &motion.u, &motion.v, &mut residual)?;
         let columns = Columns::of(system, dofs, motion)?;
@@ -68,11 +70,13 @@ pub(super) fn balance_start<T: Real>(
             solver,
             (&mut *constraints, &*g),
             &mut operator,
-            motion,
+            motion.t,
+            [&motion.u, &given],
             dofs,
             [&mut on_interface, &mut forces],
         )?;
         operator.finish(&mut residual, &on_interface, &forces)?;
+        missed = missed.max(sliver);
         let size = dofs.iter().fold(T::zero(), |size, &dof| {
             let d = residual[dof].abs();
             if d > size || d.is_nan() { d } else { size }
@@ -103,7 +107,7 @@ pub(super) fn balance_start<T: Real>(
             system.external_load(t, &mut residual)?;
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
-            return Ok(Some(StartAdjustment { energy, largest: moves(dof).abs(), dof }));
+            return Ok(Some((StartAdjustment { energy, largest: moves(dof).abs(), dof }, missed)));
         }
     }
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: dofs[0] })
@@ -115,19 +119,24 @@ fn press_start<T: Real>(
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
     operator: &mut Operator<T>,
-    motion: &Motion<T>,
+    t: f64,
+    [u, given]: [&[T]; 2],
     dofs: &[usize],
     [on_interface, forces]: [&mut Vec<T>; 2],
 ) -> Result<T> {
-    let (t, rows) = (motion.t, constraints.len());
-    let (mut gaps, mut versions) = (vec![T::zero(); rows], 0);
-    constraints.finite_gaps(t, &motion.u, &mut gaps)?;
+    let (rows, mut versions) = (constraints.len(), 0);
+    let mut gaps = vec![T::zero(); rows];
+    constraints.finite_gaps(t, u, &mut gaps)?;
     forces.fill(T::zero());
-    let tolerance: Vec<T> =
-        (0..rows).map(|row| constraints.gap_rounding(row, g.magnitude(row, &motion.u), gaps[row])).collect();
+    let mut tolerance: Vec<T> =
+        (0..rows).map(|row| constraints.gap_rounding(row, g.magnitude(row, u), gaps[row])).collect();
+    for (row, tolerance) in tolerance.iter_mut().enumerate() {
+        *tolerance += rounding(g.interface_magnitude(row, on_interface));
+    }
+    tolerance.extend(constraints.tangents().all().map(|row| rounding(g.magnitude(row, u))));
     let candidates: Vec<usize> = (0..rows).filter(|&row| g.acts_on(row, dofs)).collect();
     // Compliance and shift of the laws, linearized at the present gaps.
-    let laws: Vec<[T; 2]> = (0..rows)
+    let mut laws: Vec<[T; 2]> = (0..rows)
         .map(|row| {
             let law = constraints.law(row);
             let depth = (-gaps[row]).max(tolerance[row]);
@@ -135,33 +144,49 @@ fn press_start<T: Real>(
             if law.is_compliant() { [compliance, shift] } else { [T::zero(); 2] }
         })
         .collect();
-    let free: Vec<T> = (0..rows).map(|row| gaps[row] + g.interface_product(row, on_interface) + laws[row][1]).collect();
-    let mut problem: Vec<usize> = Vec::new();
+    laws.resize(g.rows(), [T::zero(); 2]);
+    // Gaps, and the ways along the tangents.
+    let way = |row: usize| g.row(row).map(|(dof, weight)| weight * (u[dof] - given[dof])).sum::<T>();
+    let start = |row: usize| if row < rows { gaps[row] } else { way(row) };
+    let free: Vec<T> =
+        (0..g.rows()).map(|row| start(row) + g.interface_product(row, on_interface) + laws[row][1]).collect();
+    let rubs = |row: usize| constraints.tangents().friction(row) > 0.0 && !constraints.law(row).is_compliant();
+    let (mut contacts, mut problem): (Vec<usize>, Vec<usize>) = Default::default();
+    let owner = |row: usize| if row < rows { row } else { constraints.tangents().owner(row) };
     let mut response = vec![T::zero(); on_interface.len()];
     loop {
         let pushed = |&row: &usize| {
             let y = free[row] + g.interface_product(row, &response);
-            !problem.contains(&row) && (y < -tolerance[row] || constraints.law(row).is_equality())
+            !contacts.contains(&row) && (y < -tolerance[row] || constraints.law(row).is_equality())
         };
         let joining: Vec<usize> = candidates.iter().copied().filter(pushed).collect();
         if joining.is_empty() {
             break;
         }
-        problem.extend(joining);
-        problem.sort_unstable();
+        contacts.extend(joining);
+        contacts.sort_unstable();
+        problem.clear();
+        let mut sets = Vec::new();
+        for &row in &contacts {
+            let tangents = if rubs(row) { constraints.tangents().of(row) } else { 0..0 };
+            sets.push(match tangents.len() {
+                0 => constraints.law(row).into(),
+                count => AdmissibleSet::with_friction(constraints.tangents().friction(row), count, false),
+            });
+            problem.extend(std::iter::once(row).chain(tangents));
+        }
         let pick = |values: &[T]| -> Vec<T> { problem.iter().map(|&row| values[row]).collect() };
         let (offset, rounded) = (pick(&free), pick(&tolerance));
-        let sets: Vec<AdmissibleSet> = problem.iter().map(|&row| constraints.law(row).into()).collect();
         let (delassus, version) = operator.delassus(g, &problem, |k| laws[problem[k]][0], &mut versions)?;
         let data = ContactProblem::of(delassus, &offset, &sets, &rounded, version);
         let mut lambda = vec![T::zero(); problem.len()];
         solver.reserve(problem.len());
         solver
             .solve(&data, &mut lambda)
-            .map_err(|failure| contact_error(t, failure, |i| constraints.ids[problem[i]]))?;
+            .map_err(|failure| contact_error(t, failure, |i| constraints.ids[owner(problem[i])]))?;
         operator.answer(g, (&problem, &lambda), forces, &mut response);
     }
     T::axpy(T::one(), &response, on_interface);
     // (Rows are taken to have unit weights: a gap is then as long as the displacement that closes it.)
-    Ok(problem.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
+    Ok(contacts.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
 }

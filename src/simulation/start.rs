@@ -163,15 +163,16 @@ impl<T: Real> Start<'_, T> {
         projection.reset();
         let mut contacts = ContactState::with_capacity(constraints.room());
         contacts.reset(&constraints.ids, constraints.tangents());
-        let mut touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+        let mut touching = touching_contacts(constraints, g, (&motion, T::zero()), h, violation, &mut contacts)?;
         let mut adjustment = None;
         if let Violation::Initial(_) = violation {
             let (parts, solver) = (&mut **system, &mut **contact_solver);
-            adjustment = balance_start(parts, solver, (&mut *constraints, &mut *g), &mut motion, massless, [h, ahead])?;
-            if adjustment.is_some() {
+            let rows = (&mut *constraints, &mut *g);
+            if let Some((adjusted, missed)) = balance_start(parts, solver, rows, &mut motion, massless, [h, ahead])? {
+                adjustment = Some(adjusted);
                 constraints.search(&motion, ahead, g)?;
                 contacts.reset(&constraints.ids, constraints.tangents());
-                touching = touching_contacts(constraints, g, &motion, h, violation, &mut contacts)?;
+                touching = touching_contacts(constraints, g, (&motion, missed), h, violation, &mut contacts)?;
             }
         }
 
@@ -282,11 +283,12 @@ fn rub_springs<T: Real>(
 /// digits.
 const INPUT: f64 = 64.0;
 
-/// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle.
+/// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle. A gap may have been
+/// `missed` by so much.
 fn touching_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
-    motion: &Motion<T>,
+    (motion, missed): (&Motion<T>, T),
     h: f64,
     violation: Violation,
     contacts: &mut ContactState<T>,
@@ -300,7 +302,7 @@ fn touching_contacts<T: Real>(
         let rate = g.product(row, &motion.v) + rates.rate;
         let gap = contacts.gap[row];
         let rounded = T::of(INPUT) * constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap);
-        let tolerance = rounded + T::of(1e-10 * h) * rate.abs();
+        let tolerance = rounded + missed + T::of(1e-10 * h) * rate.abs();
         let law = constraints.law(row);
         let violated = !law.may_penetrate() && gap < -tolerance || law.is_equality() && gap > tolerance;
         match violation {

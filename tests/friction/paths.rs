@@ -2,7 +2,7 @@
 
 use super::{GRAVITY, masses, run, schemes};
 use contact_dynamics::contact::ContactLaw;
-use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Newmark, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::schemes::Listed;
 use contact_dynamics_scenes::sparse::matrix;
 
@@ -145,5 +145,34 @@ fn modes_couple_above_the_threshold() {
         }
         let growth = largest[1] / largest[0];
         assert!(if grows { growth > 5.0 } else { growth < 1.2 }, "{share}: {growth}");
+    }
+}
+
+/// A contact node without mass, pulled along a floor by its spring at the start: it stays where friction can hold it, or
+/// slides until it can, and the run goes on from there.
+#[test]
+fn dofs_without_mass_begin_with_friction() {
+    for (friction, rests) in [(0.0, 0.5), (0.6, 0.0), (0.3, 0.2)] {
+        let springs = |i: usize, j: usize, k: f64| [(i, i, k), (j, j, k), (i, j, -k), (j, i, -k)];
+        let stiffness = matrix(4, [springs(0, 2, 2.0), springs(1, 3, 100.0)].concat());
+        let system = LinearSystem::lumped(vec![1.0, 1.0, 0.0, 0.0], stiffness).unwrap();
+        let system = system.load(|_, f| f[1] = -2.0);
+        let floor = LinearRows::new().unilateral(&[(3, 1.0)], 0.0).friction(friction, &[&[(2, 1.0)]]);
+        let scheme: Box<dyn TimeIntegrator> = Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap());
+        let mut run = run(system, scheme, 1e-3, vec![0.0; 4])
+            .displacement(vec![0.5, -0.02, 0.0, 0.0])
+            .constraint(floor)
+            .build()
+            .unwrap();
+        assert!((run.state().displacement()[2] - rests).abs() < 1e-14, "{friction} {:?}", run.state().displacement());
+        let contacts = run.state().contacts();
+        assert!((contacts.forces()[0] - 2.0).abs() < 1e-13);
+        let held = contacts.friction_forces(0).first().copied().unwrap_or(0.0);
+        assert!((held + 2.0 * (0.5 - rests)).abs() < 1e-12, "{friction} {held}");
+        // It goes on as it stood: the mass accelerates with the spring, and no jump is seen.
+        assert!((run.state().acceleration()[0] + 2.0 * (0.5 - rests)).abs() < 1e-12);
+        run.step().unwrap();
+        assert!((run.state().displacement()[2] - rests).abs() < 1e-5, "{friction} {:?}", run.state().displacement());
+        assert!((run.state().contacts().forces()[0] - 2.0).abs() < 1e-3);
     }
 }
