@@ -21,7 +21,7 @@ pub(super) struct Cone<T> {
     pub(super) guess: [T; 2],
 }
 
-/// Steps of the search for the direction of slip, each of which at least halves what is left every other time.
+/// The most steps of the search for the direction of slip, which takes three or four.
 const STEPS: usize = 200;
 
 impl<T: Real> Cone<T> {
@@ -103,10 +103,11 @@ fn slip_direction<T: Real>(schur: [[T; 2]; 2], c: [T; 2], guess: [T; 2], bound: 
     let mut f = solve_two(schur, gamma, c);
     for _ in 0..STEPS {
         let (length, radius) = (norm(f), bound(f));
-        if length >= radius {
-            low = gamma;
-        } else {
+        // (Where S is singular f(0) is no number, or without bound.)
+        if length < radius {
             high = gamma;
+        } else {
+            low = gamma;
         }
         // d f/d γ = −(S + γ)⁻¹ f.
         let slope = solve_two(schur, gamma, f);
@@ -115,12 +116,12 @@ fn slip_direction<T: Real>(schur: [[T; 2]; 2], c: [T; 2], guess: [T; 2], bound: 
         let step = (length - radius) * length / (radius_slope * length - radius * length_slope);
         let next = gamma + step;
         // (NaN is in no interval.)
-        let next = if next >= low && next <= high {
+        let next = if next >= low && next <= high && next.is_finite() {
             next
         } else if high.is_finite() {
             low + (high - low) / two
         } else {
-            two * two * low.max(size).max(T::min_positive_value())
+            two * two * low.max(if size > T::zero() { size } else { T::one() })
         };
         let moved = (next - gamma).abs();
         gamma = next;

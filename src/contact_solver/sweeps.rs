@@ -11,7 +11,7 @@ use std::ops::Range;
 /// it is not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweeps<T> {
-    /// Whether W is symmetric, if that is known.
+    /// Whether W is symmetric, as far as sweeps care, if that is known.
     is_symmetric: Option<bool>,
     /// Σ W λ over the blocks behind that of a row: of the multipliers that they have, and of those that this sweep
     /// gives them.
@@ -62,7 +62,8 @@ impl<T: Real> Sweeps<T> {
         }
     }
 
-    /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier, times its own compliance.
+    /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier, times its own compliance; NaN if one
+    /// is.
     pub(super) fn sweep(&mut self, problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
         let mut largest = T::zero();
         for (rows, set) in problem.blocks() {
@@ -83,7 +84,11 @@ impl<T: Real> Sweeps<T> {
                 if set.friction().is_none() {
                     *multiplier = set.nearest(*multiplier);
                 }
-                largest = largest.max(block.delassus[k][k] * (*multiplier - before).abs());
+                let change = block.delassus[k][k] * (*multiplier - before).abs();
+                // (`max` would pass over NaN.)
+                if change > largest || change.is_nan() {
+                    largest = change;
+                }
             }
             // (Relaxed beyond its solution a block may leave its cone.)
             if omega > T::one() && set.friction().is_some() {

@@ -197,6 +197,21 @@ fn many_contacts_by_newton_and_by_sweeps() {
     }
 }
 
+/// Where friction moves nothing in one direction, or in none, the block still slides against its slip.
+#[test]
+fn directions_without_compliance() {
+    for tangential in [[0.0, 3.0], [3.0, 0.0], [0.0, 0.0], [1e-300, 3.0], [3.0, 1e-12]] {
+        for slip in [[0.5, 0.1], [-0.2, 0.7], [0.5, 0.0], [0.0, -0.4], [1e-9, 0.3]] {
+            let w = [2.0, 0.0, 0.0, 0.0, tangential[0], 0.0, 0.0, 0.0, tangential[1]];
+            let (q, sets) = ([-2.0, slip[0], slip[1]], [cone(3, 0.05)]);
+            for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+                let found = solve(solver, (&w, &q, &sets)).unwrap();
+                check(&w, &q, &sets, &found, 1e-12, &format!("{solver:?} {tangential:?} {slip:?}"));
+            }
+        }
+    }
+}
+
 /// Sweeps take W for symmetric until its result is refused: by much and by little, in all rows and in one entry.
 #[test]
 fn an_unsymmetric_operator_is_read_as_a_whole() {
