@@ -330,7 +330,7 @@ impl<T: Real> Observer<T> for ContactRecorder<T> {
         self.forces.push(contacts.forces().iter().copied().sum());
         self.raw_forces.push(contacts.raw_forces().iter().copied().sum());
         self.impulses.push(contacts.impulses().iter().copied().sum());
-        let size = |contact| contacts.friction_forces(contact).iter().fold(T::zero(), |size, &f| size.hypot(f));
+        let size = |contact| contacts.tangential(contact, &contacts.lambda);
         let all = 0..contacts.ids().len();
         let count = |status| all.clone().filter(|&contact| contacts.status(contact) == status).count();
         self.friction.push(all.clone().map(size).sum());

@@ -84,9 +84,9 @@ impl Tangents {
         (0..self.friction.len()).filter(|&contact| !self.of(contact).is_empty())
     }
 
-    /// The contact of a tangential row.
+    /// The contact that a row belongs to: that of a gap is its own.
     pub(crate) fn owner(&self, row: usize) -> usize {
-        self.owners[row - self.contacts]
+        row.checked_sub(self.contacts).and_then(|tangent| self.owners.get(tangent)).copied().unwrap_or(row)
     }
 
     /// Appends contacts to a list of rows, each with the rows of its friction behind it.
@@ -120,6 +120,7 @@ mod tests {
         }
         assert_eq!([0, 1, 2].map(|contact| tangents.of(contact)), [3..5, 5..5, 5..6]);
         assert_eq!((tangents.all(), tangents.owner(4), tangents.owner(5)), (3..6, 0, 2));
+        assert_eq!(tangents.owner(2), 2);
         assert_eq!(tangents.contacts().collect::<Vec<_>>(), [0, 2]);
         let mut rows = Vec::new();
         tangents.expand([0, 2].into_iter(), &mut rows);

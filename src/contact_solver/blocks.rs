@@ -95,11 +95,11 @@ impl<T: Real> BlockAcceptance<T> {
             let diverges = !(change <= T::of(DIVERGES) * least && change.is_finite());
             let looks = (sweeps - left).is_multiple_of(LOOK);
             let stalls = looks && change > T::of(0.5) * before;
-            if !diverges && (change <= self.accepted || stalls) && self.accepts(problem, multipliers) {
+            let converges = change <= self.accepted;
+            if !diverges && (converges || stalls) && self.accepts(problem, multipliers) {
                 return true;
             }
             let ends = diverges || stalls && impatient || left == 0;
-            let converges = change <= self.accepted;
             if (ends || stalls || converges) && memory.is_mistaken(problem) {
                 // All of it was wrong.
                 multipliers.fill(T::zero());

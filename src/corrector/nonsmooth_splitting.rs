@@ -2,7 +2,7 @@
 
 use super::contact_implicit::{adds_no_velocity, one_step};
 use super::correction::Pressed;
-use super::{Correction, Corrector};
+use super::{Correction, Corrector, Rubbing};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
@@ -93,22 +93,20 @@ impl<T: Real> Corrector<T> for NonsmoothSplitting {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Takes the contact forces of closed contacts out of the accelerations, friction with them, and reports the
-    /// impulses of the velocities over h.
+    /// Takes the contact forces of closed contacts out of the accelerations, friction with them, and reports the total
+    /// impulses of the velocities, which have been solved for, over h.
     fn split_forces(&mut self) {
-        let [_, by_v, by_a] = self.response();
-        let (h, weight) = (T::of(self.h), self.momentum_weights()[2]);
-        let rows = std::mem::take(&mut self.buffers.closed);
-        for &contact in &rows {
-            for row in std::iter::once(contact).chain(self.contacts.tangents.of(contact)) {
-                let raw = self.contacts.lambda_raw[row];
-                self.projection.prepare(self.g, &[row]);
-                self.projection.push(self.g, row, -T::of(by_a) * raw, &mut self.new.a);
-                self.book_impulse(row, -(T::of(weight * by_a) * raw));
-                // (λ_a is −h times the impulse of the correction.)
-                self.report_force(row, T::of(by_v) * raw - self.contacts.lambda_a[row] / (h * h));
-            }
+        let (h, [.., by_a]) = (T::of(self.h), self.response());
+        let Rubbing { rows, totals, .. } = &mut *self.buffers.rubbing;
+        let (rows, totals) = (std::mem::take(rows), std::mem::take(totals));
+        self.projection.prepare(self.g, &rows);
+        let weight = self.momentum_weights()[2];
+        for (&row, &total) in rows.iter().zip(&totals) {
+            let force = -T::of(by_a) * self.contacts.lambda_raw[row];
+            self.projection.push(self.g, row, force, &mut self.new.a);
+            self.book_impulse(row, T::of(weight) * force);
+            self.report_force(row, total / h);
         }
-        self.buffers.closed = rows;
+        (self.buffers.rubbing.rows, self.buffers.rubbing.totals) = (rows, totals);
     }
 }

@@ -82,11 +82,9 @@ impl<T: Scalar, const N: usize> WithSimd for Products<'_, T, N> {
                 }
             }
         }
-        let mut k = 0;
-        sums.map(|sums| {
+        std::array::from_fn(|k| {
             let rest = x[k][whole..].iter().zip(&y[whole..]).map(|(&x, &y)| x * y).sum::<T>();
-            k += 1;
-            sums.into_iter().sum::<T>() + rest
+            sums[k].into_iter().sum::<T>() + rest
         })
     }
 }

@@ -386,10 +386,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// The contact of a row, tangential or not.
     pub(crate) fn id_of(&self, row: usize) -> ContactId {
-        match self.ids.get(row) {
-            Some(&id) => id,
-            None => self.ids[self.tangents.owner(row)],
-        }
+        self.ids[self.tangents.owner(row)]
     }
 
     /// [`rows_of`](Self::rows_of) with the rows of friction of these contacts.

@@ -45,7 +45,7 @@ pub(super) fn check_contacts<T: Real>(t: f64, contacts: &ContactState<T>) -> Res
         }
         if let Some(row) = values.iter().position(|x| !x.is_finite()) {
             // (Behind the contacts stand the tangential rows of those with friction.)
-            let contact = ids[if row < ids.len() { row } else { contacts.tangents.owner(row) }];
+            let contact = ids[contacts.tangents.owner(row)];
             return Err(Error::ContactNotFinite { t, what, contact, value: values[row].value() });
         }
     }

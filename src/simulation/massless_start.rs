@@ -4,7 +4,7 @@ use super::constraints::Constraints;
 use super::massless::{Columns, Embedded, is_damped};
 use super::operator::Operator;
 use crate::contact::{Candidates, ContactJacobian};
-use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
+use crate::contact_solver::{ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -152,7 +152,6 @@ fn press_start<T: Real>(
         (0..g.rows()).map(|row| start(row) + g.interface_product(row, on_interface) + laws[row][1]).collect();
     let rubs = |row: usize| constraints.tangents().friction(row) > 0.0 && !constraints.law(row).is_compliant();
     let (mut contacts, mut problem): (Vec<usize>, Vec<usize>) = Default::default();
-    let owner = |row: usize| if row < rows { row } else { constraints.tangents().owner(row) };
     let mut response = vec![T::zero(); on_interface.len()];
     loop {
         let pushed = |&row: &usize| {
@@ -169,10 +168,7 @@ fn press_start<T: Real>(
         let mut sets = Vec::new();
         for &row in &contacts {
             let tangents = if rubs(row) { constraints.tangents().of(row) } else { 0..0 };
-            sets.push(match tangents.len() {
-                0 => constraints.law(row).into(),
-                count => AdmissibleSet::with_friction(constraints.tangents().friction(row), count, false),
-            });
+            sets.push(if rubs(row) { constraints.set(row) } else { constraints.law(row).into() });
             problem.extend(std::iter::once(row).chain(tangents));
         }
         let pick = |values: &[T]| -> Vec<T> { problem.iter().map(|&row| values[row]).collect() };
@@ -183,7 +179,7 @@ fn press_start<T: Real>(
         solver.reserve(problem.len());
         solver
             .solve(&data, &mut lambda)
-            .map_err(|failure| contact_error(t, failure, |i| constraints.ids[owner(problem[i])]))?;
+            .map_err(|failure| contact_error(t, failure, |i| constraints.id_of(problem[i])))?;
         operator.answer(g, (&problem, &lambda), forces, &mut response);
     }
     T::axpy(T::one(), &response, on_interface);

@@ -95,7 +95,7 @@ impl<T: Real> Start<'_, T> {
         let Found { mut motion, contacts, adjustment } = self.motion(u, v, constraints, g, projection, violation)?;
         if self.is_smooth {
             for (row, &force) in contacts.lambda.iter().enumerate() {
-                let owner = if g.is_tangential(row) { constraints.tangents().owner(row) } else { row };
+                let owner = constraints.tangents().owner(row);
                 if constraints.law(owner).leaves_jumps() && !g.acts_on(owner, self.massless) {
                     projection.prepare(g, &[row]);
                     projection.push(g, row, -force, &mut motion.a);

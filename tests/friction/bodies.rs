@@ -1,12 +1,9 @@
-//! Elastic bodies against closed forms: two slabs that strike each other obliquely, partial slip under a ball that is
-//! moved sideways, and two blocks on a slope.
+//! Elastic bodies against closed forms: two slabs that strike each other obliquely, and partial slip under a ball that
+//! is moved sideways.
 
-use super::GRAVITY;
-use contact_dynamics::contact::{NodeToFacet, NodesOnObstacle, Plane};
-use contact_dynamics::{ContactStatus, GeneralizedAlpha, PersistencyCorrection, Simulation};
+use contact_dynamics::PersistencyCorrection;
 use contact_dynamics_scenes::mindlin::Press;
 use contact_dynamics_scenes::schemes;
-use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::two_slabs::TwoSlabs;
 
 /// The characteristics by hand: a force p sends −p/Z into a slab, and 2 p/Z are missing when it is back.
@@ -67,44 +64,4 @@ fn a_ball_that_is_moved_sideways_slips_from_the_rim() {
     let last = loads[4];
     assert!(last.stick < 0.3 * last.radius);
     assert!((last.tangential / (press.friction * last.normal) - 1.0).abs() < 0.01, "{last:?}");
-}
-
-/// A block on a block on a slope, both elastic: below the friction angle neither moves once they have settled.
-#[test]
-fn two_blocks_on_a_slope_stay() {
-    let material = Material { young: 1e5, poisson: 0.3, density: 1.0 };
-    let lower = Solid::rectangle([2.0, 0.5], [6, 2], material);
-    let split = lower.nodes.len();
-    let solid = lower.with(Solid::rectangle([1.0, 0.5], [5, 2], material).moved([0.45, 0.5]));
-    let facets = |inside: &dyn Fn(usize, [f64; 2]) -> bool| -> Vec<[usize; 2]> {
-        let all = solid.boundary().into_iter().filter(|side| side.iter().all(|&n| inside(n, solid.nodes[n])));
-        all.map(|side| [side[0], side[1]]).collect()
-    };
-    let below = facets(&|n, [_, y]| n < split && y > 0.499);
-    let above = facets(&|n, [_, y]| n >= split && y < 0.501);
-    let bottom: Vec<_> = (0..split).filter(|&n| solid.nodes[n][1] == 0.0).collect();
-    let floor = Plane::new([0.0; 2], [0.0, 1.0]).unwrap();
-    let mass = solid.lumped_mass::<f64>();
-    let (sine, cosine) = 0.2_f64.sin_cos();
-    let system = solid.system().load(move |_, f| {
-        for (dof, (f, m)) in f.iter_mut().zip(&mass).enumerate() {
-            *f = m * GRAVITY * if dof % 2 == 0 { sine } else { -cosine };
-        }
-    });
-    let mut run = Simulation::builder(system, GeneralizedAlpha::chung_hulbert(0.5).unwrap(), 1e-2)
-        .constraint(NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap().friction(0.5))
-        .constraint(NodeToFacet::new(&solid.nodes, &solid.node_dofs(), above, below).unwrap().friction(0.5))
-        .build()
-        .unwrap();
-    run.run_until(30.0, &mut ()).unwrap();
-    let before = run.state().displacement().to_vec();
-    for _ in 0..10_000 {
-        run.step().unwrap();
-    }
-    let most =
-        run.state().displacement().iter().zip(&before).fold(0.0_f64, |most, (now, then)| most.max((now - then).abs()));
-    // (Coordinates of size one.)
-    assert!(most < 2e-15, "{most:e}");
-    let contacts = run.state().contacts();
-    assert!((0..contacts.ids().len()).all(|contact| contacts.status(contact) != ContactStatus::Sliding));
 }

@@ -70,23 +70,57 @@ fn a_block_of_elements_stays() {
     assert!((0..5).all(|contact| run.state().contacts().status(contact) != ContactStatus::Sliding));
 }
 
+/// A body on another one, as one solid, with the contact between them and the nodes at the bottom.
+fn stacked(lower: Solid<2>, upper: Solid<2>, friction: f64) -> (Solid<2>, NodeToFacet<f64>, Vec<usize>) {
+    let (split, height) = (lower.nodes.len(), 0.5);
+    let solid = lower.with(upper);
+    let facets = |inside: &dyn Fn(usize, [f64; 2]) -> bool| -> Vec<[usize; 2]> {
+        let all = solid.boundary().into_iter().filter(|side| side.iter().all(|&n| inside(n, solid.nodes[n])));
+        all.map(|side| [side[0], side[1]]).collect()
+    };
+    let below = facets(&|n, [_, y]| n < split && y > height - 1e-3);
+    let above = facets(&|n, [_, y]| n >= split && y < height + 1e-3);
+    let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), above, below).unwrap().friction(friction);
+    let bottom = (0..split).filter(|&n| solid.nodes[n][1] == 0.0).collect();
+    (solid, contact, bottom)
+}
+
+/// A block on a block on a slope: below the friction angle neither moves once they have settled.
+#[test]
+fn two_blocks_on_a_slope_stay() {
+    let material = Material { young: 1e5, ..MATERIAL };
+    let lower = Solid::rectangle([2.0, 0.5], [6, 2], material);
+    let upper = Solid::rectangle([1.0, 0.5], [5, 2], material).moved([0.45, 0.5]);
+    let (solid, contact, bottom) = stacked(lower, upper, 0.5);
+    let floor = Plane::new([0.0; 2], [0.0, 1.0]).unwrap();
+    let mut run = Simulation::builder(loaded(&solid, 0.2), GeneralizedAlpha::chung_hulbert(0.5).unwrap(), 1e-2)
+        .constraint(NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap().friction(0.5))
+        .constraint(contact)
+        .build()
+        .unwrap();
+    run.run_until(30.0, &mut ()).unwrap();
+    let before = run.state().displacement().to_vec();
+    for _ in 0..10_000 {
+        run.step().unwrap();
+    }
+    let moves = run.state().displacement().iter().zip(&before).map(|(now, then)| (now - then).abs());
+    let most = moves.fold(0.0_f64, f64::max);
+    // (Coordinates of size one.)
+    assert!(most < 2e-15, "{most:e}");
+    let contacts = run.state().contacts();
+    assert!((0..contacts.ids().len()).all(|contact| contacts.status(contact) != ContactStatus::Sliding));
+}
+
 /// A block thrown along another one that lies on ice: they take and give the same momentum, to rounding, and end with
 /// one velocity.
 #[test]
 fn two_bodies_rub_without_losing_momentum() {
     let lower = Solid::rectangle([4.0, 0.5], [12, 2], MATERIAL);
     let split = lower.nodes.len();
-    let solid = lower.with(Solid::rectangle([1.0, 0.5], [5, 2], MATERIAL).moved([0.5, 0.5]));
-    let facets = |inside: &dyn Fn(usize, [f64; 2]) -> bool| -> Vec<[usize; 2]> {
-        let all = solid.boundary().into_iter().filter(|side| side.iter().all(|&n| inside(n, solid.nodes[n])));
-        all.map(|side| [side[0], side[1]]).collect()
-    };
-    let below = facets(&|n, [_, y]| n < split && y > 0.499);
-    let above = facets(&|n, [_, y]| n >= split && y < 0.501);
-    let bottom: Vec<_> = (0..split).filter(|&n| solid.nodes[n][1] == 0.0).collect();
+    let (solid, contact, bottom) =
+        stacked(lower, Solid::rectangle([1.0, 0.5], [5, 2], MATERIAL).moved([0.5, 0.5]), 0.4);
     let ice = Plane::new([0.0; 2], [0.0, 1.0]).unwrap();
     let velocity = (0..solid.dofs()).map(|dof| if dof % 2 == 0 && dof >= 2 * split { 2.0 } else { 0.0 }).collect();
-    let contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), above, below).unwrap().friction(0.4);
     let scheme = GeneralizedAlpha::chung_hulbert(0.8).unwrap();
     let mut run = Simulation::builder(loaded(&solid, 0.0), scheme, 1e-3)
         .velocity(velocity)

@@ -168,9 +168,8 @@ impl<T: Real> Correction<'_, T> {
         }
         // A body that has come from a gap had a positive impulse: its past displacement is moved back by that.
         let presses = if field == 0 { -T::one() } else { T::one() };
-        let owner = |row: usize| if row < first { row } else { tangents.owner(row) };
         let ids = &contacts.ids;
-        rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[owner(row)]))?;
+        rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[tangents.owner(row)]))?;
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
             constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
             let jumps = rubbing.jump.iter().zip(&rubbing.left);
