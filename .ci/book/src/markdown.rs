@@ -15,7 +15,7 @@ pub struct Page {
 pub struct Link {
     pub line: usize,
     pub destination: String,
-    /// Where the destination is written, if it is behind its text in parentheses.
+    /// Where the destination is written, if it is behind its text in parentheses or in HTML.
     pub written: Option<Range<usize>>,
     pub is_image: bool,
 }
@@ -38,6 +38,7 @@ pub fn read(text: &str) -> Page {
             Event::Start(Tag::Image { link_type, dest_url, .. }) => {
                 page.links.push(link(text, range, link_type, &dest_url, line, true));
             }
+            Event::Html(html) | Event::InlineHtml(html) => page.links.extend(of_html(&html, range.start, line)),
             Event::Start(Tag::Heading { .. }) => heading = Some(String::new()),
             Event::End(TagEnd::Heading(_)) => {
                 let name = anchor(&heading.take().unwrap_or_default());
@@ -76,6 +77,21 @@ fn link(
     Link { line: line(range.start), destination: destination.into(), written, is_image }
 }
 
+/// Links and images in HTML that begins at a place of the page.
+fn of_html(html: &str, begin: usize, line: impl Fn(usize) -> usize) -> Vec<Link> {
+    let mut links = Vec::new();
+    for (attribute, is_image) in [("href=\"", false), ("src=\"", true)] {
+        for (at, _) in html.match_indices(attribute) {
+            let value = &html[at + attribute.len()..];
+            let Some(length) = value.find('"') else { continue };
+            let start = begin + at + attribute.len();
+            let destination = value[..length].to_string();
+            links.push(Link { line: line(start), destination, written: Some(start..start + length), is_image });
+        }
+    }
+    links
+}
+
 /// The fragment of a heading, as hosts of repositories and mdBook make it.
 fn anchor(heading: &str) -> String {
     let lower = heading.trim().to_lowercase();
@@ -89,7 +105,8 @@ mod tests {
 
     #[test]
     fn headings_links_and_formulas_are_found() {
-        let text = "# A `b` – c!\n\n## A\n\n## A\n\n[x](y.md#z) ![p](q.svg)\n\n- l\n\n  ```math\n  E = 0\n  ```\n";
+        let text =
+            "# A `b` – c!\n\n## A\n\n## A\n\n[x](y.md#z) <img src=\"q.svg\">\n\n- l\n\n  ```math\n  E = 0\n  ```\n";
         let page = read(text);
         assert!(page.anchors.iter().eq(["a", "a-1", "a-b--c"]));
         let [link, image] = &page.links[..] else { panic!("two links") };
