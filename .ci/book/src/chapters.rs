@@ -34,7 +34,7 @@ pub fn of_repository(mut book: Book, folder: &Path) -> Result<Book> {
     }
     for file in sources {
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {file}"))?;
-        let language = if file.ends_with(".rs") { "rust,noplayground" } else { "text" };
+        let language = if paths::extension(&file) == Some("rs") { "rust,noplayground" } else { "text" };
         let content = format!("# {file}\n\n``````{language}\n{text}\n``````\n");
         book.push_item(Chapter::new(&file, content, chapter_of_source(&file), Vec::new()));
     }
@@ -51,7 +51,9 @@ fn page(chapter: &Chapter, folder: &str) -> Result<String> {
     let own = format!("{folder}/{}", path(chapter)?);
     let content = chapter.content.trim();
     let included = content.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}"));
-    let Some(included) = included.filter(|file| file.ends_with(".md") && !file.contains('\n')) else { return Ok(own) };
+    let Some(included) = included.filter(|file| paths::extension(file) == Some("md") && !file.contains('\n')) else {
+        return Ok(own);
+    };
     paths::target(&own, included).with_context(|| format!("{own} includes {included}, beyond the repository"))
 }
 
@@ -69,7 +71,7 @@ fn put_home(chapter: &mut Chapter, folder: &str, homes: &Homes, sources: &mut BT
         ensure!(Path::new(&target).is_file(), "{}: no file of the repository", place());
         let home = match (homes.get(&target), target.strip_prefix(&format!("{folder}/"))) {
             (Some(chapter), _) => chapter.clone(),
-            (None, Some(_)) if target.ends_with(".md") => bail!("{}: no chapter of the book", place()),
+            (None, Some(_)) if paths::extension(&target) == Some("md") => bail!("{}: no chapter of the book", place()),
             // mdBook copies what is no page.
             (None, Some(file)) => file.to_string(),
             (None, None) => {

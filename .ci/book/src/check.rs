@@ -13,7 +13,7 @@ const SUMMARY: &str = "docs/SUMMARY.md";
 /// One a line, with the place. `package` has the files that are published.
 pub fn complaints(package: &BTreeSet<String>) -> Result<Vec<String>> {
     let mut pages = BTreeMap::new();
-    for file in package.iter().filter(|file| file.ends_with(".md") && !file.starts_with("src/")) {
+    for file in package.iter().filter(|file| paths::extension(file) == Some("md") && !file.starts_with("src/")) {
         pages.insert(file.as_str(), markdown::read(&read(file)?));
     }
     let mut complaints = Vec::new();
@@ -27,9 +27,9 @@ pub fn complaints(package: &BTreeSet<String>) -> Result<Vec<String>> {
     }
     for entry in WalkDir::new("src") {
         let file = entry?.into_path().to_string_lossy().into_owned();
-        let found = match file.rsplit_once('.') {
-            Some((_, "rs")) => formulas::of_source(&read(&file)?),
-            Some((_, "md")) => markdown::read(&read(&file)?).formulas,
+        let found = match paths::extension(&file) {
+            Some("rs") => formulas::of_source(&read(&file)?),
+            Some("md") => markdown::read(&read(&file)?).formulas,
             _ => continue,
         };
         let refused = formulas::refused(&found).into_iter();

@@ -25,6 +25,11 @@ pub fn link(from: &str, to: &str) -> String {
     names.join("/")
 }
 
+/// What follows the last point of a file's name.
+pub fn extension(file: &str) -> Option<&str> {
+    Some(file.rsplit_once('.')?.1)
+}
+
 /// Path and fragment of a link to a file; None for a link with a scheme.
 pub fn local(link: &str) -> Option<(&str, Option<&str>)> {
     let (path, fragment) = match link.split_once('#') {
