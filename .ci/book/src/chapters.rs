@@ -41,14 +41,19 @@ pub fn of_repository(mut book: Book, folder: &Path) -> Result<Book> {
     Ok(book)
 }
 
+/// The place of a chapter in the book.
 fn path(chapter: &Chapter) -> Result<String> {
-    let path = chapter.path.as_ref().context("a chapter without a page")?;
+    text(chapter.path.as_deref())
+}
+
+fn text(path: Option<&Path>) -> Result<String> {
+    let path = path.context("a chapter without a page")?;
     Ok(path.to_str().with_context(|| format!("{} is no text", path.display()))?.replace('\\', "/"))
 }
 
 /// The page of the repository that a chapter shows.
 fn page(chapter: &Chapter, folder: &str) -> Result<String> {
-    let own = format!("{folder}/{}", path(chapter)?);
+    let own = format!("{folder}/{}", text(chapter.source_path.as_deref())?);
     let content = chapter.content.trim();
     let included = content.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}"));
     let Some(included) = included.filter(|file| paths::extension(file) == Some("md") && !file.contains('\n')) else {
@@ -67,7 +72,7 @@ fn put_home(chapter: &mut Chapter, folder: &str, homes: &Homes, sources: &mut BT
     for link in links {
         let Some((file, _)) = paths::local(&link.destination).filter(|(file, _)| !file.is_empty()) else { continue };
         let place = || format!("{page}:{}: {}", link.line, link.destination);
-        let target = paths::target(&page, file).with_context(place)?;
+        let target = paths::target(&page, file).with_context(|| format!("{}: beyond the repository", place()))?;
         ensure!(Path::new(&target).is_file(), "{}: no file of the repository", place());
         let home = match (homes.get(&target), target.strip_prefix(&format!("{folder}/"))) {
             (Some(chapter), _) => chapter.clone(),
@@ -81,7 +86,9 @@ fn put_home(chapter: &mut Chapter, folder: &str, homes: &Homes, sources: &mut BT
         };
         let fitting = paths::link(&path, &home);
         if fitting != file {
-            let written = link.written.clone().with_context(place)?;
+            let written = link.written.clone();
+            let written =
+                written.with_context(|| format!("{}: no [text](destination), which can be made fit", place()))?;
             text.replace_range(written.start..written.start + file.len(), &fitting);
         }
     }

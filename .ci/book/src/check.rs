@@ -44,7 +44,7 @@ fn read(file: &str) -> Result<String> {
 }
 
 fn wrong_link(file: &str, link: &Link, package: &BTreeSet<String>, pages: &BTreeMap<&str, Page>) -> Option<String> {
-    let Some((path, fragment)) = paths::local(&link.destination) else { return None };
+    let (path, fragment) = paths::local(&link.destination)?;
     if file == "README.md" && link.is_image {
         return Some("an image of the repository, which the registry's page of the crate cannot show".into());
     }
