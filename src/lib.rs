@@ -1,4 +1,8 @@
+#![doc = include_str!("front.md")]
+// The figure itself, so that it is seen without a network; editors, which show the front page as text, leave it out.
+#![cfg_attr(doc, doc = include_str!("../docs/figures/force.svg"))]
 #![doc = include_str!("lib.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 // The example of the README is compiled and run with the tests.

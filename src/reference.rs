@@ -12,14 +12,14 @@
 //! Seen from the contact end, one of them comes in and the other goes out; the free far end (`p = 0`) turns the
 //! outgoing one into the incoming one, so that
 //!
-//! ```text
-//! incoming(t) = outgoing(t - 2 l/c).
+//! ```math
+//! \text{incoming}(t) = \text{outgoing} \left( t - \frac{2l}{c} \right).
 //! ```
 //!
 //! The contact ends exchange nothing while they are apart. While they touch they share one velocity and one force:
 //!
-//! ```text
-//! p = (R1 - L2) / (1/Z1 + 1/Z2),   v = R1 - p/Z1 = L2 + p/Z2,   p >= 0,
+//! ```math
+//! p = \frac{R_1 - L_2}{1/Z_1 + 1/Z_2}, \qquad v = R_1 - \frac{p}{Z_1} = L_2 + \frac{p}{Z_2}, \qquad p \ge 0,
 //! ```
 //!
 //! and they part as soon as this `p` would be negative; apart, the gap grows at the rate `L2 - R1`. A rigid wall is

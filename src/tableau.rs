@@ -2,8 +2,9 @@
 //!
 //! With z the unknown of a stage and past states k = 0 (newest), 1, 2 …, a [`Row`] is
 //!
-//! ```text
-//! row = w z + Σ_k ( c_u U_k + c_v V_k + c_a A_k ),   U_k = u_k,  V_k = h v_k,  A_k = h² a_k
+//! ```math
+//! \text{row} = w z + \sum_k \left( c_u U_k + c_v V_k + c_a A_k \right), \qquad
+//! U_k = u_k, \quad V_k = h v_k, \quad A_k = h^2 a_k
 //! ```
 //!
 //! Three recovery rows give u, h v, h² a of the new state; three balance rows give ū, h v̄, h² ā at which
