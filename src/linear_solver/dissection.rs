@@ -102,7 +102,6 @@ fn without_dense(graph: &Graph) -> (Vec<usize>, Vec<usize>) {
 mod tests {
     use super::separator::{grow, refine};
     use super::*;
-    use contact_dynamics_scenes::random::xorshift;
     use faer::sparse::SymbolicSparseColMat;
 
     /// The pattern with these pairs, both triangles.
@@ -143,10 +142,13 @@ mod tests {
         (3 * side.pow(3), pairs)
     }
 
-    fn strewn(n: usize, pairs: usize, seed: u64) -> Vec<(usize, usize)> {
-        let mut random = xorshift(seed);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let mut dof = || (random() * n as f64) as usize;
+    /// Pairs by a linear congruential generator (Knuth's MMIX): the package has the tests of this file, but no crate for
+    /// them.
+    fn strewn(n: usize, pairs: usize, mut state: u64) -> Vec<(usize, usize)> {
+        let mut dof = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            usize::try_from(state >> 33).unwrap() % n
+        };
         (0..pairs).map(|_| (dof(), dof())).collect()
     }
 

@@ -18,6 +18,8 @@ pub struct Link {
     /// Where the destination is written, if it is behind its text in parentheses or in HTML.
     pub written: Option<Range<usize>>,
     pub is_image: bool,
+    /// What stands for it where it cannot be followed or shown.
+    pub text: String,
 }
 
 pub struct Formula {
@@ -74,7 +76,9 @@ fn link(
         let start = range.start + at + "](".len();
         start..start + destination.len()
     });
-    Link { line: line(range.start), destination: destination.into(), written, is_image }
+    let shown = text[range.clone()].trim_start_matches('!').trim_start_matches('[').split("](").next();
+    let shown = shown.unwrap_or_default().to_string();
+    Link { line: line(range.start), destination: destination.into(), written, is_image, text: shown }
 }
 
 /// Links and images in HTML that begins at a place of the page.
@@ -86,7 +90,9 @@ fn of_html(html: &str, begin: usize, line: impl Fn(usize) -> usize) -> Vec<Link>
             let Some(length) = value.find('"') else { continue };
             let start = begin + at + attribute.len();
             let destination = value[..length].to_string();
-            links.push(Link { line: line(start), destination, written: Some(start..start + length), is_image });
+            let written = Some(start..start + length);
+            let text = html.split_once("alt=\"").and_then(|(_, rest)| rest.split('"').next()).unwrap_or_default().into();
+            links.push(Link { line: line(start), destination, written, is_image, text });
         }
     }
     links
@@ -106,13 +112,14 @@ mod tests {
     #[test]
     fn headings_links_and_formulas_are_found() {
         let text =
-            "# A `b` – c!\n\n## A\n\n## A\n\n[x](y.md#z) <img src=\"q.svg\">\n\n- l\n\n  ```math\n  E = 0\n  ```\n";
+            "# A `b` – c!\n\n## A\n\n## A\n\n[x](y.md#z) <img src=\"q.svg\" alt=\"a b\"> ![c d](e.png)\n\n- l\n\n  ```math\n  E = 0\n  ```\n";
         let page = read(text);
         assert!(page.anchors.iter().eq(["a", "a-1", "a-b--c"]));
-        let [link, image] = &page.links[..] else { panic!("two links") };
+        let [link, image, shown] = &page.links[..] else { panic!("three links") };
         assert_eq!((link.destination.as_str(), link.line, link.is_image), ("y.md#z", 7, false));
         assert_eq!(&text[link.written.clone().unwrap()], "y.md#z");
-        assert!(image.is_image && image.destination == "q.svg");
+        assert!(image.is_image && image.destination == "q.svg" && image.text == "a b");
+        assert!(shown.is_image && shown.destination == "e.png" && shown.text == "c d");
         assert_eq!(page.formulas[0].latex, "E = 0\n");
         assert_eq!(page.formulas[0].line, 11);
     }
