@@ -326,8 +326,6 @@ mod tests {
     fn meshes_are_sound_and_weigh_what_they_should() {
         for mesh in [hexahedra(), tetrahedra()] {
             mesh.check().unwrap();
-            // By the divergence theorem: a third of the flux of x through the surface. (Quads are not flat: by hexahedra
-            // the volume differs from that of their halves.)
             let body = Body::new(&mesh, |_| MATERIAL, 9.81, &[]);
             assert!((body.masses().iter().sum::<f64>() / (3.0 * 2.0 * mesh.volume()) - 1.0).abs() < 1e-14);
             let sum =
@@ -335,6 +333,7 @@ mod tests {
             assert!(sum.iter().all(|x| x.abs() < 1e-13), "{sum:?}");
             assert_eq!(mesh.boundary().len(), if mesh.elements.len() == 8 { 24 } else { 48 });
         }
+        // By the divergence theorem: a third of the flux of x through the surface. (Of flat facets: quads are not.)
         let flux = |mesh: &Mesh| -> f64 {
             let third = |f: &Vec<usize>| dot(&mesh.area(f), &mesh.nodes[f[0]]) / 3.0;
             mesh.boundary().iter().map(third).sum()

@@ -104,7 +104,7 @@ fn the_force_of_a_bar_is_that_of_its_wave() {
         let mean = plateau.iter().sum::<f64>() / plateau.len() as f64;
         assert!((mean / exact - 1.0).abs() < 0.01, "{model}: {mean} {exact}");
         assert!(plateau.iter().all(|f| (f / exact - 1.0).abs() < 0.1), "{model}: {plateau:?}");
-        // The impulse turns the motion around, but for what the impact of the lowest nodes and the scheme's damping take.
+        // The impulse turns the motion around, but for what the impact of the lowest nodes and the scheme take.
         let impulse: f64 = rows.windows(2).map(|w| 0.5 * (w[0][3] + w[1][3]) * (w[1][0] - w[0][0])).sum();
         assert!((impulse / (2.0 * 2.5e-3) - 1.0).abs() < 0.03, "{model}: {impulse}");
         assert!(rows.iter().all(|row| row[1].abs() < 1e-6 * exact && row[2].abs() < 1e-6 * exact));
