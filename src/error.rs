@@ -1,6 +1,8 @@
 //! The one error type of the crate: every variant carries the numbers and says what to mend.
 
 mod check;
+#[cfg(test)]
+mod page;
 
 pub(crate) use check::{positive, step_size};
 
@@ -11,6 +13,8 @@ use crate::contact_id::ContactId;
 ///
 /// Numbers are reported as `f64` whatever the scalar of the run. A step that fails leaves state and
 /// history bit for bit as they were.
+///
+#[doc = include_str!("../docs/errors.md")]
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

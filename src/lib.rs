@@ -5,12 +5,9 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
-// The example of the README is compiled and run with the tests.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
-
 pub mod analysis;
+#[cfg(any(test, doctest))]
+mod book;
 pub mod contact;
 mod contact_failure;
 mod contact_id;

@@ -1,0 +1,108 @@
+//! The pages in `docs/` whose programs are compiled and run with the tests of the documentation. (That of the errors is
+//! the documentation of [`Error`](crate::Error), and run there.)
+
+/// Takes pages into the documentation of nothing, which only its tests see.
+macro_rules! pages {
+    ($($(#[$condition:meta])? $name:ident = $page:literal;)*) => {$(
+        #[cfg(doctest)]
+        $(#[$condition])?
+        #[doc = include_str!(concat!("../", $page))]
+        struct $name;
+    )*};
+}
+
+pages! {
+    Readme = "README.md";
+    Start = "docs/start.md";
+    Choosing = "docs/choosing.md";
+    ComingFrom = "docs/coming_from.md";
+    Friction = "docs/friction.md";
+    Bars = "docs/tutorials/bars.md";
+    OwnSystem = "docs/tutorials/own_system.md";
+    OwnConstraint = "docs/tutorials/own_constraint.md";
+    OwnCorrector = "docs/tutorials/own_corrector.md";
+    OwnIntegrator = "docs/tutorials/own_integrator.md";
+    OwnLinearSolver = "docs/tutorials/own_linear_solver.md";
+    BlockOnIncline = "docs/tutorials/friction.md";
+    #[cfg(feature = "serde")]
+    Restart = "docs/tutorials/restart.md";
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    /// README.md and all pages in docs/, by their path from the root of the package, with their text.
+    fn pages() -> Vec<(String, String)> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let (mut folders, mut files) = (vec![root.join("docs")], vec![root.join("README.md")]);
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                match path.is_dir() {
+                    true => folders.push(path),
+                    false => files.push(path),
+                }
+            }
+        }
+        let name = |path: &PathBuf| path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
+        files.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+        files.iter().map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
+    }
+
+    /// Blocks of code of a page: what is said behind the opening marks, and the lines.
+    fn blocks(text: &str) -> Vec<(String, Vec<&str>)> {
+        let (mut blocks, mut open) = (Vec::new(), None);
+        for line in text.lines() {
+            match (line.trim_start().strip_prefix("```"), open.take()) {
+                (Some(kind), None) => open = Some((kind.to_owned(), Vec::new())),
+                (Some(_), Some(block)) => blocks.push(block),
+                (None, Some((kind, mut lines))) => {
+                    lines.push(line);
+                    open = Some((kind, lines));
+                }
+                (None, None) => {}
+            }
+        }
+        blocks
+    }
+
+    #[test]
+    fn every_program_of_a_page_is_run_and_asserts() {
+        let (here, errors) = (include_str!("book.rs"), include_str!("error.rs"));
+        let mut programs = 0;
+        for (page, text) in pages() {
+            let rust: Vec<_> = blocks(&text).into_iter().filter(|(kind, _)| kind.starts_with("rust")).collect();
+            let is_run = here.contains(&format!("= \"{page}\";")) || errors.contains(&format!("\"../{page}\""));
+            assert!(rust.is_empty() || is_run, "{page} has Rust that nothing compiles: add it to src/book.rs");
+            for (kind, lines) in rust {
+                assert_eq!(kind, "rust", "{page}: a program that is not compiled and run");
+                assert!(lines.iter().any(|line| line.contains("assert")), "{page} shows a program that cannot fail");
+                programs += 1;
+            }
+        }
+        assert!(programs > 20);
+    }
+
+    /// What is not marked as text would be compiled as Rust on the pages that are.
+    #[test]
+    fn blocks_of_pages_say_what_they_are() {
+        let here = include_str!("book.rs");
+        for (page, text) in pages().iter().filter(|(page, _)| here.contains(&format!("= \"{page}\";"))) {
+            assert!(blocks(text).iter().all(|(kind, _)| !kind.is_empty()), "{page}");
+        }
+    }
+
+    #[test]
+    fn tutorials_are_short() {
+        let mut tutorials = 0;
+        for (page, text) in pages().iter().filter(|(page, _)| page.starts_with("docs/tutorials/")) {
+            for (_, lines) in blocks(text).iter().filter(|(kind, _)| kind == "rust") {
+                assert!(lines.len() < 60, "{page}: {} lines", lines.len());
+                assert!(!lines.iter().any(|line| line.starts_with("# ")), "{page} hides lines");
+                tutorials += 1;
+            }
+        }
+        assert!(tutorials >= 8);
+    }
+}
