@@ -176,7 +176,8 @@ fn bars(elements: usize) -> Scene {
     let size = LENGTH / elements as f64;
     let (k, m) = (AXIAL / size, LINE_MASS * size);
     let nodes = elements + 1;
-    let mass: Vec<_> = (0..2 * nodes).map(|dof| if dof % nodes % elements == 0 { m / 2.0 } else { m }).collect();
+    let is_end = |dof: usize| [0, elements].contains(&(dof % nodes));
+    let mass: Vec<_> = (0..2 * nodes).map(|dof| if is_end(dof) { m / 2.0 } else { m }).collect();
     let exact = CollidingBars::new(end_bar(SPEED), end_bar(-SPEED), 2.0 * GAP, 1.0).expect("the data are positive");
     Scene {
         files: vec![

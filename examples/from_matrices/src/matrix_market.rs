@@ -40,7 +40,7 @@ pub(crate) struct MatrixFile {
 impl MatrixFile {
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|error| Refusal::of(path, format!("cannot be opened: {error}")))?;
-        let mut lines = Lines { path, number: 0, lines: BufReader::new(file).lines() };
+        let mut lines = Lines { path, number: 0, rest: BufReader::new(file).lines() };
         let (layout, triangles) = header(&mut lines)?;
         let sizes = lines.numbers("the line of sizes")?;
         let (rows, columns, stored) = match (layout, &sizes[..]) {
@@ -210,14 +210,14 @@ fn value(lines: &Lines<'_>, word: &str) -> Result<f64> {
 struct Lines<'a> {
     path: &'a Path,
     number: u64,
-    lines: std::io::Lines<BufReader<File>>,
+    rest: std::io::Lines<BufReader<File>>,
 }
 
 impl Lines<'_> {
     /// The next line as it is; none at the end.
     fn raw(&mut self) -> Result<Option<String>> {
         self.number += 1;
-        let line = self.lines.next().transpose();
+        let line = self.rest.next().transpose();
         line.map_err(|error| self.refused(format!("cannot be read as text: {error}")))
     }
 

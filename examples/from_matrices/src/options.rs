@@ -54,7 +54,7 @@ pub struct Options {
     /// Table of fixed dofs: dof.
     #[arg(long, value_name = "FILE", requires = "mass")]
     pub supports: Option<PathBuf>,
-    /// Sum the rows of M up to a lumped mass, as explicit schemes like it.
+    /// Lump M by its row sums, for explicit schemes.
     #[arg(long, requires = "mass")]
     pub lump: bool,
     #[arg(long, value_name = "NAME", default_value = "chung-hulbert", help = schemes::scheme_help())]

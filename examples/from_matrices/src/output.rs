@@ -203,7 +203,8 @@ impl Display for Summary {
             ("corrections at impact", works.corrections),
             ("the scheme itself", works.remainder),
         ] {
-            if work != 0.0 {
+            // (What is left is rounding.)
+            if work.abs() > 1e-12 * start.total().abs().max(end.total().abs()) {
                 writeln!(f, "  {name}: {work:+.3e}")?;
             }
         }

@@ -1,6 +1,6 @@
 //! A run from files to files.
 
-use crate::contacts;
+use crate::contacts::{self, Contact};
 use crate::model::Model;
 use crate::options::{Options, Overlap, recorded};
 use crate::output::{Peak, Sheets, Summary};
@@ -35,15 +35,7 @@ pub fn run(options: &Options) -> Result<Summary> {
     let mut model = Model::read(options)?;
     let (dofs, is_unsymmetric) = (model.dofs(), model.is_unsymmetric);
     let table = std::mem::take(&mut model.contacts);
-    let recorded = match &options.record {
-        Some(text) => recorded(text, dofs)?,
-        None => {
-            let mut own: Vec<_> = table.iter().flat_map(|contact| contact.dofs.iter().copied()).collect();
-            own.sort_unstable();
-            own.dedup();
-            own
-        }
-    };
+    let recorded = options.record.as_ref().map_or_else(|| Ok(own_dofs(&table)), |text| recorded(text, dofs))?;
     let path = options.contacts.as_deref().unwrap_or(Path::new("the table of contacts"));
     let explain = |error: contact_dynamics::Error| {
         Refusal::by_crate(&error, |index| table.get(index).map(|contact| contact.place(path)))
@@ -105,6 +97,14 @@ pub fn run(options: &Options) -> Result<Summary> {
         directory: options.output.clone(),
         forces: watch.forces,
     })
+}
+
+/// The dofs of the contacts' nodes.
+fn own_dofs(table: &[Contact]) -> Vec<usize> {
+    let mut own: Vec<_> = table.iter().flat_map(|contact| contact.dofs.iter().copied()).collect();
+    own.sort_unstable();
+    own.dedup();
+    own
 }
 
 /// What is counted while a run goes on.

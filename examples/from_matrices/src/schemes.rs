@@ -16,6 +16,9 @@ type Make = fn(&[f64]) -> contact_dynamics::Result<Scheme>;
 /// Name, parameters with their defaults, constructor.
 type Named = (&'static str, &'static [(&'static str, f64)], Make);
 
+/// Name, constructor.
+type NamedCorrection = (&'static str, fn() -> Option<Correctors>);
+
 fn boxed(scheme: impl TimeIntegrator + 'static) -> Scheme {
     Box::new(scheme)
 }
@@ -44,7 +47,7 @@ const SCHEMES: &[Named] = &[
 ];
 
 /// None where the crate chooses.
-const CORRECTIONS: &[(&str, fn() -> Option<Correctors>)] = &[
+const CORRECTIONS: &[NamedCorrection] = &[
     ("default", || None),
     ("none", || Some(Vec::new())),
     ("persistency", || Some(vec![Box::new(PersistencyCorrection::new())])),
@@ -83,13 +86,11 @@ pub(crate) fn scheme(text: &str) -> Result<Scheme> {
 
 /// Correctors by name; none where the crate chooses.
 pub(crate) fn correctors(name: &str) -> Result<Option<Correctors>> {
-    match CORRECTIONS.iter().find(|correction| correction.0 == name) {
-        Some((_, make)) => Ok(make()),
-        None => {
-            let names: Vec<_> = CORRECTIONS.iter().map(|correction| correction.0).collect();
-            Err(Refusal::new(format!("there is no correction `{name}`; the names are {}", names.join(", "))))
-        }
+    if let Some((_, make)) = CORRECTIONS.iter().find(|correction| correction.0 == name) {
+        return Ok(make());
     }
+    let names: Vec<_> = CORRECTIONS.iter().map(|correction| correction.0).collect();
+    Err(Refusal::new(format!("there is no correction `{name}`; the names are {}", names.join(", "))))
 }
 
 /// A scheme as it is written with its defaults.
