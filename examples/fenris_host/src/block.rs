@@ -51,8 +51,8 @@ pub(crate) fn report(cells: usize) -> Outcome<String> {
     let [end, landings, drift] = energies;
     writeln!(
         text,
-        "  energy: {end:.4} of the start is left; steps in which contacts close or open change it by {landings:+.4}, all \
-         others by {drift:.0e} at most"
+        "  energy: {end:.4} of the start is left; steps in which contacts close or open change it by {landings:+.4},\n  \
+         all others by {drift:.0e} at most"
     )?;
     Ok(text)
 }

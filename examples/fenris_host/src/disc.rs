@@ -47,7 +47,8 @@ pub(crate) fn report(cells: usize) -> Outcome<String> {
     let [end, rubbed, corrected, scheme] = energies;
     writeln!(
         text,
-        "  energy: {end:.4} of the start is left; friction {rubbed:+.4}, corrections {corrected:+.4}, scheme {scheme:+.4}"
+        "  energy: {end:.4} of the start is left; \
+         friction {rubbed:+.4}, corrections {corrected:+.0e}, scheme {scheme:+.0e}"
     )?;
     Ok(text)
 }

@@ -50,8 +50,8 @@ pub(crate) struct Figures {
 pub(crate) fn report(across: usize) -> Outcome<String> {
     let (body, wall) = slab(across)?;
     let mut text = format!(
-        "Slab: {} dofs, {} nodes at the wall\n\n| scheme, mass and correction | force RMS | max F/F0 | momentum | E end/start \
-         |\n| --- | --- | --- | --- | --- |\n",
+        "Slab: {} dofs, {} nodes at the wall\n\n| scheme, mass and correction | force RMS | max F/F0 | momentum \
+         | E end/start |\n| --- | --- | --- | --- | --- |\n",
         body.mass.nrows(),
         wall.len(),
     );
