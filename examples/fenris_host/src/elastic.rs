@@ -62,3 +62,38 @@ impl Body {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_dynamics_scenes::solids;
+    use fenris::mesh::procedural::create_rectangular_uniform_quad_mesh_2d;
+    use fenris::nalgebra::Vector2;
+
+    /// The largest difference of two matrices over the largest entry.
+    fn difference(one: &SparseColMat<usize, f64>, other: &SparseColMat<usize, f64>) -> f64 {
+        let (one, other) = (one.to_dense(), other.to_dense());
+        (&one - &other).norm_max() / one.norm_max()
+    }
+
+    /// Two codes that know nothing of each other assemble the same matrices on a distorted mesh.
+    #[test]
+    fn matrices_are_those_of_another_code() {
+        let material = Material { young: 3.0, poisson: 0.3, density: 0.7 };
+        let mut mesh = create_rectangular_uniform_quad_mesh_2d(1.0, 2, 1, 3, &Vector2::new(0.0, 1.0));
+        mesh.transform_vertices(|vertex| {
+            let (x, y): (f64, f64) = (vertex.x, vertex.y);
+            vertex.x += 0.1 * (3.0 * y).sin();
+            vertex.y += 0.1 * (2.0 * x).cos() * y;
+        });
+        let body = Body::new(&mesh, material).unwrap();
+        let Material { young, poisson, density } = material;
+        let other = solids::Solid::<2> {
+            nodes: body.nodes.clone(),
+            elements: mesh.connectivity().iter().map(|quad| quad.0.to_vec()).collect(),
+            material: solids::Material { young, poisson, density },
+        };
+        assert!(difference(&body.stiffness, &other.stiffness()) < 1e-13);
+        assert!(difference(&body.mass, &other.consistent_mass()) < 1e-13);
+    }
+}
