@@ -1,0 +1,25 @@
+//! Pounding: two frames of different periods, a gap, one earthquake, and nine ways to let them collide.
+//!
+//! `cargo run --release --example pounding` prints the tables of `docs/scenes/pounding.md` and writes them and a figure
+//! (`pounding.svg`); with `--quick` the ground shakes for two seconds, and references are coarse.
+//!
+//! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, and their errors by
+//! the step.
+
+mod models;
+mod tables;
+
+use contact_dynamics_scenes::output::Output;
+use std::error::Error;
+use std::fmt::Write;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let output = Output::from_command_line("pounding")?;
+    let study = tables::Study::new(output.quick);
+    let mut page = String::new();
+    for table in study.tables()? {
+        println!("{table}");
+        writeln!(page, "{table}")?;
+    }
+    output.write("pounding.md", &page)
+}
