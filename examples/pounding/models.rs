@@ -4,8 +4,9 @@ use contact_dynamics::{
     ContactLaw, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result, TimeIntegrator,
 };
 use contact_dynamics_scenes::damped_contact::DampedLaw;
-use contact_dynamics_scenes::frames::{Frames, Pounding, Record};
+use contact_dynamics_scenes::frames::Frames;
 use contact_dynamics_scenes::ground::Ground;
+use contact_dynamics_scenes::pounding::{Pounding, Record};
 use std::sync::Arc;
 
 /// The coefficient of restitution of the models that have one.
@@ -41,7 +42,7 @@ impl Scheme {
         }
     }
 
-    fn parts(self) -> Result<(Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>)> {
+    pub(crate) fn parts(self) -> Result<(Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>)> {
         let correction = || -> Vec<Box<dyn Corrector<f64>>> { vec![Box::new(PersistencyCorrection::new())] };
         Ok(match self {
             Self::Trapezoidal => (Box::new(Newmark::trapezoidal()), Vec::new()),

@@ -5,6 +5,7 @@ use crate::models::{self, Model};
 use contact_dynamics::Result;
 use contact_dynamics_scenes::frames::{Figures, Frames};
 use contact_dynamics_scenes::ground::{GRAVITY, Ground};
+use contact_dynamics_scenes::pounding::{Impacts, Pounding};
 use contact_dynamics_scenes::tables::decimal;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -39,7 +40,7 @@ impl Study {
     }
 
     pub(crate) fn figures(&self, model: &Model, h: f64) -> Result<Figures> {
-        Ok(model.run(&self.frames, &self.ground, h, self.until)?.figures(&self.frames))
+        Ok(self.frames.figures(&model.run(&self.frames, &self.ground, h, self.until)?))
     }
 
     /// All models at the finest step.
@@ -54,11 +55,11 @@ impl Study {
         text.extend((1..=left).map(|storey| format!(" L{storey} |")));
         text.extend((1..=right).map(|storey| format!(" R{storey} |")));
         let _ = writeln!(text, "\n|{}", " --- |".repeat(8 + left + right));
-        let none = Model { name: "no contact", pounding: contact_dynamics_scenes::frames::Pounding::None, ..models[2] };
+        let none = Model { name: "no contact", pounding: Pounding::None, ..models[2] };
         let alone = self.figures(&none, self.fine)?;
         for (model, figures) in models.iter().zip(references).chain([(&none, &alone)]) {
-            let Figures { impacts, force, impulse, hardest, toward, drifts, .. } = figures;
-            let _ = write!(text, "| {} | {} | {impacts} |", model.name, model.scheme.name());
+            let Figures { impacts: Impacts { count, force, impulse, hardest }, toward, drifts, .. } = figures;
+            let _ = write!(text, "| {} | {} | {count} |", model.name, model.scheme.name());
             let numbers = [1e-6 * force, 1e-6 * hardest, 1e-6 * impulse];
             text.extend(numbers.map(|x| format!(" {} |", decimal(x, 2))));
             text.extend(toward.iter().chain(drifts).map(|x| format!(" {} |", decimal(1e3 * x, 1))));
@@ -91,9 +92,9 @@ impl Study {
                     model.name,
                     model.scheme.name(),
                     1e3 * h,
-                    figures.impacts,
-                    decimal(error(figures.force, reference.force), 1),
-                    decimal(error(figures.impulse, reference.impulse), 1),
+                    figures.impacts.count,
+                    decimal(error(figures.impacts.force, reference.impacts.force), 1),
+                    decimal(error(figures.impacts.impulse, reference.impacts.impulse), 1),
                     decimal(worst, 1),
                     decimal(1e6 * figures.seconds, 2)
                 );

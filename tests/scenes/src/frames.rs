@@ -1,12 +1,11 @@
-//! Pounding: two shear frames of different periods side by side under one ground motion, under any contact law.
+//! Two shear frames of different periods side by side, which pound against each other in an earthquake.
 
-use crate::damped_contact::{DampedContact, DampedLaw};
 use crate::ground::Ground;
+use crate::pounding::{Impacts, Pounding, Record, Scene};
 use crate::sparse::{Entry, matrix, spring};
-use contact_dynamics::{ContactLaw, Corrector, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator};
+use contact_dynamics::{Corrector, LinearSystem, Result, TimeIntegrator};
 use std::f64::consts::PI;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// A shear frame: equal rigid floors on equal storeys.
 #[derive(Clone, Copy, Debug)]
@@ -36,8 +35,8 @@ impl Frame {
         (1..=self.storeys).map(|floor| (angle * floor as f64).sin()).collect()
     }
 
-    /// Rayleigh's coefficients for a damping ratio in the first two modes.
-    fn rayleigh(&self, ratio: f64) -> [f64; 2] {
+    /// Rayleigh's coefficients, of M and of K, for a damping ratio in the first two modes.
+    pub fn rayleigh(&self, ratio: f64) -> [f64; 2] {
         let [first, second] = [self.frequency(1), self.frequency(self.storeys.min(2))];
         match self.storeys {
             1 => [0.0, 2.0 * ratio / first],
@@ -51,17 +50,6 @@ impl Frame {
         let above = (1..n).flat_map(move |floor| spring(first + floor - 1, first + floor, k));
         std::iter::once((first, first, k)).chain(above)
     }
-}
-
-/// How floors at one level meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pounding {
-    /// Never: the frames pass through each other.
-    None,
-    /// A law of the crate.
-    Law(ContactLaw),
-    /// A compliant law with damping.
-    Damped(DampedLaw),
 }
 
 /// Two frames with a gap between their floors; their displacements are relative to the ground.
@@ -141,78 +129,17 @@ impl Frames {
         h: f64,
         until: f64,
     ) -> Result<Record> {
-        let (system, pairs) = (self.system(ground.clone())?, self.pairs());
-        let gap = self.gap;
-        match pounding {
-            Pounding::Damped(law) => {
-                let pairs: Vec<_> = pairs.into_iter().map(|dofs| (dofs, gap)).collect();
-                let mut system = DampedContact::new(system, law, &pairs)?;
-                let mut record = self.recorded(Simulation::builder(&mut system, scheme, h).build()?, h, until)?;
-                record.forces = system.history().to_vec();
-                let before = std::iter::repeat_n(&0.0, pairs.len()).chain(&record.forces);
-                record.impulses = before.zip(&record.forces).map(|(a, b)| 0.5 * h * (a + b)).collect();
-                Ok(record)
-            }
-            Pounding::Law(law) => {
-                let row = |rows: LinearRows<'static, f64>, [i, j]: [usize; 2]| {
-                    rows.row(law, &[(i, -1.0), (j, 1.0)], gap)
-                };
-                let rows = pairs.into_iter().fold(LinearRows::new(), row);
-                let builder = Simulation::builder(system, scheme, h).constraint(rows).correctors(correctors);
-                self.recorded(builder.build()?, h, until)
-            }
-            Pounding::None => self.recorded(Simulation::builder(system, scheme, h).build()?, h, until),
-        }
-    }
-
-    fn recorded(&self, mut run: Simulation<'_, f64>, h: f64, until: f64) -> Result<Record> {
-        let steps = (until / h).round() as usize;
-        let (dofs, pairs) = (self.dofs(), self.pairs().len());
-        let mut record = Record { h, dofs, pairs, ..Record::default() };
-        record.displacements.reserve(steps * dofs);
-        let start = Instant::now();
-        for _ in 0..steps {
-            run.step()?;
-            let state = run.state();
-            record.displacements.extend_from_slice(state.displacement());
-            record.forces.extend_from_slice(state.contacts().forces());
-            record.impulses.extend_from_slice(state.contacts().impulses());
-        }
-        record.seconds = start.elapsed().as_secs_f64() / steps as f64;
-        Ok(record)
-    }
-}
-
-/// What a run leaves: the states of its steps one after the other.
-#[derive(Clone, Debug, Default)]
-pub struct Record {
-    pub h: f64,
-    /// Seconds a step.
-    pub seconds: f64,
-    dofs: usize,
-    pairs: usize,
-    displacements: Vec<f64>,
-    forces: Vec<f64>,
-    impulses: Vec<f64>,
-}
-
-impl Record {
-    /// Times and displacements.
-    pub fn displacements(&self) -> impl Iterator<Item = (f64, &[f64])> {
-        self.displacements.chunks_exact(self.dofs).zip(1..).map(|(u, step)| (f64::from(step) * self.h, u))
-    }
-
-    /// Times and forces of the contacts, from the lowest level on.
-    pub fn forces(&self) -> impl Iterator<Item = (f64, &[f64])> {
-        self.forces.chunks_exact(self.pairs).zip(1..).map(|(force, step)| (f64::from(step) * self.h, force))
+        let pairs = self.pairs().into_iter().map(|dofs| (dofs, self.gap)).collect();
+        Scene { system: self.system(ground.clone())?, pairs }.run(pounding, scheme, correctors, h, until)
     }
 
     /// What is compared of a run.
-    pub fn figures(&self, frames: &Frames) -> Figures {
-        let mut figures = Figures { drifts: vec![0.0; self.dofs], seconds: self.seconds, ..Figures::default() };
-        let first_right = frames.frames[0].storeys;
-        let top = frames.pairs().last().copied().unwrap_or_default();
-        for (_, u) in self.displacements() {
+    pub fn figures(&self, record: &Record) -> Figures {
+        let mut figures =
+            Figures { impacts: record.impacts(), toward: [0.0; 2], drifts: vec![0.0; self.dofs()], seconds: record.seconds };
+        let first_right = self.frames[0].storeys;
+        let top = self.pairs().last().copied().unwrap_or_default();
+        for (_, u) in record.displacements() {
             for (floor, drift) in figures.drifts.iter_mut().enumerate() {
                 let below = if floor == 0 || floor == first_right { 0.0 } else { u[floor - 1] };
                 *drift = drift.max((u[floor] - below).abs());
@@ -220,31 +147,14 @@ impl Record {
             let toward = [u[top[0]], -u[top[1]]];
             figures.toward = [0, 1].map(|side| figures.toward[side].max(toward[side]));
         }
-        figures.force = self.forces.iter().fold(0.0, |peak, &force| force.max(peak));
-        figures.impulse = self.impulses.iter().sum();
-        // An impact is a run of steps with impulses.
-        for pair in 0..self.pairs {
-            let mut own = 0.0;
-            for &impulse in self.impulses.iter().skip(pair).step_by(self.pairs) {
-                figures.impacts += usize::from(own == 0.0 && impulse > 0.0);
-                own = if impulse > 0.0 { own + impulse } else { 0.0 };
-                figures.hardest = figures.hardest.max(own);
-            }
-        }
         figures
     }
 }
 
 /// What is compared of runs.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Figures {
-    /// Runs of steps in which a pair pushes, of all pairs.
-    pub impacts: usize,
-    /// Largest contact force of a pair.
-    pub force: f64,
-    /// Sum of the impulses of all pairs, and the largest one of an impact.
-    pub impulse: f64,
-    pub hardest: f64,
+    pub impacts: Impacts,
     /// Largest displacement toward the other frame, of either at the highest level where they meet.
     pub toward: [f64; 2],
     /// Largest drift of each storey.

@@ -30,7 +30,7 @@ impl Ground {
         const HIGHEST: f64 = 80.0 * PI;
         let (width, mut random) = (HIGHEST / WAVES as f64, Congruential(seed));
         // (The first numbers of the generator are close to its seed.)
-        (0..16).for_each(|_| drop(random.unit()));
+        random.vector(16, 1.0);
         let waves: Vec<_> = (0..WAVES)
             .map(|k| {
                 let omega = (k as f64 + 0.5) * width;
