@@ -3,9 +3,11 @@
 //! `cargo run --release --example pounding` prints the tables of `docs/scenes/pounding.md` and writes them and a figure
 //! (`pounding.svg`); with `--quick` the ground shakes for two seconds, and references are coarse.
 //!
-//! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, and their errors by
-//! the step.
+//! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, their errors by the step,
+//! and what the stiffness of a contact does; `decks.rs` two bridge decks; `figure.rs` the figure.
 
+mod decks;
+mod figure;
 mod models;
 mod tables;
 
@@ -17,9 +19,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("pounding")?;
     let study = tables::Study::new(output.quick);
     let mut page = String::new();
-    for table in study.tables()? {
+    for table in study.tables()?.into_iter().chain([decks::Bridge::new(output.quick).table()?]) {
         println!("{table}");
         writeln!(page, "{table}")?;
     }
-    output.write("pounding.md", &page)
+    output.write("pounding.md", &page)?;
+    output.write("pounding.svg", &figure::figure(&study)?)
 }

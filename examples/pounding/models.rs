@@ -60,6 +60,12 @@ impl Model {
     }
 }
 
+/// A linear spring between floors.
+pub(crate) fn linear(stiffness: f64) -> Model {
+    let pounding = Pounding::Law(ContactLaw::Penalty { stiffness });
+    Model { name: "linear spring", scheme: Scheme::Trapezoidal, pounding }
+}
+
 /// Kelvin and Voigt's law with this stiffness between floors of two frames.
 pub(crate) fn kelvin_voigt(frames: &Frames, stiffness: f64) -> Model {
     let masses = frames.frames.map(|frame| frame.mass);
@@ -74,7 +80,7 @@ pub(crate) fn kelvin_voigt(frames: &Frames, stiffness: f64) -> Model {
 pub(crate) fn all(frames: &Frames) -> Vec<Model> {
     let model = |name, scheme, pounding| Model { name, scheme, pounding };
     let rigid = Pounding::Law(ContactLaw::Rigid);
-    let [linear, hertz] = STIFFNESS;
+    let [stiffness, hertz] = STIFFNESS;
     vec![
         model("rigid", Scheme::TrapezoidalCorrected, rigid),
         model("rigid", Scheme::ChungHulbertCorrected, rigid),
@@ -85,8 +91,8 @@ pub(crate) fn all(frames: &Frames) -> Vec<Model> {
             Scheme::MoreauJean,
             Pounding::Law(ContactLaw::Restitution { coefficient: RESTITUTION }),
         ),
-        model("linear spring", Scheme::Trapezoidal, Pounding::Law(ContactLaw::Penalty { stiffness: linear })),
-        kelvin_voigt(frames, linear),
+        linear(stiffness),
+        kelvin_voigt(frames, stiffness),
         model(
             "Hertz",
             Scheme::Trapezoidal,

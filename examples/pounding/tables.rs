@@ -36,7 +36,7 @@ impl Study {
         let models = models::all(&self.frames);
         let references: Result<Vec<_>> = models.iter().map(|model| self.figures(model, self.fine)).collect();
         let references = references?;
-        Ok(vec![self.references(&models, &references)?, self.errors(&models, &references)?])
+        Ok(vec![self.references(&models, &references)?, self.errors(&models, &references)?, self.stiffnesses()?])
     }
 
     pub(crate) fn figures(&self, model: &Model, h: f64) -> Result<Figures> {
@@ -98,6 +98,32 @@ impl Study {
                     decimal(worst, 1),
                     decimal(1e6 * figures.seconds, 2)
                 );
+            }
+        }
+        Ok(text)
+    }
+
+    /// What the stiffness of the contact does to its figures.
+    fn stiffnesses(&self) -> Result<String> {
+        let mut text = format!(
+            "Linear spring, and Kelvin–Voigt with e = 0.65, by stiffness, h = {} ms: impacts, peak force (MN), hardest \
+             impact and sum of impulses (MN s), largest drift of each frame (mm)\n\n| stiffness MN/m | model | impacts \
+             | force | hardest | impulses | left | right |\n|{}\n",
+            1e3 * self.fine,
+            " --- |".repeat(8)
+        );
+        let storeys = self.frames.frames[0].storeys;
+        for factor in [0.1, 1.0, 10.0, 100.0] {
+            let stiffness = factor * models::STIFFNESS[0];
+            for model in [models::linear(stiffness), models::kelvin_voigt(&self.frames, stiffness)] {
+                let Figures { impacts: Impacts { count, force, impulse, hardest }, drifts, .. } =
+                    self.figures(&model, self.fine)?;
+                let numbers = [force, hardest, impulse].map(|x| decimal(1e-6 * x, 2)).join(" | ");
+                let (left, right) = drifts.split_at(storeys);
+                let largest =
+                    [left, right].map(|drifts| decimal(1e3 * drifts.iter().copied().fold(0.0, f64::max), 1)).join(" | ");
+                let (stiffness, name) = (1e-6 * stiffness, model.name);
+                let _ = writeln!(text, "| {stiffness} | {name} | {count} | {numbers} | {largest} |");
             }
         }
         Ok(text)

@@ -2,7 +2,7 @@
 //! methods that a host writes. (The contact laws of the crate know gaps, not their rates.)
 
 use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
-use contact_dynamics::{Error, LinearSystem, Mass, Result, System, TangentWeights};
+use contact_dynamics::{DampingForce, Error, LinearSystem, Mass, Result, System, TangentWeights};
 use std::f64::consts::PI;
 
 /// The force of a contact by its depth δ and the rate of that; none where it would pull.
@@ -89,11 +89,11 @@ pub fn restitution_without_pull(ratio: f64) -> f64 {
 pub fn restitution_of_hertz_damp(nominal: f64) -> f64 {
     let d = 0.75 * (1.0 - nominal * nominal);
     let miss = |e: f64| (1.0 + d).ln() - (1.0 - d * e).ln() - d * (1.0 + e);
-    // (The difference rises with e′ from below zero; at 1 it is positive.)
+    // (The difference rises with e′ from below zero; at 1 it is positive. It is zero throughout without damping.)
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if miss(middle) < 0.0 { low = middle } else { high = middle }
+        if miss(middle) <= 0.0 { low = middle } else { high = middle }
     }
     low
 }
@@ -198,6 +198,10 @@ impl System<f64> for DampedContact<'_> {
         Ok(())
     }
 
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
+        Some(self)
+    }
+
     fn external_load(&mut self, t: f64, out: &mut [f64]) -> Result<()> {
         self.linear.external_load(t, out)
     }
@@ -210,6 +214,21 @@ impl System<f64> for DampedContact<'_> {
             if !pair.closed {
                 pair.approach = pair.rate(v);
             }
+        }
+        Ok(())
+    }
+}
+
+impl DampingForce<f64> for DampedContact<'_> {
+    fn evaluate(&mut self, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        match self.linear.damping_force() {
+            Some(damping) => damping.evaluate(u, v, out)?,
+            None => out.fill(0.0),
+        }
+        for pair in &self.pairs {
+            let [moving, still] = [pair.rate(v), 0.0].map(|rate| self.law.force(pair.depth(u), rate, pair)[0]);
+            out[pair.dofs[0]] += moving - still;
+            out[pair.dofs[1]] -= moving - still;
         }
         Ok(())
     }

@@ -7,6 +7,7 @@
 //! soft string does.
 
 use crate::sparse::{Entry, matrix};
+use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{
     Corrector, LinearRows, LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator,
 };
@@ -165,8 +166,13 @@ impl Rod {
         (0..2 * DOFS).flat_map(|i| (0..2 * DOFS).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
     }
 
+    /// K.
+    pub fn stiffness(&self) -> SparseColMat<usize, f64> {
+        matrix(self.dofs(), (0..self.elements).flat_map(|e| self.element(e)))
+    }
+
     /// Lumped masses; a rotation has that of a stiff piece of half an element to either side.
-    fn masses(&self) -> Vec<f64> {
+    pub fn masses(&self) -> Vec<f64> {
         let of = |node: usize| {
             let mass = self.density * self.share(node);
             [mass, mass, mass * self.size().powi(2) / 12.0]
@@ -203,13 +209,11 @@ impl Rod {
         onset: f64,
         hoist: impl Fn(f64) -> [f64; 3] + Send + 'static,
     ) -> Result<SimulationBuilder<'static, f64>> {
-        let stiffness = matrix(self.dofs(), (0..self.elements).flat_map(|e| self.element(e)));
         let (rod, last) = (*self, self.elements);
-        let [top, side] = self.directions(0);
+        let [top, _] = self.directions(0);
         // The top is vertical or horizontal: one dof is that along the well.
         let (driven, fixed) = if top[1].abs() > 0.5 { (1, 0) } else { (0, 1) };
-        let _ = side;
-        let system = LinearSystem::lumped(self.masses(), stiffness)?
+        let system = LinearSystem::lumped(self.masses(), self.stiffness())?
             .load(move |t, force| {
                 let part = if onset > 0.0 { (t / onset).min(1.0) } else { 1.0 };
                 force.fill(0.0);

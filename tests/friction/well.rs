@@ -1,0 +1,114 @@
+//! A rod in a curved well: torque and drag against the soft string, and the front of axial waves that friction stops.
+
+use contact_dynamics::{ContactStatus, Corrector, GeneralizedAlpha, Newmark, PersistencyCorrection};
+use contact_dynamics_scenes::well::{Rod, Well, arc_tension, ramp};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
+
+fn correction() -> Vec<Box<dyn Corrector<f64>>> {
+    vec![Box::new(PersistencyCorrection::with_history_projection())]
+}
+
+/// The pull of the hook, mean over the last tenth of a run, with the top moved at a constant velocity.
+fn steady_hook(rod: &Rod, velocity: f64, h: f64, until: f64) -> f64 {
+    let scheme = Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap());
+    let mut run = rod.run(scheme, correction(), h, 0.5, ramp(velocity, 0.5)).unwrap();
+    let (mut sum, mut count) = (0.0, 0);
+    while run.time() < until {
+        run.step().unwrap();
+        if run.time() > 0.9 * until {
+            sum += rod.hook_load(&mut run).unwrap();
+            count += 1;
+        }
+    }
+    // Nothing sticks once all of it moves.
+    let contacts = run.state().contacts();
+    let sticking = (0..contacts.gaps().len()).filter(|&k| contacts.status(k) == ContactStatus::Sticking).count();
+    assert_eq!(sticking, 0);
+    sum / f64::from(count)
+}
+
+/// A rope around a quarter of a circle, without weight.
+#[test]
+fn a_weightless_rod_on_an_arc_is_a_rope_on_a_capstan() {
+    let well = Well { kick_off: 0.0, radius: 100.0, inclination: [0.0, FRAC_PI_2] };
+    let rod = Rod {
+        well,
+        length: well.end_of_arc(),
+        elements: 40,
+        stretching: 7e8,
+        bending: 1e4,
+        density: 29.0,
+        weight: 0.0,
+        friction: 0.3,
+        play: 0.02,
+        tail: 1e5,
+    };
+    for (velocity, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
+        let exact = rod.tail * (sign * rod.friction * FRAC_PI_2).exp();
+        assert!((exact / arc_tension(sign * rod.friction, 0.0, 100.0, [rod.tail, FRAC_PI_2], 0.0) - 1.0).abs() < 1e-12);
+        let found = steady_hook(&rod, velocity, 1e-3, 2.0);
+        assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
+    }
+}
+
+/// A heavy rod on the high side of an arc, with a closed form, and a well of three parts, with the soft string.
+#[test]
+fn the_hook_load_of_a_rod_that_moves_is_that_of_the_soft_string() {
+    let mut arc = Rod::drill_pipe(60);
+    arc.well.kick_off = 0.0;
+    arc.length = arc.well.end_of_arc();
+    arc.tail = 3e5;
+    let exact = arc_tension(arc.friction, arc.weight, arc.well.radius, [arc.tail, FRAC_PI_3], 0.0);
+    assert!((arc.soft_string(1.0, 2)[0][1] / exact - 1.0).abs() < 1e-9);
+    let found = steady_hook(&arc, 1.0, 2e-3, 3.0);
+    assert!((found / exact - 1.0).abs() < 5e-3, "{found} {exact}");
+    let whole = Rod::drill_pipe(80);
+    for (velocity, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
+        let exact = whole.soft_string(sign, 2)[0][1];
+        let found = steady_hook(&whole, velocity, 4e-3, 6.0);
+        assert!((found / exact - 1.0).abs() < 1e-2, "{velocity}: {found} {exact}");
+    }
+}
+
+/// A straight rod on a level bed, its end pulled with V from t = 0 on: the front runs with c, behind it the velocity is
+/// V − q x/(2 ρA c), so that friction q = μ w stops the front at 2 ρA c V/q; until then the hook pulls with ρA c V + q c
+/// t/2 (d'Alembert with a constant load behind the front).
+#[test]
+fn friction_stops_the_front_of_a_wave() {
+    let well = Well { kick_off: 0.0, radius: 1e3, inclination: [FRAC_PI_2, FRAC_PI_2] };
+    let rod = Rod { well, length: 1500.0, friction: 0.5, ..Rod::drill_pipe(300) };
+    let (c, q, v) = (rod.wave_speed(), rod.friction * rod.weight, 0.4);
+    let impedance = rod.density * c;
+    let (start, stop) = (0.5, 2.0 * impedance * v / q);
+    assert!((800.0..1200.0).contains(&stop), "{stop}");
+    // (The weight is on before the pull begins: the support is at rest until then.)
+    let hoist = move |t: f64| if t > start { [v * (t - start), v, 0.0] } else { [0.0; 3] };
+    let mut run = rod.run(Box::new(Newmark::trapezoidal()), correction(), 5e-4, 0.2, hoist).unwrap();
+    run.run_until(start, &mut ()).unwrap();
+    let passed = 0.5 * stop / c;
+    run.run_until(start + passed, &mut ()).unwrap();
+    let u = run.state().displacement().to_vec();
+    // Where the front is: the last node that has moved by a hundredth of what the top has.
+    let front = (0..=rod.elements).rev().find(|&node| -rod.way(node, &u) > 0.01 * v * passed).unwrap();
+    assert!((rod.depth(front) / (c * passed) - 1.0).abs() < 0.03, "{} {}", rod.depth(front), c * passed);
+    let v_now = run.state().velocity().to_vec();
+    for part in [0.25, 0.5, 0.75] {
+        let node = (part * c * passed / rod.size()).round() as usize;
+        let exact = v - q * rod.depth(node) / (2.0 * impedance);
+        // (Waves of the mesh ring behind the front: the mean of some nodes.)
+        let mean = (node - 4..=node + 4).map(|node| -rod.way(node, &v_now)).sum::<f64>() / 9.0;
+        assert!((mean / exact - 1.0).abs() < 0.05, "{part}: {mean} {exact}");
+    }
+    let mut mean = 0.0;
+    for _ in 0..40 {
+        run.step().unwrap();
+        mean += rod.hook_load(&mut run).unwrap() / 40.0;
+    }
+    let exact = impedance * v + 0.5 * q * c * (run.time() - start - 20.0 * 5e-4);
+    assert!((mean / exact - 1.0).abs() < 0.02, "{mean} {exact}");
+    // What lies beyond where it stops has not moved when the wave could have been there.
+    run.run_until(start + 1.05 * stop / c, &mut ()).unwrap();
+    let beyond = (1.1 * stop / rod.size()).ceil() as usize;
+    let u = run.state().displacement();
+    assert!((beyond..=rod.elements).all(|node| rod.way(node, u).abs() < 1e-3 * v * stop / c));
+}
