@@ -80,24 +80,40 @@ impl Bridge {
         record.displacements().fold([0.0; 2], |most: [f64; 2], (_, u)| [most[0].max(u[i]), most[1].max(-u[j])])
     }
 
+    /// Largest force until the wave of the first touch comes back from the far end of the shorter deck, and ½ ρA c times
+    /// the velocity of approach in the step before it: what plane waves of two equal cross-sections have.
+    fn first(decks: &Decks, record: &Record) -> [f64; 2] {
+        let Some(touch) = record.forces().position(|(_, force)| force[0] > 0.0) else { return [0.0; 2] };
+        let [i, j] = decks.contact();
+        let wave = 2.0 * decks.decks[1].length / decks.wave_speed();
+        let while_there = record.forces().skip(touch).take((wave / record.h).ceil() as usize);
+        let force = while_there.fold(0.0, |most: f64, (_, force)| most.max(force[0]));
+        let apart: Vec<f64> =
+            record.displacements().skip(touch.saturating_sub(2)).take(2).map(|(_, u)| u[i] - u[j]).collect();
+        let approach = apart.windows(2).map(|pair| (pair[1] - pair[0]) / record.h).sum::<f64>();
+        [force, 0.5 * decks.density * decks.wave_speed() * approach]
+    }
+
     pub(crate) fn table(&self) -> Result<String> {
         let [decks, fine] = &self.decks;
         let reference = self.run(fine, Way::Preset(Preset::conservative), self.fine)?;
         let mut text = format!(
-            "Two bridge decks of {} and {} elements: impacts, peak force (MN), hardest impact and sum of impulses \
-             (MN s), displacements of the ends that meet toward the other deck (mm), time of a step; the reference has \
-             {} and {} elements\n\n| model | h ms | impacts | force | hardest | impulses | left | right | µs/step \
-             |\n|{}\n",
+            "Two bridge decks of {} and {} elements: impacts, force of the first one until its wave is back, peak force \
+             (MN), hardest impact and sum of impulses (MN s), displacements of the ends that meet toward the other deck \
+             (mm), time of a step; the reference has {} and {} elements, and at its first touch ½ ρA c Δv = {} MN\n\n| \
+             model | h ms | impacts | first | force | hardest | impulses | left | right | µs/step |\n|{}\n",
             decks.decks[0].elements,
             decks.decks[1].elements,
             fine.decks[0].elements,
             fine.decks[1].elements,
-            " --- |".repeat(9)
+            decimal(1e-6 * Self::first(fine, &reference)[1], 2),
+            " --- |".repeat(10)
         );
         let mut failures = String::new();
         let mut row = |name: &str, h: f64, decks: &Decks, record: &Record| {
             let Impacts { count, force, impulse, hardest } = record.impacts();
-            let numbers = [force, hardest, impulse].map(|x| decimal(1e-6 * x, 2)).join(" | ");
+            let [first, _] = Self::first(decks, record);
+            let numbers = [first, force, hardest, impulse].map(|x| decimal(1e-6 * x, 2)).join(" | ");
             let ways = Self::toward(decks, record).map(|x| decimal(1e3 * x, 1)).join(" | ");
             let time = decimal(1e6 * record.seconds, 2);
             let _ = writeln!(text, "| {name} | {} | {count} | {numbers} | {ways} | {time} |", 1e3 * h);

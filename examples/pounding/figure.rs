@@ -71,7 +71,11 @@ pub(crate) fn figure(study: &Study) -> Result<String, Box<dyn Error>> {
         },
     ];
     let title = "Two frames of 0.90 s and 0.35 s pound against each other";
-    page(title, "Trapezoidal rule, h = 2 ms; displacements against the ground, the right frame shifted by the gap", &panels)
+    page(
+        title,
+        "Trapezoidal rule, h = 2 ms; displacements against the ground, the right frame shifted by the gap",
+        &panels,
+    )
 }
 
 fn time(range: Range<f64>) -> Axis {

@@ -93,11 +93,7 @@ pub(crate) fn all(frames: &Frames) -> Vec<Model> {
         ),
         linear(stiffness),
         kelvin_voigt(frames, stiffness),
-        model(
-            "Hertz",
-            Scheme::Trapezoidal,
-            Pounding::Law(ContactLaw::PowerLaw { stiffness: hertz, exponent: 1.5 }),
-        ),
+        model("Hertz", Scheme::Trapezoidal, Pounding::Law(ContactLaw::PowerLaw { stiffness: hertz, exponent: 1.5 })),
         model(
             "Hertz, damped, e = 0.65",
             Scheme::Trapezoidal,

@@ -120,8 +120,9 @@ impl Study {
                     self.figures(&model, self.fine)?;
                 let numbers = [force, hardest, impulse].map(|x| decimal(1e-6 * x, 2)).join(" | ");
                 let (left, right) = drifts.split_at(storeys);
-                let largest =
-                    [left, right].map(|drifts| decimal(1e3 * drifts.iter().copied().fold(0.0, f64::max), 1)).join(" | ");
+                let largest = [left, right]
+                    .map(|drifts| decimal(1e3 * drifts.iter().copied().fold(0.0, f64::max), 1))
+                    .join(" | ");
                 let (stiffness, name) = (1e-6 * stiffness, model.name);
                 let _ = writeln!(text, "| {stiffness} | {name} | {count} | {numbers} | {largest} |");
             }

@@ -98,7 +98,8 @@ pub(crate) fn table(quick: bool) -> Result<String> {
                 ]
                 .join(" | ");
                 let step = decimal(1e3 * h, 2);
-                let _ = writeln!(text, "| {elements} | {step} | {} | {name} | {numbers} | {stick} | {slide} |", way.name);
+                let _ =
+                    writeln!(text, "| {elements} | {step} | {} | {name} | {numbers} | {stick} | {slide} |", way.name);
             }
         }
     }

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 
 /// When the pull begins; the weight is on before.
-const START: f64 = 0.5;
+pub(crate) const START: f64 = 0.5;
 
 /// The velocity of the pull.
 const VELOCITY: f64 = 0.4;
@@ -22,6 +22,15 @@ pub(crate) fn rod(elements: usize) -> Rod {
 /// The pull from the start on.
 pub(crate) fn pull(t: f64) -> [f64; 3] {
     if t > START { [VELOCITY * (t - START), VELOCITY, 0.0] } else { [0.0; 3] }
+}
+
+/// A time, this part of that at which the front stops, and the velocities along the rod then.
+pub(crate) fn exact(rod: &Rod, part: f64) -> (f64, Vec<(f64, f64)>) {
+    let (c, q) = (rod.wave_speed(), rod.friction * rod.weight);
+    let stop = 2.0 * rod.density * c * VELOCITY / q;
+    let front = part * stop;
+    let last = VELOCITY * (1.0 - front / stop);
+    (front / c, vec![(0.0, VELOCITY), (front, last), (front, 0.0), (rod.length, 0.0)])
 }
 
 /// Until the front stops at 2 ρA c V/q the hook pulls with ρA c V + q c t/2, and the velocity behind the front is
@@ -68,8 +77,9 @@ pub(crate) fn table(quick: bool) -> Result<String> {
             }
             let u = run.state().displacement();
             let moved = (0..=elements).rev().find(|&node| -rod.way(node, u) > 1e-3).map_or(0.0, |node| rod.depth(node));
-            let numbers =
-                [100.0 * hook / f64::from(count), 100.0 * velocity.unwrap_or(f64::NAN)].map(|x| decimal(x, 2)).join(" | ");
+            let numbers = [100.0 * hook / f64::from(count), 100.0 * velocity.unwrap_or(f64::NAN)]
+                .map(|x| decimal(x, 2))
+                .join(" | ");
             let step = decimal(1e3 * h, 3);
             let _ = writeln!(text, "| {elements} | {step} | {} | {numbers} | {} |", way.name, decimal(moved, 0));
         }

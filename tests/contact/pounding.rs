@@ -1,6 +1,7 @@
 //! Pounding: contact models of structural engineers against closed forms, and frames that do not meet against their
 //! modes.
 
+use contact_dynamics::LinearSystem;
 use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{ContactLaw, MoreauJean, Newmark, PersistencyCorrection, Simulation, System, verify};
 use contact_dynamics_scenes::damped_contact::{
@@ -10,7 +11,6 @@ use contact_dynamics_scenes::frames::{Frame, Frames};
 use contact_dynamics_scenes::ground::{Ground, ricker};
 use contact_dynamics_scenes::pounding::{Pounding, Record};
 use contact_dynamics_scenes::sparse::{matrix, spring};
-use contact_dynamics::LinearSystem;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -95,7 +95,8 @@ fn a_damped_hertz_contact_has_the_restitution_of_its_integral() {
 
 #[test]
 fn damped_contacts_know_their_tangent_and_refuse_what_is_out_of_range() {
-    for law in [DampedLaw::kelvin_voigt(3e4, 0.65, MASSES), DampedLaw::HertzDamp { stiffness: 2e6, restitution: 0.65 }] {
+    for law in [DampedLaw::kelvin_voigt(3e4, 0.65, MASSES), DampedLaw::HertzDamp { stiffness: 2e6, restitution: 0.65 }]
+    {
         let mut system = free_masses(law);
         // Approach while open, then pressed.
         system.commit(0.0, &[0.0, 0.0], &[0.4, 0.0]).unwrap();
@@ -184,7 +185,8 @@ fn frames_far_apart_move_by_their_modes() {
         let record = run(&frames, &ground, pounding, interval / refinement as f64, until);
         let every = record.displacements().skip(refinement - 1).step_by(refinement);
         let exact = exact[0].iter().zip(&exact[1]).skip(1).map(|(left, right)| left.iter().chain(right));
-        let errors = every.zip(exact).flat_map(|((_, u), exact)| u.iter().zip(exact).map(|(u, exact)| (u - exact).abs()));
+        let errors =
+            every.zip(exact).flat_map(|((_, u), exact)| u.iter().zip(exact).map(|(u, exact)| (u - exact).abs()));
         errors.fold(0.0, f64::max) / peak
     };
     for pounding in [

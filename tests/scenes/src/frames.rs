@@ -64,10 +64,8 @@ pub struct Frames {
 impl Frames {
     /// Five storeys of 400 t and three of 300 t, periods of 0.90 s and 0.35 s, 15 mm apart (SI units).
     pub fn of_the_study() -> Self {
-        let frames = [
-            Frame { storeys: 5, mass: 4e5, stiffness: 2.4e8 },
-            Frame { storeys: 3, mass: 3e5, stiffness: 4.9e8 },
-        ];
+        let frames =
+            [Frame { storeys: 5, mass: 4e5, stiffness: 2.4e8 }, Frame { storeys: 3, mass: 3e5, stiffness: 4.9e8 }];
         Self { frames, gap: 0.015, damping: 0.05 }
     }
 
@@ -135,8 +133,12 @@ impl Frames {
 
     /// What is compared of a run.
     pub fn figures(&self, record: &Record) -> Figures {
-        let mut figures =
-            Figures { impacts: record.impacts(), toward: [0.0; 2], drifts: vec![0.0; self.dofs()], seconds: record.seconds };
+        let mut figures = Figures {
+            impacts: record.impacts(),
+            toward: [0.0; 2],
+            drifts: vec![0.0; self.dofs()],
+            seconds: record.seconds,
+        };
         let first_right = self.frames[0].storeys;
         let top = self.pairs().last().copied().unwrap_or_default();
         for (_, u) in record.displacements() {

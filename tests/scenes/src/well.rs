@@ -8,9 +8,7 @@
 
 use crate::sparse::{Entry, matrix};
 use contact_dynamics::faer::sparse::SparseColMat;
-use contact_dynamics::{
-    Corrector, LinearRows, LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator,
-};
+use contact_dynamics::{Corrector, LinearRows, LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator};
 use std::ops::Range;
 
 /// A well: vertical, then an arc of a circle, then straight on with the inclination reached.
@@ -156,8 +154,7 @@ impl Rod {
                 let rotation = |k: usize| if k % DOFS == 2 { 1.0 } else { 0.0 };
                 let (ri, rj) = (rotation(i), rotation(j));
                 let same = if i == j { 4.0 } else { 2.0 };
-                block[i][j] = axial * stretch[i] * stretch[j]
-                    + 12.0 * b * deflection[i] * deflection[j]
+                block[i][j] = axial * stretch[i] * stretch[j] + 12.0 * b * deflection[i] * deflection[j]
                     - 6.0 * b * l * (deflection[i] * rj + ri * deflection[j])
                     + same * b * l * l * ri * rj;
             }
@@ -276,7 +273,7 @@ impl Rod {
             let depths = [k + 1, k].map(|k| self.length * k as f64 / (points - 1) as f64);
             let mut knots: Vec<f64> = [self.well.end_of_arc(), self.well.kick_off]
                 .into_iter()
-                .filter(|knot| (depths[1]..depths[0]).contains(knot))
+                .filter(|knot| depths[1] < *knot && *knot < depths[0])
                 .collect();
             knots.insert(0, depths[0]);
             knots.push(depths[1]);
@@ -285,7 +282,7 @@ impl Rod {
                 let ds = (piece[0] - piece[1]) / f64::from(steps);
                 for step in 0..steps {
                     // (A little inside: the curvature belongs to the piece.)
-                    let at = |part: f64| (piece[0] - (f64::from(step) + part) * ds).clamp(piece[1] + 1e-9, piece[0] - 1e-9);
+                    let at = |part: f64| piece[0] - (f64::from(step) + part.clamp(1e-9, 1.0 - 1e-9)) * ds;
                     let k1 = slope(at(0.0), tension);
                     let k2 = slope(at(0.5), tension + 0.5 * ds * k1);
                     let k3 = slope(at(0.5), tension + 0.5 * ds * k2);
