@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::time::Instant;
 
 pub(crate) fn table(quick: bool) -> Result<String> {
-    let (sizes, steps): (&[usize], usize) = if quick { (&[40], 20) } else { (&[100, 200, 400, 800], 200) };
+    let (sizes, steps): (&[usize], usize) = if quick { (&[40], 20) } else { (&[50, 100, 200, 400], 50) };
     let mut text = format!(
         "Time of a step in µs, drill pipe that is pulled out, all contacts pressed and sliding (mean of {steps} steps): \
          a bare solve, a step without walls, without friction, with friction, and the last one over the solve\n\n| \
@@ -22,11 +22,11 @@ pub(crate) fn table(quick: bool) -> Result<String> {
         let h = 2.0 * rod.size() / rod.wave_speed();
         let scheme = || -> Result<Box<dyn TimeIntegrator>> { Ok(Box::new(GeneralizedAlpha::chung_hulbert(0.8)?)) };
         let smooth = Rod { friction: 0.0, ..rod };
-        let mut free = rod.scene(scheme()?, h, 0.5, ramp(1.0, 0.5))?.build()?;
+        let mut free = rod.scene(scheme()?, h, 0.2, ramp(1.0, 0.1))?.build()?;
         let bare = solve(&rod, h)?;
         let timed = |way: Way, rod: &Rod| -> Result<[f64; 2]> {
-            let mut run = way.run(rod, h, 0.5, ramp(1.0, 0.5))?;
-            run.run_until(if quick { 0.8 } else { 2.0 }, &mut ())?;
+            let mut run = way.run(rod, h, 0.2, ramp(1.0, 0.1))?;
+            run.run_until(0.3, &mut ())?;
             let before = run.statistics().contact_iterations;
             let time = mean_step(&mut run, steps)?;
             Ok([time, (run.statistics().contact_iterations - before) as f64 / steps as f64])

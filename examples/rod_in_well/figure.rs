@@ -20,7 +20,7 @@ fn curve(label: &str, color: RGBColor, width: u32, points: Vec<(f64, f64)>) -> C
 
 /// The weight comes on within a second, then the rod is pulled out.
 fn pulled(rod: &Rod, way: crate::drag::Way, until: f64) -> Result<Shown, Box<dyn Error>> {
-    let h = 2.0 * rod.size() / rod.wave_speed();
+    let h = 5e-3;
     let hoist = ramp(1.0, 0.5);
     let mut run = way.run(rod, h, 1.0, move |t| hoist(t - 2.0))?;
     let mut shown = Shown { hook: Vec::new(), sticking: Vec::new(), sliding: Vec::new(), walls: Vec::new() };

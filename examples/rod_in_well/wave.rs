@@ -36,7 +36,7 @@ pub(crate) fn exact(rod: &Rod, part: f64) -> (f64, Vec<(f64, f64)>) {
 /// Until the front stops at 2 ρA c V/q the hook pulls with ρA c V + q c t/2, and the velocity behind the front is
 /// V − q x/(2 ρA c): mean errors of both.
 pub(crate) fn table(quick: bool) -> Result<String> {
-    let sizes: &[usize] = if quick { &[60] } else { &[150, 300, 600] };
+    let sizes: &[usize] = if quick { &[60] } else { &[75, 150, 300] };
     let exact = rod(sizes[0]);
     let (c, q) = (exact.wave_speed(), exact.friction * exact.weight);
     let impedance = exact.density * c;

@@ -8,10 +8,11 @@ fn correction() -> Vec<Box<dyn Corrector<f64>>> {
     vec![Box::new(PersistencyCorrection::with_history_projection())]
 }
 
-/// The pull of the hook, mean over the last tenth of a run, with the top moved at a constant velocity.
+/// The pull of the hook, mean over the last tenth of a run, with the top moved at a constant velocity. Weight and motion
+/// come on smoothly: a rod that slides one way all the time is not damped by Coulomb's friction, and would go on swinging.
 fn steady_hook(rod: &Rod, velocity: f64, h: f64, until: f64) -> f64 {
     let scheme = Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap());
-    let mut run = rod.run(scheme, correction(), h, 0.5, ramp(velocity, 0.5)).unwrap();
+    let mut run = rod.run(scheme, correction(), h, 0.6 * until, ramp(velocity, 0.3 * until)).unwrap();
     let (mut sum, mut count) = (0.0, 0);
     while run.time() < until {
         run.step().unwrap();
@@ -27,14 +28,14 @@ fn steady_hook(rod: &Rod, velocity: f64, h: f64, until: f64) -> f64 {
     sum / f64::from(count)
 }
 
-/// A rope around a quarter of a circle, without weight.
+/// A rope around a quarter of a circle, without weight, between two straight pieces.
 #[test]
 fn a_weightless_rod_on_an_arc_is_a_rope_on_a_capstan() {
-    let well = Well { kick_off: 0.0, radius: 100.0, inclination: [0.0, FRAC_PI_2] };
+    let well = Well { kick_off: 20.0, radius: 100.0, inclination: [0.0, FRAC_PI_2] };
     let rod = Rod {
         well,
-        length: well.end_of_arc(),
-        elements: 40,
+        length: well.end_of_arc() + 20.0,
+        elements: 50,
         stretching: 7e8,
         bending: 1e4,
         density: 29.0,
@@ -43,29 +44,34 @@ fn a_weightless_rod_on_an_arc_is_a_rope_on_a_capstan() {
         play: 0.02,
         tail: 1e5,
     };
-    for (velocity, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
+    for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
         let exact = rod.tail * (sign * rod.friction * FRAC_PI_2).exp();
         assert!((exact / arc_tension(sign * rod.friction, 0.0, 100.0, [rod.tail, FRAC_PI_2], 0.0) - 1.0).abs() < 1e-12);
-        let found = steady_hook(&rod, velocity, 1e-3, 2.0);
+        let found = steady_hook(&rod, velocity, 2e-3, 2.0);
         assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
     }
 }
 
-/// A heavy rod on the high side of an arc, with a closed form, and a well of three parts, with the soft string.
+/// A heavy rod that a tail holds on the high side of an arc, with a closed form, and a well of three parts, with the
+/// soft string.
 #[test]
 fn the_hook_load_of_a_rod_that_moves_is_that_of_the_soft_string() {
-    let mut arc = Rod::drill_pipe(60);
-    arc.well.kick_off = 0.0;
-    arc.length = arc.well.end_of_arc();
-    arc.tail = 3e5;
-    let exact = arc_tension(arc.friction, arc.weight, arc.well.radius, [arc.tail, FRAC_PI_3], 0.0);
-    assert!((arc.soft_string(1.0, 2)[0][1] / exact - 1.0).abs() < 1e-9);
-    let found = steady_hook(&arc, 1.0, 2e-3, 3.0);
-    assert!((found / exact - 1.0).abs() < 5e-3, "{found} {exact}");
+    let mut held = Rod::drill_pipe(60);
+    (held.well.kick_off, held.tail) = (100.0, 3e5);
+    held.length = held.well.end_of_arc() + 100.0;
+    let [start, end] = held.well.inclination;
+    for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
+        let friction = sign * held.friction;
+        let below = held.tail + 100.0 * held.weight * (end.cos() + friction * end.sin());
+        let exact = arc_tension(friction, held.weight, held.well.radius, [below, end], start) + 100.0 * held.weight;
+        assert!((held.soft_string(sign, 2)[0][1] / exact - 1.0).abs() < 1e-9);
+        let found = steady_hook(&held, velocity, 8e-3, 6.0);
+        assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
+    }
     let whole = Rod::drill_pipe(80);
-    for (velocity, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
+    for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
         let exact = whole.soft_string(sign, 2)[0][1];
-        let found = steady_hook(&whole, velocity, 4e-3, 6.0);
+        let found = steady_hook(&whole, velocity, 1e-2, 10.0);
         assert!((found / exact - 1.0).abs() < 1e-2, "{velocity}: {found} {exact}");
     }
 }
@@ -88,9 +94,15 @@ fn friction_stops_the_front_of_a_wave() {
     let passed = 0.5 * stop / c;
     run.run_until(start + passed, &mut ()).unwrap();
     let u = run.state().displacement().to_vec();
-    // Where the front is: the last node that has moved by a hundredth of what the top has.
-    let front = (0..=rod.elements).rev().find(|&node| -rod.way(node, &u) > 0.01 * v * passed).unwrap();
-    assert!((rod.depth(front) / (c * passed) - 1.0).abs() < 0.03, "{} {}", rod.depth(front), c * passed);
+    // Behind the front u = V (t − x/c) − q x (c t − x)/(2 EA), before it nothing.
+    let exact = |x: f64| match x < c * passed {
+        true => v * (passed - x / c) - q * x * (c * passed - x) / (2.0 * rod.stretching),
+        false => 0.0,
+    };
+    let errors = (0..=rod.elements).map(|node| (-rod.way(node, &u) - exact(rod.depth(node))).abs());
+    let worst = errors.fold(0.0, f64::max) / (v * passed);
+    assert!(worst < 0.02, "{worst}");
+    assert!(exact(0.98 * c * passed) > 0.0 && rod.way(rod.elements, &u).abs() < 1e-9 * v * passed);
     let v_now = run.state().velocity().to_vec();
     for part in [0.25, 0.5, 0.75] {
         let node = (part * c * passed / rod.size()).round() as usize;

@@ -177,7 +177,7 @@ impl Rod {
         (0..=self.elements).flat_map(of).collect()
     }
 
-    /// A run that begins with the rod at rest on the low side, weightless; weight (and the tail's pull) come on linearly
+    /// A run that begins with the rod at rest on the low side, weightless; weight (and the tail's pull) come on smoothly
     /// within `onset`. The top moves up as `hoist` says (way, velocity, acceleration), and not sideways.
     ///
     /// # Errors
@@ -212,7 +212,8 @@ impl Rod {
         let (driven, fixed) = if top[1].abs() > 0.5 { (1, 0) } else { (0, 1) };
         let system = LinearSystem::lumped(self.masses(), self.stiffness())?
             .load(move |t, force| {
-                let part = if onset > 0.0 { (t / onset).min(1.0) } else { 1.0 };
+                // (Smoothly: what slides one way all the time is not damped by Coulomb's friction.)
+                let part = if onset > 0.0 { ramp(1.0, onset)(t)[1] } else { 1.0 };
                 force.fill(0.0);
                 for node in 0..=last {
                     force[DOFS * node + 1] = part * rod.weight * rod.share(node);
