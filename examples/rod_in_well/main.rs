@@ -11,14 +11,17 @@ mod drag;
 mod figure;
 mod wave;
 
+use contact_dynamics::Result;
 use contact_dynamics_scenes::output::Output;
 use std::error::Error;
 use std::fmt::Write;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> std::result::Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("rod_in_well")?;
     let mut page = String::new();
-    for table in [drag::table(output.quick)?, wave::table(output.quick)?, cost::table(output.quick)?] {
+    let tables: [fn(bool) -> Result<String>; 3] = [drag::table, wave::table, cost::table];
+    for table in tables {
+        let table = table(output.quick)?;
         println!("{table}");
         writeln!(page, "{table}")?;
     }

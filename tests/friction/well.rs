@@ -2,7 +2,7 @@
 
 use contact_dynamics::{ContactStatus, Corrector, GeneralizedAlpha, Newmark, PersistencyCorrection};
 use contact_dynamics_scenes::well::{Rod, Well, arc_tension, ramp};
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
+use std::f64::consts::FRAC_PI_2;
 
 fn correction() -> Vec<Box<dyn Corrector<f64>>> {
     vec![Box::new(PersistencyCorrection::with_history_projection())]
@@ -47,7 +47,7 @@ fn a_weightless_rod_on_an_arc_is_a_rope_on_a_capstan() {
     for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
         let exact = rod.tail * (sign * rod.friction * FRAC_PI_2).exp();
         assert!((exact / arc_tension(sign * rod.friction, 0.0, 100.0, [rod.tail, FRAC_PI_2], 0.0) - 1.0).abs() < 1e-12);
-        let found = steady_hook(&rod, velocity, 2e-3, 2.0);
+        let found = steady_hook(&rod, velocity, 4e-3, 5.0);
         assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
     }
 }
@@ -68,10 +68,10 @@ fn the_hook_load_of_a_rod_that_moves_is_that_of_the_soft_string() {
         let found = steady_hook(&held, velocity, 8e-3, 6.0);
         assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
     }
-    let whole = Rod::drill_pipe(80);
+    let whole = Rod::drill_pipe(60);
     for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
         let exact = whole.soft_string(sign, 2)[0][1];
-        let found = steady_hook(&whole, velocity, 1e-2, 10.0);
+        let found = steady_hook(&whole, velocity, 1.25e-2, 10.0);
         assert!((found / exact - 1.0).abs() < 1e-2, "{velocity}: {found} {exact}");
     }
 }

@@ -237,7 +237,8 @@ impl Rod {
         };
         let low = (1..=self.elements).map(|node| (node, 1.0, 0.0));
         let high = (1..=self.elements).map(|node| (node, -1.0, self.play));
-        low.chain(high).fold(LinearRows::new(), row)
+        // Gaps are differences of coordinates of the well's size.
+        low.chain(high).fold(LinearRows::new(), row).coordinates(self.length)
     }
 
     /// Contacts of the low side and of the high side.
