@@ -1,8 +1,8 @@
 //! The hook load of a rod that moves with a constant velocity, against torque and drag of the soft string.
 
 use contact_dynamics::{
-    ContactStatus, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result, Simulation,
-    TimeIntegrator,
+    CdLagrange, ContactStatus, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result,
+    Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::well::{Rod, ramp};
@@ -12,11 +12,13 @@ use std::fmt::Write;
 const VELOCITY: f64 = 0.2;
 const STEP: f64 = 1e-2;
 
+type Parts = (Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>);
+
 /// A scheme with its correction, and what tables call them.
 #[derive(Clone, Copy)]
 pub(crate) struct Way {
     pub(crate) name: &'static str,
-    make: fn() -> Result<(Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>)>,
+    make: fn() -> Result<Parts>,
 }
 
 pub(crate) const CORRECTED: Way = Way {
@@ -34,6 +36,8 @@ pub(crate) const TRAPEZOIDAL_RAW: Way =
 pub(crate) const MOREAU_JEAN: Way =
     Way { name: "Moreau–Jean(0.5)", make: || Ok((Box::new(MoreauJean::new(0.5)?), Vec::new())) };
 
+pub(crate) const CD_LAGRANGE: Way = Way { name: "CD-Lagrange", make: || Ok((Box::new(CdLagrange), Vec::new())) };
+
 pub(crate) const ALL: [Way; 5] = [CORRECTED, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW, MOREAU_JEAN];
 
 fn correction() -> Vec<Box<dyn Corrector<f64>>> {
@@ -41,6 +45,11 @@ fn correction() -> Vec<Box<dyn Corrector<f64>>> {
 }
 
 impl Way {
+    /// A run that is steady at the end: the top moves up with the sign +1, down with −1.
+    pub(crate) fn steady(self, rod: &Rod, sign: f64, until: f64) -> Result<Simulation<'static, f64>> {
+        self.run(rod, STEP, 0.6 * until, ramp(sign * VELOCITY, 0.3 * until))
+    }
+
     /// A run whose weight comes on within `onset`.
     pub(crate) fn run(
         self,
@@ -79,7 +88,7 @@ pub(crate) fn table(quick: bool) -> Result<String> {
             for (name, sign) in [("out", 1.0_f64), ("in", -1.0)] {
                 let profile = rod.soft_string(sign, 4001);
                 let (hook, wall) = (profile[0][1], wall_force(&profile));
-                let mut run = way.run(&rod, STEP, 0.6 * until, ramp(sign * VELOCITY, 0.3 * until))?;
+                let mut run = way.steady(&rod, sign, until)?;
                 let mut hooks = Vec::new();
                 let mut pressed = 0.0;
                 while run.time() < until {

@@ -1,6 +1,6 @@
 //! The figure: forces along the well, the hook load over time, contacts that stick and slide, and a wave that stops.
 
-use crate::drag::{CORRECTED, MOREAU_JEAN, TRAPEZOIDAL_RAW, states};
+use crate::drag::{CD_LAGRANGE, CORRECTED, TRAPEZOIDAL_RAW, states};
 use crate::wave;
 use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, page};
 use contact_dynamics_scenes::well::{Rod, ramp};
@@ -11,7 +11,6 @@ struct Shown {
     hook: Vec<(f64, f64)>,
     sticking: Vec<(f64, f64)>,
     sliding: Vec<(f64, f64)>,
-    walls: Vec<(f64, f64)>,
 }
 
 fn curve(label: &str, color: RGBColor, width: u32, points: Vec<(f64, f64)>) -> Curve {
@@ -23,7 +22,7 @@ fn pulled(rod: &Rod, way: crate::drag::Way, until: f64) -> Result<Shown, Box<dyn
     let h = 5e-3;
     let hoist = ramp(1.0, 0.5);
     let mut run = way.run(rod, h, 1.0, move |t| hoist(t - 2.0))?;
-    let mut shown = Shown { hook: Vec::new(), sticking: Vec::new(), sliding: Vec::new(), walls: Vec::new() };
+    let mut shown = Shown { hook: Vec::new(), sticking: Vec::new(), sliding: Vec::new() };
     while run.time() < until {
         run.step()?;
         let t = run.time();
@@ -32,11 +31,17 @@ fn pulled(rod: &Rod, way: crate::drag::Way, until: f64) -> Result<Shown, Box<dyn
         shown.sticking.push((t, stick));
         shown.sliding.push((t, slide));
     }
+    Ok(shown)
+}
+
+/// Forces on the walls over length by depth, of a rod that is pulled out steadily; of the high side positive.
+fn walls(rod: &Rod, until: f64) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
+    let mut run = CORRECTED.steady(rod, 1.0, until)?;
+    run.run_until(until, &mut ())?;
     let forces = run.state().contacts().forces();
     let [low, high] = rod.sides();
     let over = |k: usize| (forces[high.clone()][k] - forces[low.clone()][k]) / rod.share(k + 1);
-    shown.walls = (0..rod.elements).map(|k| (rod.depth(k + 1), over(k))).collect();
-    Ok(shown)
+    Ok((0..rod.elements).map(|k| (rod.depth(k + 1), over(k))).collect())
 }
 
 pub(crate) fn figure(quick: bool) -> Result<String, Box<dyn Error>> {
@@ -50,10 +55,13 @@ pub(crate) fn figure(quick: bool) -> Result<String, Box<dyn Error>> {
     let time = Axis::linear("time (s)", 0.0..6.0, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     let panels = [
         Panel {
-            title: "(a) Force on the wall, high side positive, pulled out".into(),
+            title: "(a) Force on the wall, high side positive, pulled out steadily".into(),
             x: depth,
-            y: Axis::linear("N/m", -300.0..500.0, &[-200.0, 0.0, 200.0, 400.0]),
-            curves: vec![curve("λ_v/λ_a", BLUE, 8, corrected.walls), curve("soft string", DARK, 4, soft)],
+            y: Axis::linear("N/m", -300.0..800.0, &[-200.0, 0.0, 200.0, 400.0, 600.0, 800.0]),
+            curves: vec![
+                curve("λ_v/λ_a", BLUE, 8, walls(&rod, if quick { 4.0 } else { 10.0 })?),
+                curve("soft string", DARK, 4, soft),
+            ],
             note: None,
         },
         Panel {
@@ -76,8 +84,13 @@ pub(crate) fn figure(quick: bool) -> Result<String, Box<dyn Error>> {
         },
         front(quick)?,
     ];
-    let title = format!("Drill pipe in a well of 2000 m, {elements} elements: weight on by 1 s, pulled from 2 s on");
-    page(&title, "Chung–Hulbert(0.8) with λ_v/λ_a, and the trapezoidal rule without; (d): a level bed", &panels)
+    let title =
+        format!("Drill pipe in a well of 2000 m, {elements} elements; (b), (c): weight on by 1 s, pulled from 2 s on");
+    page(
+        &title,
+        "Chung–Hulbert(0.8) with λ_v/λ_a, and the trapezoidal rule without; (d): a level bed, CD-Lagrange, Courant number 1",
+        &panels,
+    )
 }
 
 /// The velocity along a rod on a level bed, three times after a sudden pull, against the exact one.
@@ -86,7 +99,7 @@ fn front(quick: bool) -> Result<Panel, Box<dyn Error>> {
     let mut curves = Vec::new();
     for (part, color) in [(0.3, BLUE), (0.6, GREEN), (0.9, VERMILION)] {
         let (t, exact) = wave::exact(&rod, part);
-        let mut run = MOREAU_JEAN.run(&rod, 0.5 * rod.size() / rod.wave_speed(), 0.2, wave::pull)?;
+        let mut run = CD_LAGRANGE.run(&rod, rod.size() / rod.wave_speed(), 0.2, wave::pull)?;
         run.run_until(wave::START + t, &mut ())?;
         let v = run.state().velocity();
         let points = (0..=rod.elements).map(|node| (rod.depth(node), -rod.way(node, v))).collect();

@@ -1,6 +1,6 @@
 //! A straight rod on a level bed, pulled suddenly: the front of the wave that friction stops.
 
-use crate::drag::{CORRECTED, MOREAU_JEAN, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW};
+use crate::drag::{CD_LAGRANGE, CORRECTED, MOREAU_JEAN, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW};
 use contact_dynamics::Result;
 use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::well::{Rod, Well};
@@ -53,8 +53,9 @@ pub(crate) fn table(quick: bool) -> Result<String> {
     );
     for &elements in sizes {
         let rod = rod(elements);
-        let h = 0.5 * rod.size() / c;
-        for way in [CORRECTED, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW, MOREAU_JEAN] {
+        let implicit = [CORRECTED, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW, MOREAU_JEAN].map(|way| (way, 0.5));
+        for (way, courant) in implicit.into_iter().chain([(CD_LAGRANGE, 0.5), (CD_LAGRANGE, 1.0)]) {
+            let h = courant * rod.size() / c;
             let mut run = way.run(&rod, h, 0.2, pull)?;
             run.run_until(START, &mut ())?;
             let (mut hook, mut count, mut velocity) = (0.0, 0, None);

@@ -82,7 +82,7 @@ fn a_damped_hertz_contact_has_the_restitution_of_its_integral() {
         let exact = restitution_of_hertz_damp(nominal);
         assert!((found.restitution / exact - 1.0).abs() < 1e-3, "{nominal}: {} {exact}", found.restitution);
         // Undamped it is Hertz' impact.
-        if nominal == 1.0 {
+        if nominal > 0.99 {
             assert!((found.force / elastic.force() - 1.0).abs() < 1e-4, "{} {}", found.force, elastic.force());
             assert!((found.duration / elastic.duration() - 1.0).abs() < 5e-3);
             assert!((exact - 1.0).abs() < 1e-12);
@@ -175,11 +175,11 @@ fn by_modes(frame: &Frame, ratio: f64, ground: &Ground, interval: f64, count: us
 
 #[test]
 fn frames_far_apart_move_by_their_modes() {
-    let (interval, until) = (5e-3, 2.0);
-    let count = (until / interval) as usize;
+    let (interval, count) = (5e-3, 400);
+    let until = f64::from(count) * interval;
     let ground = Arc::new(Ground::sampled(interval, until, ricker(3.0, 1.5, 0.8)));
     let frames = Frames { gap: 10.0, ..Frames::of_the_study() };
-    let exact = frames.frames.map(|frame| by_modes(&frame, frames.damping, &ground, interval, count));
+    let exact = frames.frames.map(|frame| by_modes(&frame, frames.damping, &ground, interval, count as usize));
     let peak = exact[0].iter().flatten().fold(0.0, |peak: f64, u| peak.max(u.abs()));
     let error = |pounding, refinement: usize| {
         let record = run(&frames, &ground, pounding, interval / refinement as f64, until);

@@ -1,6 +1,6 @@
 //! A rod in a curved well: torque and drag against the soft string, and the front of axial waves that friction stops.
 
-use contact_dynamics::{ContactStatus, Corrector, GeneralizedAlpha, Newmark, PersistencyCorrection};
+use contact_dynamics::{CdLagrange, ContactStatus, Corrector, GeneralizedAlpha, PersistencyCorrection};
 use contact_dynamics_scenes::well::{Rod, Well, arc_tension, ramp};
 use std::f64::consts::FRAC_PI_2;
 
@@ -41,13 +41,14 @@ fn a_weightless_rod_on_an_arc_is_a_rope_on_a_capstan() {
         density: 29.0,
         weight: 0.0,
         friction: 0.3,
-        play: 0.02,
+        // (Little: when tension comes on the rod jumps to the high side, and goes on swinging.)
+        play: 1e-4,
         tail: 1e5,
     };
     for (velocity, sign) in [(0.2, 1.0), (-0.2, -1.0)] {
         let exact = rod.tail * (sign * rod.friction * FRAC_PI_2).exp();
         assert!((exact / arc_tension(sign * rod.friction, 0.0, 100.0, [rod.tail, FRAC_PI_2], 0.0) - 1.0).abs() < 1e-12);
-        let found = steady_hook(&rod, velocity, 4e-3, 5.0);
+        let found = steady_hook(&rod, velocity, 4e-3, 3.0);
         assert!((found / exact - 1.0).abs() < 5e-3, "{velocity}: {found} {exact}");
     }
 }
@@ -82,17 +83,20 @@ fn the_hook_load_of_a_rod_that_moves_is_that_of_the_soft_string() {
 #[test]
 fn friction_stops_the_front_of_a_wave() {
     let well = Well { kick_off: 0.0, radius: 1e3, inclination: [FRAC_PI_2, FRAC_PI_2] };
-    let rod = Rod { well, length: 1500.0, friction: 0.5, ..Rod::drill_pipe(300) };
+    let rod = Rod { well, length: 1500.0, friction: 0.5, ..Rod::drill_pipe(150) };
     let (c, q, v) = (rod.wave_speed(), rod.friction * rod.weight, 0.4);
     let impedance = rod.density * c;
     let (start, stop) = (0.5, 2.0 * impedance * v / q);
     assert!((800.0..1200.0).contains(&stop), "{stop}");
     // (The weight is on before the pull begins: the support is at rest until then.)
     let hoist = move |t: f64| if t > start { [v * (t - start), v, 0.0] } else { [0.0; 3] };
-    let mut run = rod.run(Box::new(Newmark::trapezoidal()), correction(), 5e-4, 0.2, hoist).unwrap();
+    // (At the Courant number 1 waves along the rod are exact; elsewhere the mesh rings behind the front.)
+    let h = rod.size() / c;
+    let mut run = rod.run(Box::new(CdLagrange), Vec::new(), h, 0.2, hoist).unwrap();
     run.run_until(start, &mut ()).unwrap();
     let passed = 0.5 * stop / c;
     run.run_until(start + passed, &mut ()).unwrap();
+    let passed = run.time() - start;
     let u = run.state().displacement().to_vec();
     // Behind the front u = V (t − x/c) − q x (c t − x)/(2 EA), before it nothing.
     let exact = |x: f64| match x < c * passed {
@@ -101,22 +105,21 @@ fn friction_stops_the_front_of_a_wave() {
     };
     let errors = (0..=rod.elements).map(|node| (-rod.way(node, &u) - exact(rod.depth(node))).abs());
     let worst = errors.fold(0.0, f64::max) / (v * passed);
-    assert!(worst < 0.02, "{worst}");
+    assert!(worst < 0.01, "{worst}");
     assert!(exact(0.98 * c * passed) > 0.0 && rod.way(rod.elements, &u).abs() < 1e-9 * v * passed);
     let v_now = run.state().velocity().to_vec();
     for part in [0.25, 0.5, 0.75] {
         let node = (part * c * passed / rod.size()).round() as usize;
         let exact = v - q * rod.depth(node) / (2.0 * impedance);
-        // (Waves of the mesh ring behind the front: the mean of some nodes.)
-        let mean = (node - 4..=node + 4).map(|node| -rod.way(node, &v_now)).sum::<f64>() / 9.0;
-        assert!((mean / exact - 1.0).abs() < 0.05, "{part}: {mean} {exact}");
+        let mean = (node - 1..=node + 1).map(|node| -rod.way(node, &v_now)).sum::<f64>() / 3.0;
+        assert!((mean / exact - 1.0).abs() < 0.03, "{part}: {mean} {exact}");
     }
     let mut mean = 0.0;
-    for _ in 0..40 {
+    for _ in 0..20 {
         run.step().unwrap();
-        mean += rod.hook_load(&mut run).unwrap() / 40.0;
+        mean += rod.hook_load(&mut run).unwrap() / 20.0;
     }
-    let exact = impedance * v + 0.5 * q * c * (run.time() - start - 20.0 * 5e-4);
+    let exact = impedance * v + 0.5 * q * c * (run.time() - start - 9.5 * h);
     assert!((mean / exact - 1.0).abs() < 0.02, "{mean} {exact}");
     // What lies beyond where it stops has not moved when the wave could have been there.
     run.run_until(start + 1.05 * stop / c, &mut ()).unwrap();
