@@ -86,7 +86,8 @@ impl Bridge {
         let Some(touch) = record.forces().position(|(_, force)| force[0] > 0.0) else { return [0.0; 2] };
         let [i, j] = decks.contact();
         let wave = 2.0 * decks.decks[1].length / decks.wave_speed();
-        let while_there = record.forces().skip(touch).take((wave / record.h).ceil() as usize);
+        let back = (touch + 1) as f64 * record.h + wave;
+        let while_there = record.forces().skip(touch).take_while(|(t, _)| *t < back);
         let force = while_there.fold(0.0, |most: f64, (_, force)| most.max(force[0]));
         let apart: Vec<f64> =
             record.displacements().skip(touch.saturating_sub(2)).take(2).map(|(_, u)| u[i] - u[j]).collect();
@@ -123,7 +124,9 @@ impl Bridge {
             for h in STEPS {
                 match self.run(decks, way, h) {
                     Ok(record) => row(&name, h, decks, &record),
-                    Err(error) => failures += &format!("\n{name}, h = {} ms: {error}\n", 1e3 * h),
+                    Err(error) => {
+                        let _ = writeln!(failures, "\n{name}, h = {} ms: {error}", 1e3 * h);
+                    }
                 }
             }
         }

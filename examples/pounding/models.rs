@@ -9,6 +9,9 @@ use contact_dynamics_scenes::ground::Ground;
 use contact_dynamics_scenes::pounding::{Pounding, Record};
 use std::sync::Arc;
 
+/// A scheme and its correctors.
+type Parts = (Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>);
+
 /// The coefficient of restitution of the models that have one.
 pub(crate) const RESTITUTION: f64 = 0.65;
 
@@ -42,7 +45,7 @@ impl Scheme {
         }
     }
 
-    pub(crate) fn parts(self) -> Result<(Box<dyn TimeIntegrator>, Vec<Box<dyn Corrector<f64>>>)> {
+    pub(crate) fn parts(self) -> Result<Parts> {
         let correction = || -> Vec<Box<dyn Corrector<f64>>> { vec![Box::new(PersistencyCorrection::new())] };
         Ok(match self {
             Self::Trapezoidal => (Box::new(Newmark::trapezoidal()), Vec::new()),

@@ -176,10 +176,10 @@ fn by_modes(frame: &Frame, ratio: f64, ground: &Ground, interval: f64, count: us
 #[test]
 fn frames_far_apart_move_by_their_modes() {
     let (interval, count) = (5e-3, 400);
-    let until = f64::from(count) * interval;
+    let until = count as f64 * interval;
     let ground = Arc::new(Ground::sampled(interval, until, ricker(3.0, 1.5, 0.8)));
     let frames = Frames { gap: 10.0, ..Frames::of_the_study() };
-    let exact = frames.frames.map(|frame| by_modes(&frame, frames.damping, &ground, interval, count as usize));
+    let exact = frames.frames.map(|frame| by_modes(&frame, frames.damping, &ground, interval, count));
     let peak = exact[0].iter().flatten().fold(0.0, |peak: f64, u| peak.max(u.abs()));
     let error = |pounding, refinement: usize| {
         let record = run(&frames, &ground, pounding, interval / refinement as f64, until);
