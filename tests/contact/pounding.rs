@@ -3,7 +3,7 @@
 
 use contact_dynamics::LinearSystem;
 use contact_dynamics::reference::PowerLawImpact;
-use contact_dynamics::{ContactLaw, MoreauJean, Newmark, PersistencyCorrection, Simulation, System, verify};
+use contact_dynamics::{ContactLaw, Corrector, MoreauJean, Newmark, PersistencyCorrection, Simulation, System, verify};
 use contact_dynamics_scenes::damped_contact::{
     DampedContact, DampedLaw, damping_ratio, restitution_of_hertz_damp, restitution_without_pull,
 };
@@ -210,9 +210,36 @@ fn models_agree_on_impulses_and_not_on_forces() {
     for figures in &springs {
         assert!(figures.impacts.count > 0);
     }
-    // The force of an impact goes with the root of the stiffness.
+    // The force of an impact goes with the root of the stiffness; the impulses are those of the masses.
     for pair in springs.windows(2) {
         let ratio = pair[1].impacts.force / pair[0].impacts.force;
         assert!((1.5..5.0).contains(&ratio), "{ratio}");
     }
+    let rigid = of(Pounding::Law(ContactLaw::Rigid));
+    for figures in &springs[1..] {
+        let ratio = figures.impacts.impulse / rigid.impacts.impulse;
+        assert!((ratio - 1.0).abs() < 0.15, "{ratio}");
+    }
+}
+
+/// The same impacts by steps ten times as long: with the correction drifts and impulses hardly change, without it they
+/// do.
+#[test]
+fn corrected_impacts_do_not_depend_on_the_step() {
+    let frames = Frames::of_the_study();
+    let ground = Arc::new(Ground::sampled(5e-3, 2.0, ricker(3.5, 1.5, 0.8)));
+    let change = |corrected: bool| {
+        let [fine, coarse] = [5e-4, 5e-3].map(|h| {
+            let scheme = Box::new(Newmark::trapezoidal());
+            let correction: Box<dyn Corrector<f64>> = Box::new(PersistencyCorrection::new());
+            let correctors = if corrected { vec![correction] } else { Vec::new() };
+            let rigid = Pounding::Law(ContactLaw::Rigid);
+            frames.figures(&frames.run(&ground, rigid, scheme, correctors, h, 1.5).unwrap())
+        });
+        let drifts = fine.drifts.iter().zip(&coarse.drifts).map(|(fine, coarse)| (coarse / fine - 1.0).abs());
+        [drifts.fold(0.0, f64::max), (coarse.impacts.impulse / fine.impacts.impulse - 1.0).abs()]
+    };
+    let (corrected, raw) = (change(true), change(false));
+    assert!(corrected[0] < 0.04 && corrected[1] < 0.02, "{corrected:?}");
+    assert!(raw[0] > 3.0 * corrected[0] && raw[1] > 3.0 * corrected[1], "{corrected:?} {raw:?}");
 }
