@@ -1,10 +1,11 @@
 //! Pounding: two frames of different periods, a gap, one earthquake, and nine ways to let them collide.
 //!
 //! `cargo run --release --example pounding` prints the tables of `docs/scenes/pounding.md` and writes them and a figure
-//! (`pounding.svg`); with `--quick` the ground shakes for two seconds, and references are coarse.
+//! (`pounding.svg`); with `--quick` the ground shakes for four seconds, and references are coarse.
 //!
-//! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, their errors by the step,
-//! and what the stiffness of a contact does; `decks.rs` two bridge decks; `figure.rs` the figure.
+//! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, their errors by the
+//! step, what the stiffness of a contact does, and the restitution of damped laws; `decks.rs` two bridge decks;
+//! `figure.rs` the figure.
 
 mod decks;
 mod figure;
@@ -19,7 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("pounding")?;
     let study = tables::Study::new(output.quick);
     let mut page = String::new();
-    for table in study.tables()?.into_iter().chain([decks::Bridge::new(output.quick).table()?]) {
+    for table in study.tables()?.into_iter().chain([decks::Bridge::new(output.quick).table()?, tables::restitutions()])
+    {
         println!("{table}");
         writeln!(page, "{table}")?;
     }

@@ -3,6 +3,7 @@
 
 use crate::models::{self, Model};
 use contact_dynamics::Result;
+use contact_dynamics_scenes::damped_contact::{damping_ratio, restitution_of_hertz_damp, restitution_without_pull};
 use contact_dynamics_scenes::frames::{Figures, Frames};
 use contact_dynamics_scenes::ground::{GRAVITY, Ground};
 use contact_dynamics_scenes::pounding::{Impacts, Pounding};
@@ -32,6 +33,7 @@ impl Study {
         Self { frames: Frames::of_the_study(), ground, until, fine, repetitions }
     }
 
+    /// All tables of the frames.
     pub(crate) fn tables(&self) -> Result<Vec<String>> {
         let models = models::all(&self.frames);
         let references: Result<Vec<_>> = models.iter().map(|model| self.figures(model, self.fine)).collect();
@@ -129,4 +131,17 @@ impl Study {
         }
         Ok(text)
     }
+}
+
+/// What two free masses keep of their approach under the damped laws, by the coefficient that was put in.
+pub(crate) fn restitutions() -> String {
+    let mut text = String::from(
+        "Restitution of two free masses by the e put in (closed forms)\n\n| e | Kelvin–Voigt, without pull | Hertz, \
+         damped |\n| --- | --- | --- |\n",
+    );
+    for nominal in [0.4, 0.5, models::RESTITUTION, 0.8, 0.9] {
+        let found = [restitution_without_pull(damping_ratio(nominal)), restitution_of_hertz_damp(nominal)];
+        let _ = writeln!(text, "| {nominal} | {} |", found.map(|e| decimal(e, 3)).join(" | "));
+    }
+    text
 }
