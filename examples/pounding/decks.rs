@@ -80,8 +80,8 @@ impl Bridge {
         record.displacements().fold([0.0; 2], |most: [f64; 2], (_, u)| [most[0].max(u[i]), most[1].max(-u[j])])
     }
 
-    /// Largest force until the wave of the first touch comes back from the far end of the shorter deck, and ½ ρA c times
-    /// the velocity of approach in the step before it: what plane waves of two equal cross-sections have.
+    /// Largest force until the wave of the first touch comes back from the far end of the shorter deck, and ½ ρA c
+    /// times the velocity of approach in the step before it: what plane waves of two equal cross-sections have.
     fn first(decks: &Decks, record: &Record) -> [f64; 2] {
         let Some(touch) = record.forces().position(|(_, force)| force[0] > 0.0) else { return [0.0; 2] };
         let [i, j] = decks.contact();
@@ -99,10 +99,11 @@ impl Bridge {
         let [decks, fine] = &self.decks;
         let reference = self.run(fine, Way::Preset(Preset::conservative), self.fine)?;
         let mut text = format!(
-            "Two bridge decks of {} and {} elements: impacts, force of the first one until its wave is back, peak force \
-             (MN), hardest impact and sum of impulses (MN s), displacements of the ends that meet toward the other deck \
-             (mm), time of a step; the reference has {} and {} elements, and at its first touch ½ ρA c Δv = {} MN\n\n| \
-             model | h ms | impacts | first | force | hardest | impulses | left | right | µs/step |\n|{}\n",
+            "Two bridge decks of {} and {} elements: impacts, force of the first one until its wave is back, peak \
+             force (MN), hardest impact and sum of impulses (MN s), displacements of the ends that meet toward the \
+             other deck (mm), time of a step; the reference has {} and {} elements, and at its first touch ½ ρA c Δv \
+             = {} MN\n\n| model | h ms | impacts | first | force | hardest | impulses | left | right | µs/step \
+             |\n|{}\n",
             decks.decks[0].elements,
             decks.decks[1].elements,
             fine.decks[0].elements,

@@ -11,9 +11,9 @@ use std::time::Instant;
 pub(crate) fn table(quick: bool) -> Result<String> {
     let (sizes, steps): (&[usize], usize) = if quick { (&[40], 20) } else { (&[50, 100, 200, 400], 50) };
     let mut text = format!(
-        "Time of a step in µs, drill pipe that is pulled out, all contacts pressed and sliding (median of {steps} steps): \
-         a bare solve, a step without walls, without friction, with friction, and the last one over the solve\n\n| \
-         elements | h ms | solve | no walls | no friction | friction | friction, raw | friction/solve | \
+        "Time of a step in µs, drill pipe that is pulled out, all contacts pressed and sliding (median of {steps} \
+         steps): a bare solve, a step without walls, without friction, with friction, and the last one over the \
+         solve\n\n| elements | h ms | solve | no walls | no friction | friction | friction, raw | friction/solve | \
          iterations |\n|{}\n",
         " --- |".repeat(9)
     );

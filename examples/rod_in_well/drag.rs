@@ -74,10 +74,10 @@ pub(crate) fn states(run: &Simulation<'_, f64>) -> [usize; 2] {
 pub(crate) fn table(quick: bool) -> Result<String> {
     let (sizes, until): (&[usize], f64) = if quick { (&[40], 4.0) } else { (&[50, 100, 200], 10.0) };
     let mut text = format!(
-        "Drill pipe moved at {VELOCITY} m/s, h = {} ms: hook load over that of the soft string, mean of the last tenth of {until} s, its \
-         standard deviation over the mean, sum of the forces on the wall over that of the soft string, contacts that \
-         stick and slide at the end\n\n| elements | scheme | motion | soft string kN | error % | deviation % | \
-         wall force error % | stick | slide |\n|{}\n",
+        "Drill pipe moved at {VELOCITY} m/s, h = {} ms: hook load over that of the soft string, mean of the last \
+         tenth of {until} s, its standard deviation over the mean, sum of the forces on the wall over that of the \
+         soft string, contacts that stick and slide at the end\n\n| elements | scheme | motion | soft string kN | \
+         error % | deviation % | wall force error % | stick | slide |\n|{}\n",
         1e3 * STEP,
         " --- |".repeat(9)
     );

@@ -88,7 +88,7 @@ pub(crate) fn figure(quick: bool) -> Result<String, Box<dyn Error>> {
         format!("Drill pipe in a well of 2000 m, {elements} elements; (b), (c): weight on by 1 s, pulled from 2 s on");
     page(
         &title,
-        "Chung–Hulbert(0.8) with λ_v/λ_a, and the trapezoidal rule without; (d): a level bed, CD-Lagrange, Courant number 1",
+        "Chung–Hulbert(0.8) with λ_v/λ_a, the trapezoidal rule without; (d): level bed, CD-Lagrange, Courant number 1",
         &panels,
     )
 }

@@ -44,8 +44,8 @@ pub(crate) fn table(quick: bool) -> Result<String> {
     let mut text = format!(
         "Rod on a level bed pulled with {VELOCITY} m/s from rest: mean error of the hook load over its value at the \
          start, {} kN, until friction has stopped the front after {} m and {} ms; mean error of the velocity along the \
-         rod, half way, over that of the pull; depth that has moved by 1 mm when the front stops\n\n| elements | h ms | \
-         scheme | hook % | velocity % | moved m |\n|{}\n",
+         rod, half way, over that of the pull; depth that has moved by 1 mm when the front stops\n\n| elements | h \
+         ms | scheme | hook % | velocity % | moved m |\n|{}\n",
         decimal(1e-3 * impedance * VELOCITY, 2),
         decimal(stop, 0),
         decimal(1e3 * stop / c, 1),

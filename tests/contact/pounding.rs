@@ -115,8 +115,8 @@ fn damped_contacts_know_their_tangent_and_refuse_what_is_out_of_range() {
     assert!(place.contains("no place"), "{place}");
 }
 
-/// A floor of one frame at rest and one that comes: both go on with the common velocity, or part with e of the approach;
-/// the impulse is m v and (1 + e) m v with the reduced mass.
+/// A floor of one frame at rest and one that comes: both go on with the common velocity, or part with e of the
+/// approach; the impulse is m v and (1 + e) m v with the reduced mass.
 #[test]
 fn an_impact_of_floors_has_the_impulse_of_its_masses() {
     let frame = |mass| Frame { storeys: 1, mass, stiffness: 1e-9 };

@@ -8,8 +8,9 @@ fn correction() -> Vec<Box<dyn Corrector<f64>>> {
     vec![Box::new(PersistencyCorrection::with_history_projection())]
 }
 
-/// The pull of the hook, mean over the last tenth of a run, with the top moved at a constant velocity. Weight and motion
-/// come on smoothly: a rod that slides one way all the time is not damped by Coulomb's friction, and would go on swinging.
+/// The pull of the hook, mean over the last tenth of a run, with the top moved at a constant velocity. Weight and
+/// motion come on smoothly: a rod that slides one way all the time is not damped by Coulomb's friction, and would go on
+/// swinging.
 fn steady_hook(rod: &Rod, velocity: f64, h: f64, until: f64) -> f64 {
     let scheme = Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap());
     let mut run = rod.run(scheme, correction(), h, 0.6 * until, ramp(velocity, 0.3 * until)).unwrap();
@@ -78,8 +79,8 @@ fn the_hook_load_of_a_rod_that_moves_is_that_of_the_soft_string() {
 }
 
 /// A straight rod on a level bed, its end pulled with V from t = 0 on: the front runs with c, behind it the velocity is
-/// V − q x/(2 ρA c), so that friction q = μ w stops the front at 2 ρA c V/q; until then the hook pulls with ρA c V + q c
-/// t/2 (d'Alembert with a constant load behind the front).
+/// V − q x/(2 ρA c), so that friction q = μ w stops the front at 2 ρA c V/q; until then the hook pulls with ρA c V + q
+/// c t/2 (d'Alembert with a constant load behind the front).
 #[test]
 fn friction_stops_the_front_of_a_wave() {
     let well = Well { kick_off: 0.0, radius: 1e3, inclination: [FRAC_PI_2, FRAC_PI_2] };

@@ -15,8 +15,8 @@ pub enum DampedLaw {
         /// c (force time/length).
         damping: f64,
     },
-    /// k δ^3/2 (1 + 3 (1 − e²)/(4 v₀) δ̇), v₀ the velocity of approach at first touch (Muthukumar and DesRoches, Earthq.
-    /// Eng. Struct. Dyn. 35, 2006). A contact that began without approach has no damping.
+    /// k δ^3/2 (1 + 3 (1 − e²)/(4 v₀) δ̇), v₀ the velocity of approach at first touch (Muthukumar and DesRoches,
+    /// Earthq. Eng. Struct. Dyn. 35, 2006). A contact that began without approach has no damping.
     HertzDamp {
         /// k (force/length^3/2).
         stiffness: f64,

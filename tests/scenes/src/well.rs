@@ -3,8 +3,8 @@
 //!
 //! The rod is linear about the axis of the well, in which it lies without stress: displacements are those of a
 //! clearance, and the force N = T κ with which tension pulls it across a bend comes from the angles between the
-//! elements. What it takes to bend a straight rod into the well, and the stiffness of a taut string, are left out, as the
-//! soft string does.
+//! elements. What it takes to bend a straight rod into the well, and the stiffness of a taut string, are left out, as
+//! the soft string does.
 
 use crate::sparse::{Entry, matrix};
 use contact_dynamics::faer::sparse::SparseColMat;
@@ -177,8 +177,8 @@ impl Rod {
         (0..=self.elements).flat_map(of).collect()
     }
 
-    /// A run that begins with the rod at rest on the low side, weightless; weight (and the tail's pull) come on smoothly
-    /// within `onset`. The top moves up as `hoist` says (way, velocity, acceleration), and not sideways.
+    /// A run that begins with the rod at rest on the low side, weightless; weight (and the tail's pull) come on
+    /// smoothly within `onset`. The top moves up as `hoist` says (way, velocity, acceleration), and not sideways.
     ///
     /// # Errors
     ///
@@ -257,10 +257,10 @@ impl Rod {
         Ok(-reactions[..2].iter().zip(top).map(|(force, along)| force * along).sum::<f64>())
     }
 
-    /// The soft string (Johancsik, Friesen and Dawson, J. Petrol. Technol. 36, 1984): tension and force on the wall over
-    /// length at so many depths from the top to the end. From the lower end up dT = (w cos φ + sign μ |N|) ds, N = T κ −
-    /// w sin φ (on the high side if positive), with the sign +1 when the rod is pulled out, −1 when it is run in, 0 when
-    /// it has no friction.
+    /// The soft string (Johancsik, Friesen and Dawson, J. Petrol. Technol. 36, 1984): tension and force on the wall
+    /// over length at so many depths from the top to the end. From the lower end up dT = (w cos φ + sign μ |N|) ds, N =
+    /// T κ − w sin φ (on the high side if positive), with the sign +1 when the rod is pulled out, −1 when it is run in,
+    /// 0 when it has no friction.
     pub fn soft_string(&self, sign: f64, points: usize) -> Vec<[f64; 3]> {
         let pressed = |depth: f64, tension: f64| {
             tension * self.well.curvature_at(depth) - self.weight * self.well.inclination_at(depth).sin()
