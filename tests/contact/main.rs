@@ -8,5 +8,6 @@ mod laws;
 mod node_to_facet;
 mod obstacles;
 mod passing_through;
+mod pounding;
 mod rate_laws;
 mod two_bodies;

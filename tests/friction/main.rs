@@ -13,6 +13,7 @@ mod slab;
 mod solids;
 mod systems;
 mod tangents;
+mod well;
 
 use contact_dynamics::{LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator};
 use contact_dynamics_scenes::schemes::{self, Listed};
