@@ -1,9 +1,11 @@
 //! Elimination orders: fill, solutions that do not depend on them, and orders that cannot be used.
 
+use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::linear_solver::Ordering;
 use contact_dynamics::{
-    Cholesky, Composite, Error, Factorization, LinearRows, LinearSolver, PersistencyCorrection, Simulation,
+    Cholesky, Composite, Error, Factorization, LinearRows, LinearSolver, NodesOnObstacle, PersistencyCorrection,
+    Simulation, System,
 };
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -263,5 +265,39 @@ fn one_sided_patterns_are_refused_by_the_factorization() {
     for order in [Ordering::Automatic, Ordering::NestedDissection, Ordering::Coordinates(vec![[0.0; 3]; n])] {
         let mut factor: Box<dyn Factorization<f64>> = Cholesky::ordered(order).analyze(a.symbolic(), &[]).unwrap();
         assert!(matches!(factor.factorize(a.as_ref()), Err(Error::Asymmetric { .. })));
+    }
+}
+
+/// A run whose factor would be much larger with the interface last orders freely: all surface nodes of a solid may be
+/// candidates, at the price of a factor for the few that touch.
+#[test]
+fn whole_surfaces_may_be_candidates() {
+    let solid = block(9).lifted(1e-3);
+    let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+    let run = |nodes: &[usize], friction: f64| {
+        let contact = NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), nodes).unwrap().friction(friction);
+        let mut run = Simulation::builder(solid.system(), Composite, 0.05)
+            .velocity(solid.uniform([0.02, 0.0, -0.01]))
+            .constraint(contact)
+            .build()
+            .unwrap();
+        let mut largest = 0.0_f64;
+        for _ in 0..60 {
+            run.step().unwrap();
+            largest = largest.max(run.state().contacts().forces().iter().sum());
+        }
+        (run, largest)
+    };
+    let system = solid.system::<f64>();
+    let free = LinearSolver::<f64>::analyze(&Cholesky::default(), system.pattern(), &[]).unwrap().stored_values();
+    let bottom: Vec<usize> = face(&solid.clone().lifted(0.0)).into_iter().map(|dof| dof / 3).collect();
+    for friction in [0.0, 0.3] {
+        let (few, force) = run(&bottom, friction);
+        let (all, same) = run(&solid.surface_nodes(), friction);
+        assert!(few.factor_size() < 2 * free && all.factor_size() <= 2 * free, "{free} {}", all.factor_size());
+        // Only the lowest nodes touch, and which others might does not matter.
+        assert!(force > 0.0 && (same / force - 1.0).abs() < 1e-9, "{force} {same}");
+        let difference = distance(few.state().velocity(), all.state().velocity());
+        assert!(difference < 1e-9, "{difference:e}");
     }
 }
