@@ -23,7 +23,7 @@ const DEAR: f64 = 1.25;
 const DEAR_KEPT: f64 = 2.0;
 
 /// Share of a factor that the interface's dense triangle must have for a free order to be tried.
-const TRIANGLE: f64 = 0.25;
+const TRIANGLE: f64 = 0.1;
 
 /// Analyzes with the interface eliminated last, if the solver condenses; in a free order if the factor would otherwise
 /// be much larger, as with a whole surface in the interface: its dofs, eliminated last, fill a dense triangle.
