@@ -212,8 +212,8 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Dimension`] if D is not 2 or 3, if the lists differ in length, if a facet does not fit D, or if a node
     /// does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without nodes or
-    /// facets; [`Error::Incompatible`] for a facet without area, folded, turned
-    /// against its neighbor or at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
+    /// facets; [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
+    /// [`Error::Incompatible`] at a branch of the surface, and for nodes that are repeated or shared by the surfaces.
     pub fn one_pass<F: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
