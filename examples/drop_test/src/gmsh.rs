@@ -11,11 +11,12 @@ pub fn read(path: &Path, unit: f64) -> Result<Mesh> {
     let shown = path.display();
     let bytes = std::fs::read(path).map_err(|error| format!("the mesh {shown} cannot be read: {error}"))?;
     check_format(&bytes).map_err(|reason| format!("{shown} {reason}"))?;
-    // The error of the parser borrows the bytes and shows some of them: its last words say what it was looking for.
+    // The text of the parser's error ends in a dump of bytes; before it, line by line, is what was being read.
     let file = mshio::parse_msh_bytes(&bytes).map_err(|error| {
         let text = error.to_string();
-        let place = text.lines().find(|line| !line.trim().is_empty()).unwrap_or("no reason given").trim().to_owned();
-        format!("{shown} is damaged ({place}): write it again with `gmsh -3 MODEL.geo -format msh41`")
+        let reading = text.lines().map(str::trim).filter_map(|line| line.strip_prefix("in ")).next_back();
+        let place = reading.map_or(String::new(), |what| format!(" ({})", what.trim_end_matches([',', '.'])));
+        format!("{shown} is damaged{place}: write it again with `gmsh -3 MODEL.geo -format msh41`")
     })?;
     let (Some(nodes), Some(blocks)) = (file.data.nodes, file.data.elements) else {
         return Err(format!("{shown} has no nodes or no elements: mesh the volume first, with `gmsh -3`").into());

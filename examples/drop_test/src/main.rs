@@ -83,7 +83,7 @@ fn run(mut options: Options) -> Result<()> {
         .map_err(|error| format!("the directory {} cannot be made: {error}", directory.display()))?;
 
     let scene = Scene::new(&options, &mut phases)?;
-    let (scene, simulation) = scene.simulation(&options, checkpoint)?;
+    let simulation = scene.simulation(&options, checkpoint)?;
     phases.done("order and factor");
     describe(&options, &scene);
     let series = Series::new(&directory, &scene.mesh, scene.elements, std::mem::take(&mut pictures));
@@ -125,8 +125,8 @@ impl Recording<'_> {
         let begin = self.simulation.time();
         let friction = self.history.0.last().map_or(0.0, |record| record.friction);
         if self.history.0.is_empty() {
-            self.record(friction);
-            self.picture()?;
+            let forces = self.record(friction);
+            self.picture(&forces)?;
         }
         for step in 1..=steps {
             // Steps that fail are halved: several may make up one of the grid.
@@ -135,9 +135,9 @@ impl Recording<'_> {
                 self.simulation.step()?;
             }
             self.phases.done("steps");
-            self.record(friction);
+            let forces = self.record(friction);
             if step * frames / steps > (step - 1) * frames / steps {
-                self.picture()?;
+                self.picture(&forces)?;
             }
             if let Some(last) = self.history.0.last() {
                 bar.set_message(format!(
@@ -154,8 +154,9 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Adds the state to the history; `friction` was lost by friction before this run.
-    fn record(&mut self, friction: f64) {
+    /// Adds the state to the history; `friction` was lost by friction before this run. Returns the contact forces on all
+    /// dofs.
+    fn record(&mut self, friction: f64) -> Vec<f64> {
         let forces = self.forces();
         let mut force = [0.0; 3];
         for (dof, value) in forces[..3 * self.scene.nodes].iter().enumerate() {
@@ -171,6 +172,7 @@ impl Recording<'_> {
         let time = self.simulation.time();
         let energy = self.simulation.energy();
         self.history.0.push(Record::new(time, force, contacts, &energy, weight, friction));
+        forces
     }
 
     /// Contact forces on all dofs.
@@ -182,13 +184,12 @@ impl Recording<'_> {
         forces
     }
 
-    fn picture(&mut self) -> Result<()> {
+    fn picture(&mut self, force: &[f64]) -> Result<()> {
         let state = self.simulation.state();
         let u = state.displacement();
         let stress = self.scene.body.von_mises(u, self.options.model == Model::Linear);
         self.stress = stress.iter().copied().fold(self.stress, f64::max);
-        let (force, velocity) = (self.forces(), state.velocity());
-        let picture = Picture { displacement: u, velocity, force: &force, von_mises: &stress };
+        let picture = Picture { displacement: u, velocity: state.velocity(), force, von_mises: &stress };
         self.series.add(state.time(), &self.scene.mesh, &self.scene.surface, &picture)
     }
 }

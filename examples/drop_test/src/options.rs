@@ -253,6 +253,11 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Options::command().debug_assert();
+        // A restart takes all that makes the scene from the run before: nothing given beside it is left unread.
+        let own = ["steps", "frames", "output", "restart"];
+        for argument in Options::command().get_arguments().map(|argument| argument.get_id().as_str()) {
+            assert!(OF_THE_SCENE.contains(&argument) != own.contains(&argument), "{argument}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::options::{Model, Options, Scheme, Target};
 use crate::placement;
 use crate::{Phases, Result};
-use contact_dynamics::contact::{Facet, NodeToFacet, Plane, Side, Sphere};
+use contact_dynamics::contact::{self, Facet, NodeToFacet, Plane, Side, Sphere};
 use contact_dynamics::{
     CdLagrange, Checkpoint, Composite, GeneralizedAlpha, Newmark, NodesOnObstacle, Simulation, SimulationBuilder,
     StepControl, System, TimeIntegrator,
@@ -45,7 +45,7 @@ impl Scene {
     pub fn new(options: &Options, phases: &mut Phases) -> Result<Self> {
         let mut mesh = gmsh::read(&part(options), options.unit.meters())?;
         mesh.turn(options.turn.0);
-        let base = match &options.onto {
+        let mut base = match &options.onto {
             Target::Part(path) => Some(gmsh::read(path, options.unit.meters())?),
             Target::Plane | Target::Ball => None,
         };
@@ -55,23 +55,17 @@ impl Scene {
         let material = options.material;
         let other = options.target_material.unwrap_or(material);
         let step = step_size(options, &mesh, base.as_ref());
-        let (fall, target) = place(options, &mut mesh, base.as_ref())?;
+        let (mut surface, fall) = (mesh.boundary(), options.height);
+        let target = place(options, &mut mesh, base.as_mut(), surface.len())?;
         // v² = v₀² + 2 g H at the end of the fall; a part that is thrown up comes back.
         let last = (options.speed.powi(2) + 2.0 * options.gravity * fall).sqrt();
         let [start, speed, left] = approach(options, fall, BEFORE * step * last)?;
         mesh.translate([0.0, 0.0, left - fall]);
 
-        let mut surface = mesh.boundary();
-        let target = match target {
-            Placed::Plane(plane) => Obstacle::Plane(plane),
-            Placed::Ball(ball) => Obstacle::Ball(ball),
-            Placed::Part(base) => {
-                let first = surface.len();
-                surface.extend(base.boundary().into_iter().map(|facet| facet.iter().map(|n| n + nodes).collect()));
-                mesh.append(&base);
-                Obstacle::Part(first)
-            }
-        };
+        if let Some(base) = base {
+            surface.extend(base.boundary().into_iter().map(|facet| facet.iter().map(|n| n + nodes).collect()));
+            mesh.append(&base);
+        }
         let held = held(&mesh, nodes);
         let materials = |element: usize| if element < elements { material } else { other };
         let body = Body::new(&mesh, materials, options.gravity, &held);
@@ -81,10 +75,10 @@ impl Scene {
 
     /// The run, from the start or from where another one ended.
     pub fn simulation(
-        self,
+        &self,
         options: &Options,
         checkpoint: Option<Checkpoint<f64>>,
-    ) -> Result<(Self, Simulation<'static, f64>)> {
+    ) -> Result<Simulation<'static, f64>> {
         let scheme: Box<dyn TimeIntegrator> = match options.scheme {
             Scheme::ChungHulbert => Box::new(GeneralizedAlpha::chung_hulbert(0.8)?),
             Scheme::Composite => Box::new(Composite),
@@ -106,8 +100,7 @@ impl Scene {
         if let Some(checkpoint) = checkpoint {
             builder = builder.resume_from(checkpoint);
         }
-        let run = builder.build()?;
-        Ok((self, run))
+        Ok(builder.build()?)
     }
 
     fn contact(
@@ -116,18 +109,9 @@ impl Scene {
         friction: f64,
     ) -> Result<SimulationBuilder<'static, f64>> {
         let node_dofs: Vec<[usize; 3]> = (0..self.mesh.nodes.len()).map(dofs).collect();
-        let mut nodes: Vec<usize> = self.surface.iter().flatten().copied().filter(|&node| node < self.nodes).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        // Nodes farther away than an element, and than a step brings them, are left alone.
-        let reach = self.mesh.mean_size();
         Ok(match &self.target {
-            Obstacle::Plane(plane) => builder.constraint(
-                NodesOnObstacle::new(*plane, &self.mesh.nodes, &node_dofs, &nodes)?.friction(friction).reach(reach)?,
-            ),
-            Obstacle::Ball(ball) => builder.constraint(
-                NodesOnObstacle::new(*ball, &self.mesh.nodes, &node_dofs, &nodes)?.friction(friction).reach(reach)?,
-            ),
+            Obstacle::Plane(plane) => builder.constraint(self.against(*plane, &node_dofs, friction)?),
+            Obstacle::Ball(ball) => builder.constraint(self.against(*ball, &node_dofs, friction)?),
             Obstacle::Part(first) => {
                 let facets = |list: &[Vec<usize>]| list.iter().map(|nodes| facet(nodes)).collect::<Vec<_>>();
                 let (one, other) = self.surface.split_at(*first);
@@ -135,6 +119,21 @@ impl Scene {
                 builder.constraint(pair.friction(friction))
             }
         })
+    }
+
+    /// The nodes of the surface against a rigid body. Those farther away than an element, and than a step brings them,
+    /// are left alone.
+    fn against(
+        &self,
+        obstacle: impl contact::Obstacle<f64, 3> + 'static,
+        node_dofs: &[[usize; 3]],
+        friction: f64,
+    ) -> Result<NodesOnObstacle<'static, f64, 3>> {
+        let mut nodes = self.surface.concat();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let contact = NodesOnObstacle::new(obstacle, &self.mesh.nodes, node_dofs, &nodes)?;
+        Ok(contact.friction(friction).reach(self.mesh.mean_size())?)
     }
 }
 
@@ -151,39 +150,34 @@ pub fn part(options: &Options) -> PathBuf {
     options.mesh.clone().unwrap_or_else(shipped)
 }
 
-enum Placed {
-    Plane(Plane<f64, 3>),
-    Ball(Sphere<f64, 3>),
-    Part(Mesh),
-}
-
-/// Places the part above the middle of what it falls on; returns the height through which it falls.
-fn place(options: &Options, mesh: &mut Mesh, base: Option<&Mesh>) -> Result<(f64, Placed)> {
+/// Places the part at its height above the middle of what it falls on, and that with its top at the origin; `first` is
+/// the number of facets of the part.
+fn place(options: &Options, mesh: &mut Mesh, base: Option<&mut Mesh>, first: usize) -> Result<Obstacle> {
     let [low, high] = mesh.bounds();
     let [x, y] = options.offset.0;
     mesh.translate([x - 0.5 * (low[0] + high[0]), y - 0.5 * (low[1] + high[1]), -low[2]]);
-    let (clearance, placed) = match (&options.onto, base) {
+    let (clearance, target) = match (&options.onto, base) {
         (Target::Ball, _) => {
             let width = f64::max(high[0] - low[0], high[1] - low[1]);
             let radius = options.radius.unwrap_or(0.25 * width);
-            let clearance = placement::above_ball(mesh, radius);
-            (clearance, Placed::Ball(Sphere::new([0.0, 0.0, -radius], radius, Side::Outside)?))
+            let ball = Sphere::new([0.0, 0.0, -radius], radius, Side::Outside)?;
+            (placement::above_ball(mesh, radius), Obstacle::Ball(ball))
         }
         (Target::Part(_), Some(base)) => {
-            let mut base = base.clone();
             let [low, high] = base.bounds();
             base.translate([-0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1]), -high[2]]);
-            (placement::above_part(mesh, &base), Placed::Part(base))
+            (placement::above_part(mesh, base), Obstacle::Part(first))
         }
         _ => {
             let (s, c) = options.slope.to_radians().sin_cos();
-            (placement::above_plane(mesh, [s, 0.0, c]), Placed::Plane(Plane::new([0.0; 3], [s, 0.0, c])?))
+            let plane = Plane::new([0.0; 3], [s, 0.0, c])?;
+            (placement::above_plane(mesh, [s, 0.0, c]), Obstacle::Plane(plane))
         }
     };
     let clearance = clearance
         .ok_or("the part falls past what it should meet, with nothing below it: look at --offset and --radius")?;
     mesh.translate([0.0, 0.0, options.height - clearance]);
-    Ok((options.height, placed))
+    Ok(target)
 }
 
 /// Time, speed and height left where a run begins that has about `distance` before contact.
@@ -248,7 +242,7 @@ mod tests {
     fn scenes_begin_clear_of_contact_by_a_few_steps() {
         for words in [&[][..], &["--slope", "20"], &["--onto", "ball"], &["--turn", "30,40,50"]] {
             let scene = Scene::new(&options(words), &mut Phases::new()).unwrap();
-            let (scene, run) = scene.simulation(&options(words), None).unwrap();
+            let run = scene.simulation(&options(words), None).unwrap();
             let gaps = run.state().contacts().gaps();
             let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
             let way = BEFORE * scene.step * scene.speed;

@@ -1,11 +1,11 @@
 //! A neo-Hookean block lands on an edge at large strains: fenris assembles force and tangent in each Newton iteration.
 
-use crate::elastic::Material;
 use crate::glue;
 use crate::hyperelastic::Hyperelastic;
 use crate::scene::Outcome;
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{EnergyMomentum, Newton, NodesOnObstacle, Simulation, StepControl, System, verify};
+use contact_dynamics_scenes::solids::Material;
 use fenris::mesh::procedural::create_rectangular_uniform_hex_mesh;
 use fenris::nalgebra::{Rotation3, Vector3};
 use std::fmt::Write;

@@ -1,10 +1,11 @@
 //! A disc of fenris's own mesh is thrown at a floor, obliquely and with friction: momentum and energy.
 
-use crate::elastic::{Body, Material};
+use crate::elastic::{self, Body};
 use crate::glue;
 use crate::scene::Outcome;
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{GeneralizedAlpha, LinearSystem, NodesOnObstacle, Simulation};
+use contact_dynamics_scenes::solids::Material;
 use fenris::geometry::sdf::SdfCircle;
 use fenris::mesh::procedural::approximate_quad_mesh_for_sdf_2d;
 use fenris::nalgebra::Vector2;
@@ -59,7 +60,7 @@ pub(crate) fn run(cells: usize) -> Outcome<Figures> {
     let circle = SdfCircle { radius: RADIUS, center: Vector2::new(0.0, RADIUS + HEIGHT) };
     let body = Body::new(&approximate_quad_mesh_for_sdf_2d(&circle, size), MATERIAL)?;
     let dofs = body.mass.nrows();
-    let speed = (MATERIAL.wave_modulus() / MATERIAL.density).sqrt();
+    let speed = (elastic::wave_modulus(&MATERIAL) / MATERIAL.density).sqrt();
     let (transit, h) = (2.0 * RADIUS / speed, 0.5 * size / speed);
     let floor = Plane::new([0.0, 0.0], [0.0, 1.0])?;
     let nodes = glue::node_dofs(body.nodes.len());

@@ -2,6 +2,7 @@
 
 use crate::glue;
 use contact_dynamics::faer::sparse::SparseColMat;
+use contact_dynamics_scenes::solids::Material;
 use fenris::assembly::global::CsrAssembler;
 use fenris::assembly::local::{Density, ElementEllipticAssemblerBuilder, ElementMassAssembler};
 use fenris::mesh::QuadMesh2d;
@@ -10,24 +11,15 @@ use fenris::quadrature::{CanonicalMassQuadrature, CanonicalStiffnessQuadrature};
 use fenris_solid::MaterialEllipticOperator;
 use fenris_solid::materials::{LameParameters, LinearElasticMaterial, YoungPoisson};
 
-/// Steel of a soft kind, in units of m, kg and s.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Material {
-    pub(crate) young: f64,
-    pub(crate) poisson: f64,
-    pub(crate) density: f64,
+/// The constants of a material as fenris takes them.
+pub(crate) fn lame(material: &Material) -> LameParameters<f64> {
+    YoungPoisson { young: material.young, poisson: material.poisson }.into()
 }
 
-impl Material {
-    pub(crate) fn lame(&self) -> LameParameters<f64> {
-        YoungPoisson { young: self.young, poisson: self.poisson }.into()
-    }
-
-    /// λ + 2μ, the stiffness against strain along one direction alone.
-    pub(crate) fn wave_modulus(&self) -> f64 {
-        let LameParameters { mu, lambda } = self.lame();
-        lambda + 2.0 * mu
-    }
+/// λ + 2μ, the stiffness against strain along one direction alone.
+pub(crate) fn wave_modulus(material: &Material) -> f64 {
+    let LameParameters { mu, lambda } = lame(material);
+    lambda + 2.0 * mu
 }
 
 /// A mesh with its matrices.
@@ -44,7 +36,7 @@ impl Body {
         let assembler = CsrAssembler::default();
         let density = mesh.canonical_mass_quadrature().with_uniform_data(Density(material.density));
         let mass = ElementMassAssembler::with_solution_dim(2).with_space(mesh).with_quadrature_table(&density);
-        let lame = mesh.canonical_stiffness_quadrature().with_uniform_data(material.lame());
+        let lame = mesh.canonical_stiffness_quadrature().with_uniform_data(lame(&material));
         // (A linear operator is assembled at any u.)
         let rest = DVector::zeros(2 * mesh.vertices().len());
         let operator = MaterialEllipticOperator::new(&LinearElasticMaterial);
@@ -66,7 +58,7 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_dynamics_scenes::solids;
+    use contact_dynamics_scenes::solids::Solid;
     use fenris::mesh::procedural::create_rectangular_uniform_quad_mesh_2d;
     use fenris::nalgebra::Vector2;
 
@@ -87,11 +79,10 @@ mod tests {
             vertex.y += 0.1 * (2.0 * x).cos() * y;
         });
         let body = Body::new(&mesh, material).unwrap();
-        let Material { young, poisson, density } = material;
-        let other = solids::Solid::<2> {
+        let other = Solid::<2> {
             nodes: body.nodes.clone(),
             elements: mesh.connectivity().iter().map(|quad| quad.0.to_vec()).collect(),
-            material: solids::Material { young, poisson, density },
+            material,
         };
         assert!(difference(&body.stiffness, &other.stiffness()) < 1e-13);
         assert!(difference(&body.mass, &other.consistent_mass()) < 1e-13);

@@ -1,9 +1,10 @@
 //! A neo-Hookean body at large strains: a `System` whose force and tangent fenris assembles in every Newton iteration.
 
-use crate::elastic::Material;
+use crate::elastic::lame;
 use crate::glue;
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{Error, Mass, Result, System, TangentWeights};
+use contact_dynamics_scenes::solids::Material;
 use fenris::assembly::global::{CsrAssembler, VectorAssembler, assemble_scalar};
 use fenris::assembly::local::{
     Density, ElementEllipticAssembler, ElementEllipticAssemblerBuilder, ElementMassAssembler, UniformQuadratureTable,
@@ -42,7 +43,7 @@ impl Hyperelastic {
         let pull: Vec<f64> = (0..dofs).map(|dof| gravity[dof % 3]).collect();
         let mut weight = vec![0.0; dofs];
         Mass::Consistent(mass.as_ref()).product(1.0, &pull, &mut weight)?;
-        let quadrature = mesh.canonical_stiffness_quadrature().with_uniform_data(material.lame());
+        let quadrature = mesh.canonical_stiffness_quadrature().with_uniform_data(lame(&material));
         let operator = MaterialEllipticOperator::new(&NeoHookeanMaterial);
         let rest = vec![0.0; dofs];
         let elements = elements(&mesh, &operator, &quadrature, &rest);

@@ -1,7 +1,7 @@
 //! A slab in plane strain flies against a wall, its sides held: strain along one direction alone, so that the force is
 //! known, F = ρ c_p A v with c_p = √((λ + 2μ)/ρ) while the wave runs to the far end and back.
 
-use crate::elastic::{Body, Material};
+use crate::elastic::{self, Body};
 use crate::glue;
 use crate::scene::Outcome;
 use contact_dynamics::contact::Plane;
@@ -11,6 +11,7 @@ use contact_dynamics::{
     Corrector, GeneralizedAlpha, LinearSystem, Mass, Newmark, NodesOnObstacle, PersistencyCorrection, Preset,
     Simulation, TimeIntegrator, mass,
 };
+use contact_dynamics_scenes::solids::Material;
 use fenris::mesh::procedural::create_rectangular_uniform_quad_mesh_2d;
 use fenris::nalgebra::Vector2;
 use std::fmt::Write;
@@ -68,7 +69,7 @@ fn length() -> f64 {
 }
 
 fn wave_speed() -> f64 {
-    (MATERIAL.wave_modulus() / MATERIAL.density).sqrt()
+    (elastic::wave_modulus(&MATERIAL) / MATERIAL.density).sqrt()
 }
 
 fn step(across: usize) -> f64 {
@@ -124,7 +125,7 @@ fn run(body: &Body, wall: &[usize], across: usize, choice: Choice) -> Outcome<Fi
         .build()?;
 
     let density = MATERIAL.density;
-    let bar = Bar { young: MATERIAL.wave_modulus(), density, area: HEIGHT, length: length(), velocity: SPEED };
+    let bar = Bar { young: elastic::wave_modulus(&MATERIAL), density, area: HEIGHT, length: length(), velocity: SPEED };
     let exact = CollidingBars::against_wall(bar, gap, END * transit * 1.1)?;
     let plateau = density * wave_speed() * HEIGHT * SPEED;
     let (start, momentum) = (run.energy().total(), run.momentum(&along)?);

@@ -96,9 +96,8 @@ impl Sheets {
         let results = state.contacts();
         for (index, contact) in contacts.iter().enumerate() {
             let (normal, friction) = (results.forces()[index], results.friction_forces(index));
-            let size = friction.iter().fold(0.0, |size: f64, f| size.hypot(*f));
             let mut cells = vec![time.clone(), contact.name.clone()];
-            cells.extend([normal, size, results.gaps()[index]].map(number));
+            cells.extend([normal, friction_size(results, index), results.gaps()[index]].map(number));
             cells.extend([status(results, index).to_string(), number(impulses[index])]);
             cells.extend(contact.force(normal, friction).into_iter().map(number));
             cells.resize(10, String::new());
@@ -126,6 +125,11 @@ impl Sheets {
     pub(crate) fn finish(&mut self) -> Result<()> {
         [&mut self.forces, &mut self.motion, &mut self.energy].into_iter().try_for_each(Sheet::finish)
     }
+}
+
+/// Size of the friction force of a contact.
+pub(crate) fn friction_size(contacts: &ContactState<f64>, index: usize) -> f64 {
+    contacts.friction_forces(index).iter().fold(0.0, |size: f64, f| size.hypot(*f))
 }
 
 fn status(contacts: &ContactState<f64>, index: usize) -> &'static str {

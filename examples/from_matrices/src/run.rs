@@ -3,7 +3,7 @@
 use crate::contacts::{self, Contact};
 use crate::model::Model;
 use crate::options::{Options, Overlap, recorded};
-use crate::output::{Peak, Sheets, Summary};
+use crate::output::{Peak, Sheets, Summary, friction_size};
 use crate::refusal::{Refusal, Result};
 use crate::schemes;
 use contact_dynamics::{ContactState, InitialOverclosure, Lu, Simulation};
@@ -150,6 +150,6 @@ impl Watch {
 
 /// Sums of the normal forces and of the sizes of friction.
 fn totals(contacts: &ContactState<f64>) -> [f64; 2] {
-    let size = |index| contacts.friction_forces(index).iter().fold(0.0, |size: f64, f| size.hypot(*f));
-    [contacts.forces().iter().sum(), (0..contacts.ids().len()).map(size).sum()]
+    let friction = (0..contacts.ids().len()).map(|index| friction_size(contacts, index)).sum();
+    [contacts.forces().iter().sum(), friction]
 }
