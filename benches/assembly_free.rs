@@ -12,6 +12,7 @@ use contact_dynamics::{
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use contact_dynamics_scenes::yardsticks;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
@@ -232,7 +233,7 @@ fn table<T: Real, E: Elements<T>>(scene: Scene<T, E>, unit: Unit, samples: usize
     let Scene { free, pressed, u, v, contacts, h } = scene;
     let mut table = Table::new(unit, RATIOS);
     table.reference("force alone", timing::force(free.clone()));
-    table.reference("force and one pass over the vectors", timing::explicit_limit(free.clone(), h));
+    table.reference("force and one pass over the vectors", yardsticks::explicit_limit(free.clone(), h));
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] = [|| Box::new(CentralDifference), || Box::new(CdLagrange)];
     for scheme in schemes {
         let builder = Simulation::builder(free.clone(), scheme(), h).velocity(v.clone());

@@ -4,9 +4,10 @@
 //! `cargo bench --bench solids -- [elements a side]…` (default blocks of 10 and 20 after the plate of 300 × 300; 30
 //! takes four minutes, 40 a quarter of an hour and 8 GB)
 
-use contact_dynamics::{Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
+use contact_dynamics::{CentralDifference, Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use contact_dynamics_scenes::yardsticks;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
@@ -14,6 +15,8 @@ const RATIOS: &[Ratio] = &[
     Ratio { heading: "/ bare solve", to: &["bare solve, free"] },
     Ratio { heading: "/ (solve + K)", to: &["bare solve, free", "bare K product"] },
     Ratio { heading: "/ reading twice", to: &["reading the factor twice"] },
+    Ratio { heading: "/ K by rows", to: &["K product by compressed rows"] },
+    Ratio { heading: "/ by arrays", to: &["explicit step by arrays"] },
 ];
 
 fn main() {
@@ -50,7 +53,10 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     let millions = |scalars: usize| scalars as f64 / 1e6;
     table.reference(format!("bare solve, free order ({:.1} M)", millions(stored)), timing::solve(factor, solid.dofs()));
     table.reference("bare K product", timing::force(solid.system::<T>()));
-    table.reference("reading the factor twice", timing::reading::<T>(stored));
+    table.reference("reading the factor twice", yardsticks::reading::<T>(stored));
+    table.reference("K product by compressed rows", yardsticks::gather(&k));
+    table.reference("explicit step by arrays", yardsticks::explicit_by_arrays(&k, &mass, 0.1 * h));
+    table.row("central differences", explicit::<T, D>(solid, 0.1 * h));
     let last = timing::factor(&a, &candidates);
     let contact_last = format!("bare solve, contact last ({:.1} M)", millions(last.stored_values()));
     table.row(contact_last, timing::solve(last, solid.dofs()));
@@ -83,6 +89,16 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     table.print();
     let rate = 2.0 * (stored * size_of::<T>()) as f64 / table.median("reading the factor twice") / 1e9;
     println!("memory is read at {rate:.1} GB/s\n");
+}
+
+/// A step of central differences without contact.
+fn explicit<T: Real, const D: usize>(solid: &Solid<D>, h: f64) -> impl FnMut() + use<T, D> {
+    let system = solid.system::<T>();
+    let mut run = Simulation::builder(system, CentralDifference, h)
+        .velocity((0..solid.dofs()).map(|i| T::of(1e-3 * (0.1 * i as f64).sin())).collect())
+        .build()
+        .expect("a well-posed scene");
+    move || run.step().expect("a well-posed step")
 }
 
 /// A body that its weight presses on so many nodes of the floor (`None`: without candidates); the others are far above

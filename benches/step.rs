@@ -1,6 +1,6 @@
 //! Cost of a step of the two-bar scene beside the bare triangular solve and the bare K product, in one run.
 //!
-//! `cargo bench --bench step -- [elements a bar]…` (default 100 to a million: about two minutes) prints medians and
+//! `cargo bench --bench step -- [elements a bar]…` (default 20 to a million: about three minutes) prints medians and
 //! ratios for `f64` and `f32`. The machine may be shared: the samples of all rows are interleaved, and only ratios
 //! within one run mean something elsewhere.
 
@@ -15,19 +15,20 @@ use contact_dynamics::{
     CentralDifference, Composite, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Real, Simulation,
     TimeIntegrator,
 };
-use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use contact_dynamics_scenes::{Bars, yardsticks};
 use std::hint::black_box;
 
 const RATIOS: &[Ratio] = &[
     Ratio { heading: "/ bare solve", to: &["bare solve"] },
     Ratio { heading: "/ (solve + K)", to: &["bare solve", "bare K product"] },
     Ratio { heading: "/ by hand", to: &["composite step by hand"] },
+    Ratio { heading: "/ Newmark by hand", to: &["Newmark step by hand"] },
     Ratio { heading: "/ (K + vectors)", to: &["K product and vectors"] },
 ];
 
 fn main() {
-    let arguments = Arguments::read(&[100, 1_000, 10_000, 100_000, 1_000_000], &[100]);
+    let arguments = Arguments::read(&[20, 100, 400, 1_000, 10_000, 100_000, 1_000_000], &[20]);
     for &n in &arguments.sizes {
         table::<f64>("f64", n, &arguments, |table, bars, h| {
             let a = timing::effective(&bars.stiffness::<f64>(), &bars.lumped_mass(), &Composite, h);
@@ -47,8 +48,9 @@ fn table<T: Real>(scalar: &str, n: usize, arguments: &Arguments, more: impl FnOn
     let mut table = Table::new(Unit::Micro, RATIOS);
     table.reference("bare solve", timing::solve(factor, bars.dofs()));
     table.reference("bare K product", timing::force(bars.system::<T>()));
-    table.reference("composite step by hand", by_hand::<T>(&bars, h));
-    let limit = timing::explicit_limit(bars.system::<T>(), 0.9 * h);
+    table.reference("composite step by hand", yardsticks::composite_by_hand::<T>(&bars, h));
+    table.reference("Newmark step by hand, closed, corrected", yardsticks::newmark_by_hand::<T>(&bars, h));
+    let limit = yardsticks::explicit_limit(bars.system::<T>(), 0.9 * h);
     table.reference("K product and vectors", limit);
     drop(a);
     // Large scenes do not fit into memory all together.
@@ -60,7 +62,7 @@ fn table<T: Real>(scalar: &str, n: usize, arguments: &Arguments, more: impl FnOn
         }
     };
     more(&mut table, &bars, h);
-    table.row("reading the factor twice", timing::reading::<T>(stored));
+    table.row("reading the factor twice", yardsticks::reading::<T>(stored));
     sample(&mut table, false);
     table.row("central differences", steps(explicit::<T>(&bars, 0.9 * h)));
     sample(&mut table, false);
@@ -105,54 +107,6 @@ fn faer_solve(a: &SparseColMat<usize, f64>) -> impl FnMut() + 'static {
         let factor = LdltRef::<usize, f64>::new(&symbolic, &values);
         factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut memory));
         black_box(&x);
-    }
-}
-
-/// The composite scheme's step of chains in a straight program: what a host would write for this scene alone.
-/// Prediction, product with K and forward sweep are one loop, backward sweep and recovery another one.
-fn by_hand<T: Real>(bars: &Bars, h: f64) -> impl FnMut() + 'static {
-    let dofs = bars.dofs();
-    let (stiffness, mass) = (bars.stiffness::<T>(), bars.lumped_mass::<T>());
-    let zero = T::zero();
-    let entry = |i: usize, j: usize| {
-        let rows = stiffness.as_ref().row_idx_of_col_raw(j);
-        rows.iter().position(|&row| row == i).map_or(zero, |at| stiffness.val_of_col(j)[at])
-    };
-    let diagonal: Vec<T> = (0..dofs).map(|i| entry(i, i)).collect();
-    let beside: Vec<T> = (0..dofs).map(|i| if i + 1 < dofs { entry(i, i + 1) } else { zero }).collect();
-    // L D Lᵀ of 5/2 M/h² + K.
-    let inertia = T::of(2.5 / (h * h));
-    let (mut lower, mut inverse) = (vec![zero; dofs], vec![zero; dofs]);
-    for i in 0..dofs {
-        let pivot = inertia * mass[i] + diagonal[i] - if i > 0 { lower[i - 1] * beside[i - 1] } else { zero };
-        (inverse[i], lower[i]) = (pivot.recip(), beside[i] / pivot);
-    }
-    let still = || vec![zero; dofs];
-    let (mut u, mut u1, mut v, mut v1, mut x, mut a) = (still(), still(), still(), still(), still(), still());
-    u.iter_mut().enumerate().for_each(|(i, u)| *u = T::of(1e-3 * (0.1 * i as f64).sin()));
-    u1.copy_from_slice(&u);
-    let [of_u, of_v, of_v1] = [0.6, 0.8 * h, 0.4 * h].map(T::of);
-    let [rate_new, rate_old] = [1.5 / h, 0.5 / h].map(T::of);
-    move || {
-        let predicted = |i: usize| u[i] + of_u * (u[i] - u1[i]) + (of_v * v[i] - of_v1 * v1[i]);
-        let (mut before, mut now, mut last) = (zero, predicted(0), zero);
-        for i in 0..dofs {
-            let next = if i + 1 < dofs { predicted(i + 1) } else { zero };
-            let pull = diagonal[i] * now + beside[i] * next + if i > 0 { beside[i - 1] * before } else { zero };
-            last = -pull - if i > 0 { lower[i - 1] * last } else { zero };
-            x[i] = last;
-            (before, now) = (now, next);
-        }
-        let mut d = zero;
-        for i in (0..dofs).rev() {
-            d = x[i] * inverse[i] - lower[i] * d;
-            let new = u[i] + of_u * (u[i] - u1[i]) + (of_v * v[i] - of_v1 * v1[i]) + d;
-            let rate = rate_new * (new - u[i]) - rate_old * (u[i] - u1[i]);
-            a[i] = inertia * d;
-            (u1[i], u[i]) = (u[i], new);
-            (v1[i], v[i]) = (v[i], rate);
-        }
-        black_box((&u, &v, &a));
     }
 }
 

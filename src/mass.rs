@@ -20,6 +20,7 @@ pub use redistribute::{Redistribution, affine_motions, redistribute, redistribut
 pub use singular::{mixed, singular};
 
 use crate::error::{Error, Result};
+use crate::kernels::vector::Accumulate;
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};
 use crate::real::Real;
 use crate::sparse;
@@ -63,7 +64,7 @@ impl<T: Real> Mass<'_, T> {
                     *y += c * m * x;
                 }
             }
-            Self::Consistent(m) => T::symmetric_product(c, m, x, y),
+            Self::Consistent(m) => T::symmetric_product(c, m, x, y, Accumulate::Add),
         }
     }
 }

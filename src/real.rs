@@ -10,8 +10,9 @@ use crate::kernels::cholesky::{self, Columns, Factorization, Simplicial, Superno
 use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
 use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
+use crate::kernels::product::{self, LowerColumns, Tridiagonal};
 use crate::kernels::vector::{self, Accumulate};
-use crate::kernels::{block_sweep, product, sweep};
+use crate::kernels::{block_sweep, sweep};
 use crate::scalar::Scalar;
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, StackReq};
@@ -61,10 +62,13 @@ pub trait Kernels: Sized {
     fn largest(x: &[Self]) -> Self;
     /// `y += c A x`, any A.
     fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
-    /// `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
-    fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
-    /// `y = c A x` for symmetric A.
-    fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
+    /// `y = c A x` or `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
+    fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
+    /// `y = c A x` or `y += c A x` for tridiagonal symmetric A.
+    fn tridiagonal_product(c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
+    /// `y += c A x` with some columns of a symmetric A from the diagonal down, and their mirror images; `y` begins at
+    /// the first of the columns.
+    fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]);
     /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller. Only
     /// supernodal factors use threads.
     fn cholesky(
@@ -193,11 +197,20 @@ macro_rules! kernels {
             fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
                 product::product(c, a, x, y);
             }
-            fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
-                product::symmetric_product(a, x, y, |y, sum| *y += c * sum);
+            fn symmetric_product(
+                c: Self,
+                a: SparseColMatRef<'_, usize, Self>,
+                x: &[Self],
+                y: &mut [Self],
+                put: Accumulate,
+            ) {
+                product::symmetric_product(c, a, x, y, put);
             }
-            fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
-                product::symmetric_product(a, x, y, |y, sum| *y = c * sum);
+            fn tridiagonal_product(c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate) {
+                product::tridiagonal_product(c, a, x, y, put);
+            }
+            fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]) {
+                product::lower_product(c, columns, x, y);
             }
             fn cholesky(
                 kind: Factorization,

@@ -1,5 +1,9 @@
 //! Checks of sparse input, and linear combinations of sparse matrices in one fixed pattern.
 
+mod product;
+
+pub(crate) use product::Product;
+
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -60,16 +64,6 @@ pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usi
         Ok(()) => Ok(Symmetry::Symmetric),
         Err(Error::Asymmetric { .. }) if stored(usize::gt) && stored(usize::lt) => Ok(Symmetry::General),
         Err(other) => Err(other),
-    }
-}
-
-impl Symmetry {
-    /// `y += c A x`.
-    pub(crate) fn product<T: Real>(self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
-        match self {
-            Self::Symmetric => T::symmetric_product(c, a, x, y),
-            Self::General => T::product(c, a, x, y),
-        }
     }
 }
 

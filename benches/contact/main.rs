@@ -15,6 +15,7 @@ use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem,
 use contact_dynamics::{Composite, Factorization, LinearRows, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use contact_dynamics_scenes::yardsticks;
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::rc::Rc;
@@ -131,7 +132,7 @@ fn measure(n: usize, arguments: &Arguments) {
         table.row(name, move || run.step().expect("a well-posed step"));
     }
     table.row("bare K product", timing::force(block.system::<f64>()));
-    table.row("reading the first factor twice", timing::reading::<f64>(stored));
+    table.row("reading the first factor twice", yardsticks::reading::<f64>(stored));
     // Operations of small scenes find their memory in the cache in a run as well.
     let [samples, calls] = [if n > 25 { 5 } else { 15 }, 100_000 / block.dofs()].map(|times| arguments.repeated(times));
     table.sample(samples, calls);

@@ -5,7 +5,7 @@ use crate::analysis::{self, ZeroStability};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
 use crate::real::Real;
-use crate::sparse::{self, Symmetry};
+use crate::sparse::{self, Product, Symmetry};
 use crate::state::Motion;
 use crate::system::{Linearity, System, TangentWeights};
 use crate::tableau::Tableau;
@@ -133,7 +133,7 @@ struct Highest {
 /// What K does to a vector.
 enum Stiffness<'s, T: Real> {
     /// The values of the system's pattern.
-    Matrix { values: Vec<T>, symmetry: Symmetry },
+    Matrix { values: Vec<T>, product: Product<T> },
     /// Differences of the force over a displacement of the given size.
     Force { at: &'s Motion<T>, force: Vec<T>, size: T, moved: Vec<T> },
 }
@@ -155,9 +155,9 @@ impl<'s, T: Real> Stiffness<'s, T> {
             let mut values = vec![T::zero(); entries];
             let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
             system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
-            let symmetry = sparse::symmetry("stiffness", SparseColMatRef::new(system.pattern(), &values))
-                .unwrap_or(Symmetry::General);
-            return Ok(Some(Self::Matrix { values, symmetry }));
+            let k = SparseColMatRef::new(system.pattern(), &values[..]);
+            let product = Product::new(k, sparse::symmetry("stiffness", k).unwrap_or(Symmetry::General));
+            return Ok(Some(Self::Matrix { values, product }));
         }
         let size = match system.linearity() {
             Linearity::Linear => T::one(),
@@ -176,7 +176,7 @@ impl<'s, T: Real> Stiffness<'s, T> {
     }
 
     fn is_symmetric(&self) -> bool {
-        !matches!(self, Self::Matrix { symmetry: Symmetry::General, .. })
+        !matches!(self, Self::Matrix { product: Product::General, .. })
     }
 
     /// The circles of M⁻¹ K on the dofs with a response, for a lumped mass and a matrix.
@@ -201,9 +201,8 @@ impl<'s, T: Real> Stiffness<'s, T> {
     /// `y = K x`.
     fn product(&mut self, system: &mut dyn System<T>, x: &[T], y: &mut [T]) -> Result<()> {
         match self {
-            Self::Matrix { values, symmetry } => {
-                y.fill(T::zero());
-                symmetry.product(T::one(), SparseColMatRef::new(system.pattern(), values), x, y);
+            Self::Matrix { values, product } => {
+                product.write(T::one(), SparseColMatRef::new(system.pattern(), values), x, y);
             }
             Self::Force { at, force, size, moved } => {
                 let longest = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));

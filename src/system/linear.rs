@@ -4,7 +4,7 @@ use super::{DampingForce, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
-use crate::sparse::{self, Combination, Symmetry};
+use crate::sparse::{self, Combination, Product, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) -> Result<()> + Send + 'a>;
@@ -41,8 +41,8 @@ type Motion<'a, T> = Box<dyn FnMut(f64) -> Result<[T; 3]> + Send + 'a>;
 pub struct LinearSystem<'a, T: Real> {
     mass: StoredMass<T>,
     stiffness: SparseColMat<usize, T>,
-    /// Whether K is symmetric.
-    symmetry: Symmetry,
+    /// How K is multiplied.
+    product: Product<T>,
     damping: StoredDamping<T>,
     /// K and a general C in one pattern; K's own pattern is enough without C.
     union: Option<Combination>,
@@ -64,7 +64,7 @@ enum StoredDamping<T> {
         mass: T,
         stiffness: T,
     },
-    General(SparseColMat<usize, T>, Symmetry),
+    General(SparseColMat<usize, T>, Product<T>),
 }
 
 impl<T: Real> std::fmt::Debug for LinearSystem<'_, T> {
@@ -128,11 +128,11 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             });
         }
         same_size("stiffness matrix", n, stiffness.as_ref())?;
-        let symmetry = sparse::symmetry("stiffness", stiffness.as_ref())?;
+        let product = Product::new(stiffness.as_ref(), sparse::symmetry("stiffness", stiffness.as_ref())?);
         Ok(Self {
             mass,
             stiffness,
-            symmetry,
+            product,
             damping: StoredDamping::None,
             union: None,
             load: None,
@@ -149,9 +149,9 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for a C of one triangle.
     pub fn damping(mut self, damping: SparseColMat<usize, T>) -> Result<Self> {
         same_size("damping matrix", self.dofs(), damping.as_ref())?;
-        let symmetry = sparse::symmetry("damping", damping.as_ref())?;
+        let product = Product::new(damping.as_ref(), sparse::symmetry("damping", damping.as_ref())?);
         self.union = Some(Combination::new(self.dofs(), &[], &[self.stiffness.symbolic(), damping.symbolic()])?);
-        self.damping = StoredDamping::General(damping, symmetry);
+        self.damping = StoredDamping::General(damping, product);
         Ok(self)
     }
 
@@ -315,18 +315,16 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             T::axpy(*stiffness, v, &mut self.scratch);
         }
         let moved = if let StoredDamping::Rayleigh { .. } = &self.damping { &self.scratch[..] } else { u };
-        match (&mut self.load, self.symmetry) {
-            (None, Symmetry::Symmetric) => T::symmetric_product_into(minus, self.stiffness.as_ref(), moved, out),
-            (load, symmetry) => {
+        match &mut self.load {
+            None => self.product.write(minus, self.stiffness.as_ref(), moved, out),
+            Some(load) => {
                 out.fill(T::zero());
-                if let Some(load) = load {
-                    load(t, out)?;
-                }
-                symmetry.product(minus, self.stiffness.as_ref(), moved, out);
+                load(t, out)?;
+                self.product.add(minus, self.stiffness.as_ref(), moved, out);
             }
         }
-        match &self.damping {
-            StoredDamping::General(c, symmetry) => symmetry.product(minus, c.as_ref(), v, out),
+        match &mut self.damping {
+            StoredDamping::General(c, product) => product.add(minus, c.as_ref(), v, out),
             StoredDamping::Rayleigh { mass, .. } if *mass > T::zero() => self.mass.view().add_product(-*mass, v, out),
             StoredDamping::None | StoredDamping::Rayleigh { .. } => {}
         }
@@ -362,7 +360,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     }
 
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
-        if self.symmetry == Symmetry::General {
+        if self.product.symmetry() == Symmetry::General {
             return None;
         }
         let k = self.stiffness.as_ref();
@@ -392,12 +390,11 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
 
 impl<T: Real> DampingForce<T> for LinearSystem<'_, T> {
     fn evaluate(&mut self, _: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        out.fill(T::zero());
-        match &self.damping {
-            StoredDamping::None => {}
-            StoredDamping::General(c, symmetry) => symmetry.product(T::one(), c.as_ref(), v, out),
+        match &mut self.damping {
+            StoredDamping::None => out.fill(T::zero()),
+            StoredDamping::General(c, product) => product.write(T::one(), c.as_ref(), v, out),
             StoredDamping::Rayleigh { mass, stiffness } => {
-                self.symmetry.product(*stiffness, self.stiffness.as_ref(), v, out);
+                self.product.write(*stiffness, self.stiffness.as_ref(), v, out);
                 self.mass.view().add_product(*mass, v, out);
             }
         }

@@ -35,6 +35,7 @@ pub mod truss;
 pub mod two_slabs;
 pub mod wall_bar;
 pub mod well;
+pub mod yardsticks;
 
 pub use bars::{Bars, MassKind};
 pub use measure::{Figures, Record, record};

@@ -2,7 +2,7 @@
 //! run.
 
 use contact_dynamics::faer::sparse::SparseColMat;
-use contact_dynamics::{Automatic, Factorization, LinearSolver, Mass, Real, System, TimeIntegrator};
+use contact_dynamics::{Automatic, Factorization, LinearSolver, Real, System, TimeIntegrator};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -212,44 +212,5 @@ pub fn force<T: Real>(mut system: impl System<T>) -> impl FnMut() {
     move || {
         system.force(0.0, black_box(&u), &v, &mut f).expect("an admissible state");
         black_box(&f);
-    }
-}
-
-/// Reads so many numbers from memory, twice: what a solve would take that does nothing else. (Upper halves of blocks
-/// are stored in a factor, and need not be read.)
-pub fn reading<T: Real>(scalars: usize) -> impl FnMut() {
-    let numbers = vec![T::one(); scalars];
-    move || {
-        for _ in 0..2 {
-            let mut sums = [T::zero(); 16];
-            for chunk in black_box(&numbers[..]).chunks_exact(16) {
-                for (sum, &x) in sums.iter_mut().zip(chunk) {
-                    *sum += x;
-                }
-            }
-            black_box(sums);
-        }
-    }
-}
-
-/// The force of an explicit step and the one pass over the vectors that it cannot do without.
-pub fn explicit_limit<T: Real>(mut system: impl System<T>, h: f64) -> impl FnMut() {
-    let dofs = system.dofs();
-    let inverse: Vec<T> = match system.mass() {
-        Mass::Lumped(mass) => mass.iter().map(|m| m.recip()).collect(),
-        _ => panic!("an explicit step takes a lumped mass"),
-    };
-    let still = || vec![T::zero(); dofs];
-    let (mut u, mut v, mut a, mut f) = (still(), still(), still(), still());
-    let (whole, half) = (T::of(h), T::of(0.5 * h));
-    move || {
-        system.force(0.0, black_box(&u), &v, &mut f).expect("an admissible state");
-        let rates = v.iter_mut().zip(&mut a).zip(inverse.iter().zip(&f));
-        for (u, ((v, a), (&inverse, &f))) in u.iter_mut().zip(rates) {
-            *u += whole * (*v + half * *a);
-            *v += half * (*a + inverse * f);
-            *a = inverse * f;
-        }
-        black_box((&u, &v, &a));
     }
 }

@@ -1,0 +1,306 @@
+//! How a matrix is multiplied with vectors, which its pattern tells once.
+//!
+//! Of a symmetric matrix of dofs that come node by node, as nearly all do, only the entries from the diagonal down are
+//! read, and one index for a block of them: two fifths of the time of a product row by row.
+
+use super::Symmetry;
+use crate::kernels::product::{LowerColumns, Supervariable, Tridiagonal};
+use crate::kernels::vector::Accumulate;
+use crate::real::Real;
+use crate::threads;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use std::ops::Range;
+
+/// How a matrix is multiplied. The matrix itself stays where it is, and must be the one that this was made of.
+#[derive(Debug)]
+pub(crate) enum Product<T> {
+    /// A matrix that is not symmetric: column by column.
+    General,
+    /// A symmetric one without dofs that go together: row by row.
+    Rows,
+    /// A symmetric one with entries on and beside the diagonal only.
+    Tridiagonal { diagonal: Vec<T>, beside: Vec<T> },
+    /// A symmetric one whose columns go together in twos and threes.
+    Supervariables(Supervariables<T>),
+}
+
+impl<T: Real> Product<T> {
+    pub(crate) fn new(a: SparseColMatRef<'_, usize, T>, symmetry: Symmetry) -> Self {
+        if symmetry == Symmetry::General {
+            return Self::General;
+        }
+        let n = a.ncols();
+        let tridiagonal = |j: usize| {
+            let rows = a.row_idx_of_col_raw(j);
+            rows.first().is_none_or(|&row| row + 1 >= j) && rows.last().is_none_or(|&row| row <= j + 1)
+        };
+        if (0..n).all(tridiagonal) {
+            let diagonal = (0..n).map(|j| super::entry(a, j, j)).collect();
+            let beside = (1..n).map(|j| super::entry(a, j, j - 1)).collect();
+            return Self::Tridiagonal { diagonal, beside };
+        }
+        Supervariables::find(a.symbolic()).map_or(Self::Rows, Self::Supervariables)
+    }
+
+    pub(crate) fn symmetry(&self) -> Symmetry {
+        match self {
+            Self::General => Symmetry::General,
+            Self::Rows | Self::Tridiagonal { .. } | Self::Supervariables(_) => Symmetry::Symmetric,
+        }
+    }
+
+    /// `y = c A x`.
+    pub(crate) fn write(&mut self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+        self.multiply(c, a, x, y, Accumulate::Replace);
+    }
+
+    /// `y += c A x`.
+    pub(crate) fn add(&mut self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T]) {
+        self.multiply(c, a, x, y, Accumulate::Add);
+    }
+
+    fn multiply(&mut self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T], put: Accumulate) {
+        match self {
+            Self::General => {
+                if put == Accumulate::Replace {
+                    y.fill(T::zero());
+                }
+                T::product(c, a, x, y);
+            }
+            Self::Rows => T::symmetric_product(c, a, x, y, put),
+            Self::Tridiagonal { diagonal, beside } => {
+                T::tridiagonal_product(c, Tridiagonal { diagonal, beside }, x, y, put);
+            }
+            Self::Supervariables(supervariables) => supervariables.multiply(c, a, x, y, put),
+        }
+    }
+}
+
+/// The supervariables of a matrix, and the parts that several threads multiply side by side. Parts are a matter of the
+/// matrix alone, so that the result is the same by any number of threads.
+#[derive(Debug)]
+pub(crate) struct Supervariables<T> {
+    /// All of them, and one behind the last.
+    all: Vec<Supervariable>,
+    groups: Vec<u32>,
+    parts: Vec<Part<T>>,
+}
+
+/// Columns that one thread multiplies.
+#[derive(Debug)]
+struct Part<T> {
+    /// Of the supervariables, without the one that follows.
+    supervariables: Range<usize>,
+    columns: Range<usize>,
+    /// What they add to the product: in their own rows, then in those that follow. Empty if there is one part, which
+    /// writes to the product itself.
+    sums: Vec<T>,
+}
+
+impl<T: Real> Supervariables<T> {
+    /// Columns together at most: a kernel is compiled for each number. (The six dofs of a shell's node are two of them.)
+    const WIDEST: usize = 3;
+    /// Below so many columns a supervariable, on average, rows are as fast.
+    const WORTHWHILE: f64 = 1.5;
+    /// Entries for which a thread is worth its while: a tenth of a millisecond.
+    const GRAIN: usize = 1 << 18;
+    /// So many parts keep eight threads busy, and cost one little.
+    const MOST_PARTS: usize = 8;
+
+    /// `None` if they would not pay, or if the matrix is too large for 32 bits.
+    fn find(pattern: SymbolicSparseColMatRef<'_, usize>) -> Option<Self> {
+        let n = pattern.ncols();
+        u32::try_from(pattern.row_idx().len()).ok()?;
+        #[allow(clippy::cast_possible_truncation)] // checked above
+        let index = |i: usize| i as u32;
+        let (mut all, mut groups) = (Vec::with_capacity(n / 2), Vec::new());
+        let mut column = 0;
+        while column < n {
+            let rows = pattern.row_idx_of_col_raw(column);
+            let place = rows.binary_search(&column).ok()?;
+            let alike = |other: &usize| {
+                rows.get(place + other - column) == Some(other) && pattern.row_idx_of_col_raw(*other) == rows
+            };
+            let width = 1 + (column + 1..n.min(column + Self::WIDEST)).take_while(alike).count();
+            let below = &rows[place + width..];
+            let whole = |group: &[usize]| group.len() == width && group[width - 1] - group[0] == width - 1;
+            let group = if below.chunks(width).all(whole) { width } else { 1 };
+            #[allow(clippy::cast_possible_truncation)] // at most three
+            let [width_, group_] = [width as u8, group as u8];
+            all.push(Supervariable { column: index(column), width: width_, group: group_, first: index(groups.len()) });
+            groups.extend(below.iter().step_by(group).map(|&row| index(row)));
+            column += width;
+        }
+        if n as f64 <= Self::WORTHWHILE * all.len() as f64 {
+            return None;
+        }
+        all.push(Supervariable { column: index(n), width: 0, group: 0, first: index(groups.len()) });
+        all.shrink_to_fit();
+        groups.shrink_to_fit();
+        let parts = Self::parts(pattern, &all);
+        Some(Self { all, groups, parts })
+    }
+
+    /// Parts with as many entries each; one alone if they would add to many rows of each other.
+    fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, all: &[Supervariable]) -> Vec<Part<T>> {
+        let n = pattern.ncols();
+        let pointers = pattern.col_ptr();
+        let wanted = (pointers[n] / Self::GRAIN).clamp(1, Self::MOST_PARTS);
+        let column = |supervariable: usize| all[supervariable].column as usize;
+        let share = |part: usize| {
+            all.partition_point(|supervariable| pointers[supervariable.column as usize] < pointers[n] / wanted * part)
+        };
+        let mut parts = Vec::with_capacity(wanted);
+        let mut behind = 0;
+        for part in 0..wanted {
+            let end = if part + 1 < wanted { share(part + 1) } else { all.len() - 1 };
+            let supervariables = share(part)..end;
+            let columns = column(supervariables.start)..column(supervariables.end);
+            let reach = columns.clone().filter_map(|j| pattern.row_idx_of_col_raw(j).last()).max();
+            let rows = reach.map_or(columns.end, |row| columns.end.max(row + 1)) - columns.start;
+            behind += rows - columns.len();
+            parts.push(Part { supervariables, columns, sums: vec![T::zero(); rows] });
+        }
+        if parts.len() == 1 || behind > n {
+            return vec![Part { supervariables: 0..all.len() - 1, columns: 0..n, sums: Vec::new() }];
+        }
+        parts
+    }
+
+    fn multiply(&mut self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T], put: Accumulate) {
+        let Self { all, groups, parts } = self;
+        let lower = |part: &Part<T>| LowerColumns {
+            matrix: a,
+            supervariables: &all[part.supervariables.start..=part.supervariables.end],
+            groups,
+        };
+        if let [part] = &parts[..] {
+            if put == Accumulate::Replace {
+                y.fill(T::zero());
+            }
+            return T::lower_product(c, lower(part), x, y);
+        }
+        let sum = |part: &mut Part<T>| -> Result<(), std::convert::Infallible> {
+            let columns = lower(part);
+            part.sums.fill(T::zero());
+            T::lower_product(c, columns, x, &mut part.sums);
+            Ok(())
+        };
+        let Ok(()) = threads::try_each(parts, &sum);
+        for Part { columns, sums, .. } in &*parts {
+            let (own, _) = sums.split_at(columns.len());
+            match put {
+                Accumulate::Replace => y[columns.clone()].copy_from_slice(own),
+                Accumulate::Add => T::axpy(T::one(), own, &mut y[columns.clone()]),
+            }
+        }
+        for Part { columns, sums, .. } in &*parts {
+            let behind = &sums[columns.len()..];
+            T::axpy(T::one(), behind, &mut y[columns.end..columns.end + behind.len()]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faer::sparse::{SparseColMat, Triplet};
+
+    /// Nodes with so many dofs each; two nodes are coupled if `coupled` says so, and all nodes with themselves.
+    fn matrix(dofs: &[usize], coupled: impl Fn(usize, usize) -> bool) -> SparseColMat<usize, f64> {
+        let first: Vec<usize> = std::iter::once(0)
+            .chain(dofs.iter().scan(0, |sum, dofs| {
+                *sum += dofs;
+                Some(*sum)
+            }))
+            .collect();
+        let mut entries = Vec::new();
+        for p in 0..dofs.len() {
+            for q in (0..=p).filter(|&q| q == p || coupled(p, q)) {
+                for (i, j) in (first[p]..first[p + 1]).flat_map(|i| (first[q]..first[q + 1]).map(move |j| (i, j))) {
+                    let value = (1.0 + (i.min(j) * 7 + i.max(j) * 3) as f64).sin();
+                    entries.push(Triplet::new(i, j, value));
+                    if p != q {
+                        entries.push(Triplet::new(j, i, value));
+                    }
+                }
+            }
+        }
+        let n = first[dofs.len()];
+        SparseColMat::try_new_from_triplets(n, n, &entries).unwrap()
+    }
+
+    /// Compares products with those row by row, to the rounding of the sums.
+    fn check(a: &SparseColMat<usize, f64>, product: &mut Product<f64>) {
+        let a = a.as_ref();
+        let n = a.ncols();
+        let x: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos() + 0.2).collect();
+        let before: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).sin()).collect();
+        let (mut written, mut added) = (vec![f64::NAN; n], before.clone());
+        product.write(-2.0, a, &x, &mut written);
+        product.add(-2.0, a, &x, &mut added);
+        for j in 0..n {
+            let terms = || a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)).map(|(&i, &value)| value * x[i]);
+            let (sum, size) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
+            let tolerance = 8.0 * f64::EPSILON * (size + 1.0);
+            assert!((written[j] + 2.0 * sum).abs() <= tolerance, "row {j}: {} and {}", written[j], -2.0 * sum);
+            assert!((added[j] - before[j] + 2.0 * sum).abs() <= tolerance, "row {j}");
+        }
+    }
+
+    #[test]
+    fn any_number_of_dofs_a_node() {
+        let coupled = |p: usize, q: usize| (p * q) % 3 == 1 || p - q < 2;
+        for dofs in
+            [vec![3; 20], vec![2; 31], vec![6; 9], vec![5; 9], vec![4; 9], vec![3, 1, 2, 3, 3, 2, 6, 1, 1, 2, 3]]
+        {
+            let a = matrix(&dofs, coupled);
+            let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+            assert!(matches!(product, Product::Supervariables(_)), "{dofs:?}");
+            check(&a, &mut product);
+        }
+    }
+
+    /// A node of two dofs between others of three leaves rows that come neither in twos nor in threes.
+    #[test]
+    fn groups_of_rows_that_are_no_nodes() {
+        let a = matrix(&[3, 2, 3], |_, q| q == 0);
+        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+        let Product::Supervariables(Supervariables { all, .. }) = &product else { panic!("dofs go together") };
+        assert!(all[0].width == 3 && all[0].group == 1);
+        check(&a, &mut product);
+    }
+
+    #[test]
+    fn chains_and_single_dofs_go_row_by_row() {
+        for n in [1, 2, 3, 40] {
+            let chain = matrix(&vec![1; n], |p, q| p - q == 1 && p != n / 2);
+            let mut product = Product::new(chain.as_ref(), Symmetry::Symmetric);
+            assert!(matches!(product, Product::Tridiagonal { .. }));
+            check(&chain, &mut product);
+        }
+        let net = matrix(&[1; 50], |p, q| (p + q) % 7 == 0);
+        let mut product = Product::new(net.as_ref(), Symmetry::Symmetric);
+        assert!(matches!(product, Product::Rows));
+        check(&net, &mut product);
+        check(&net, &mut Product::new(net.as_ref(), Symmetry::General));
+    }
+
+    /// Large matrices are multiplied in parts where dofs are numbered along the body, and in one where they are not.
+    #[test]
+    fn parts_of_a_large_matrix_add_up() {
+        let band = |p: usize, q: usize| p - q < 14;
+        let a = matrix(&[3; 4500], band);
+        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+        let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
+        assert!(parts.len() > 1 && parts.iter().all(|part| !part.sums.is_empty()));
+        check(&a, &mut product);
+
+        let scattered = |p: usize| crate::sparse::scattered(p) as usize % 4500;
+        let far = matrix(&[3; 4500], |p, q| scattered(p).abs_diff(scattered(q)) < 14);
+        let mut product = Product::new(far.as_ref(), Symmetry::Symmetric);
+        let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
+        assert!(parts.len() == 1 && far.val().len() > 4 * Supervariables::<f64>::GRAIN);
+        check(&far, &mut product);
+    }
+}
