@@ -18,6 +18,7 @@ mod contact_step;
 mod control;
 mod curved_rows;
 mod curved_step;
+mod derived;
 mod energy;
 mod finite;
 mod gaps;

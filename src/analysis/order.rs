@@ -124,8 +124,7 @@ pub(super) fn response(tableau: &Tableau, [damping, stiffness]: [f64; 2], force:
 
 /// `sum += c h^power term`.
 fn add(sum: &mut [Series], c: f64, term: &[Series], power: i32) {
-    let factor = Series::monomial(c, power);
-    for (sum, term) in sum.iter_mut().zip(term) {
-        *sum = sum.plus(&factor.times(term));
+    for (sum, term) in sum.iter_mut().zip(term).filter(|(_, term)| !term.is_zero()) {
+        *sum = sum.plus(&term.scaled(c, power));
     }
 }

@@ -82,6 +82,12 @@ impl Series {
         Self { valuation: -self.valuation, terms }
     }
 
+    /// `c h^power self`.
+    pub(super) fn scaled(&self, c: f64, power: i32) -> Self {
+        let scale = |&(x, e): &(f64, f64)| (c * x, (c * e).abs() + f64::EPSILON * (c * x).abs());
+        Self { valuation: self.valuation + power, terms: self.terms.iter().map(scale).collect() }.normalized()
+    }
+
     /// `self/divisor`.
     pub(super) fn over(&self, divisor: &Self) -> Self {
         self.times(&divisor.reciprocal())
@@ -149,7 +155,7 @@ pub(super) fn solve(mut matrix: Vec<Vec<Series>>, mut right: Vec<Series>) -> Opt
                 continue;
             }
             let factor = other[k].over(&row[k]);
-            for (x, p) in other.iter_mut().zip(row).skip(k) {
+            for (x, p) in other.iter_mut().zip(row).skip(k).filter(|(_, p)| !p.is_zero()) {
                 *x = x.minus(&factor.times(p));
             }
             other[k] = Series::zero();

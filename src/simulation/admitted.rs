@@ -23,7 +23,7 @@ pub(crate) struct Admitted {
     pub(crate) no_switch: Option<&'static str>,
     /// Why friction is refused, if it is.
     pub(crate) no_friction: Option<&'static str>,
-    /// The contact solver, and the sets that it does not take.
+    /// The contact solver, if there are sets that it does not take, and these.
     pub(crate) solver: String,
     pub(crate) no_sets: Vec<AdmissibleSet>,
 }
@@ -93,9 +93,10 @@ pub(super) fn admitted<T: Real>(
     let kinds: &[bool] = if corrects { &[false, true] } else { &[false] };
     let cone = |tangents| kinds.iter().map(move |&held| AdmissibleSet::with_friction(0.0, tangents, held));
     let sets = AdmissibleSet::OF_LAWS.into_iter().chain((1..=2).flat_map(cone));
-    let no_sets = sets.filter(|&set| !solver.admits(set)).collect();
-    let (integrator_name, solver) = (integrator.name(), format!("{solver:?}"));
-    let mut admitted = Admitted { integrator: integrator_name, solver, no_sets, ..Admitted::default() };
+    let no_sets: Vec<_> = sets.filter(|&set| !solver.admits(set)).collect();
+    // (Written out it takes longer than a step of a small system.)
+    let solver = if no_sets.is_empty() { String::new() } else { format!("{solver:?}") };
+    let mut admitted = Admitted { integrator: integrator.name(), solver, no_sets, ..Admitted::default() };
     admitted.no_friction = correctors.iter().find_map(|corrector| corrector.check_friction().err());
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {

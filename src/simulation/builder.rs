@@ -345,7 +345,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         };
         let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), admitted)?;
         if self.stability == Stability::Checked {
-            stability::check_scheme(&scheme.integrator.name(), &scheme.tableau)?;
+            stability::check_scheme(&scheme)?;
         }
         if constraints.may_press() {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
@@ -382,7 +382,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
         let program = compiler.compile(&scheme.tableau)?;
         let is_known = history.known == scheme.depth;
-        let startup = (!is_known).then(|| compiler.start(&scheme.starter, &scheme.tableau)).transpose()?;
+        let startup = (!is_known).then(|| compiler.start(&scheme.derived.starter, &scheme.tableau)).transpose()?;
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
         let size = ContactSize::new(rows, &g, &constraints);

@@ -73,7 +73,7 @@ impl<T: Real> Simulation<'_, T> {
         let at = At::state(&state.motion);
         program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
         match startup {
-            Some(startup) => startup.set_step_size(&scheme.starter.stages, &mut **system, other, h, at),
+            Some(startup) => startup.set_step_size(&scheme.derived.starter.stages, &mut **system, other, h, at),
             None => Ok(()),
         }
     }

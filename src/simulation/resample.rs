@@ -83,7 +83,7 @@ impl<T: Real> Simulation<'_, T> {
         let at = At::state(&state.motion);
         program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
         if let Some(startup) = startup
-            && let Err(error) = startup.set_step_size(&scheme.starter.stages, &mut **system, old, h, at)
+            && let Err(error) = startup.set_step_size(&scheme.derived.starter.stages, &mut **system, old, h, at)
         {
             program.set_step_size(&scheme.tableau.stages, &mut **system, h, old, at)?;
             return Err(error);
@@ -178,7 +178,7 @@ impl<T: Real> Simulation<'_, T> {
             let (interface, unit) = (constraints.interface(), Unit::of(constraints));
             let at = At::state(&begun.motion);
             let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
-            let program = compiler.start(&scheme.starter, &scheme.tableau)?;
+            let program = compiler.start(&scheme.derived.starter, &scheme.tableau)?;
             self.statistics.factorizations += program.operators.len() as u64;
             *startup = Some(program);
         } else if past.known == depth {
@@ -291,7 +291,7 @@ fn conserve_momentum<T: Real>(
     h: f64,
     past: &mut [Motion<T>],
 ) {
-    let Some(psi) = scheme.covectors.get(past.len()) else { return };
+    let Some(psi) = scheme.derived.covectors.get(past.len()) else { return };
     let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
     let p = psi[0][2] + older().map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum::<f64>();
     // The change of ψ by a shift of the past displacements by −k h, and by a unit shift of the past velocities.

@@ -1,10 +1,11 @@
 //! The scheme of a run, and what follows from its rows besides the compiled program.
 
-use crate::analysis;
-use crate::integrator::{Newmark, TimeIntegrator};
+use super::derived::Derived;
+use crate::integrator::TimeIntegrator;
 use crate::real::Real;
 use crate::state::Motion;
 use crate::tableau::{StartUp, Tableau};
+use std::sync::Arc;
 
 /// Dofs a block: the values of a block are still in the first-level cache when they are checked.
 const BLOCK: usize = 1024;
@@ -19,21 +20,16 @@ pub(super) struct Scheme<'a> {
     /// Times of the stored v and a, in steps from that of the state.
     pub(super) shifts: [f64; 2],
     pub(super) start_up: StartUp,
-    /// The one-step scheme of the first steps.
-    pub(super) starter: Tableau,
-    /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
-    pub(super) covectors: Vec<Vec<[f64; 3]>>,
+    pub(super) derived: Arc<Derived>,
 }
 
 impl<'a> Scheme<'a> {
     /// Derives everything from a tableau that was checked.
     pub(super) fn new(integrator: Box<dyn TimeIntegrator + 'a>, tableau: Tableau, start_up: StartUp) -> Self {
-        let starter = Newmark::trapezoidal().tableau();
-        let covectors = tableau.momentum().during_start(&starter.stages[0]);
-        let order = analysis::order(&tableau);
-        let shifts = [order.velocity_shift, order.acceleration_shift];
+        let derived = Derived::of(&tableau);
+        let shifts = [derived.order.velocity_shift, derived.order.acceleration_shift];
         let depth = tableau.depth();
-        Self { integrator, tableau, depth, shifts, start_up, starter, covectors }
+        Self { integrator, tableau, depth, shifts, start_up, derived }
     }
 
     /// Number of motions in a history: the states that are read, and one for each stage to write. Where stored v and a
@@ -54,7 +50,7 @@ impl<'a> Scheme<'a> {
     pub(super) fn momentum<T: Real>(&self, newest: &Motion<T>, past: &[Motion<T>], h: f64) -> Vec<T> {
         let mut sum = vec![T::zero(); newest.u.len()];
         let known = past.len().min(self.depth - 1);
-        for (psi, motion) in self.covectors[known].iter().zip(std::iter::once(newest).chain(past)) {
+        for (psi, motion) in self.derived.covectors[known].iter().zip(std::iter::once(newest).chain(past)) {
             // Displacements enter with weights that sum to zero: differences keep their digits.
             T::axpy_difference(T::of(psi[0] / h), &motion.u, &newest.u, &mut sum);
             T::axpy(T::of(psi[1]), &motion.v, &mut sum);

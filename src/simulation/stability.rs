@@ -38,16 +38,16 @@ const RESERVE: f64 = 4.0;
 const SLIVER: f64 = 1e-7;
 
 /// Refuses tableaux whose results have nothing to do with the equation of motion, however small the step.
-pub(super) fn check_scheme(integrator: &str, tableau: &Tableau) -> Result<()> {
-    let order = analysis::order(tableau);
+pub(super) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
+    let order = scheme.derived.order;
     let order = order.displacement.min(order.velocity);
     if order == 0 {
-        return Err(Error::InconsistentScheme { integrator: integrator.to_owned() });
+        return Err(Error::InconsistentScheme { integrator: scheme.integrator.name() });
     }
-    match analysis::zero_stability(tableau) {
+    match scheme.derived.zero_stability {
         ZeroStability::Unstable => {
-            let radius = analysis::spectral_radius(tableau, 0.0, 0.0);
-            Err(Error::UnstableScheme { integrator: integrator.to_owned(), order, radius })
+            let radius = analysis::spectral_radius(&scheme.tableau, 0.0, 0.0);
+            Err(Error::UnstableScheme { integrator: scheme.integrator.name(), order, radius })
         }
         ZeroStability::Strong | ZeroStability::Weak => Ok(()),
     }
@@ -66,7 +66,7 @@ pub(super) fn check_step<T: Real>(
     h: f64,
 ) -> Result<StepLimit> {
     let tableau = &scheme.tableau;
-    let stable_at_infinity = || analysis::radius_at_infinity(tableau).is_some_and(|radius| radius <= 1.0 + 1e-6);
+    let stable_at_infinity = || scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + 1e-6);
     if tableau.stages.iter().all(|stage| stage.balance.u.z != 0.0) && stable_at_infinity() {
         return Ok(StepLimit::Cleared(f64::INFINITY));
     }

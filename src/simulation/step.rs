@@ -160,7 +160,7 @@ impl<T: Real> Simulation<'_, T> {
         let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, .. } = self;
         let (program, start_covector) = match &mut self.startup {
             // After the step one state more is known than now.
-            Some(startup) => (startup, Some(&self.scheme.covectors[history.known])),
+            Some(startup) => (startup, Some(&self.scheme.derived.covectors[history.known])),
             None => (&mut self.program, None),
         };
         let clock = history.clock;
