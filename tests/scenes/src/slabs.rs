@@ -1,9 +1,12 @@
 //! Slabs that strike a rough wall obliquely: plane P and S waves, a column of elements with two dofs a node, uncoupled
 //! but for the cone of friction at the wall.
 
+use crate::masses::Body;
 use crate::sparse::matrix;
+use contact_dynamics::mass::affine_motions;
 use contact_dynamics::{
-    Corrector, LinearRows, LinearSystem, Mass, Preset, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
+    ContactLaw, Corrector, LinearRows, LinearSystem, Mass, Preset, Result, Simulation, SimulationBuilder,
+    TimeIntegrator, mass,
 };
 
 /// A slab before its impact, in the units of the scene: mass a length and wave speeds.
@@ -81,7 +84,7 @@ impl Slab {
     }
 
     /// Its velocity: toward the wall, and along it.
-    pub(crate) fn velocities(&self) -> impl Iterator<Item = f64> {
+    pub fn velocities(&self) -> impl Iterator<Item = f64> {
         let [toward, along] = self.velocity;
         (0..self.dofs()).map(move |dof| if dof % 2 == 0 { -toward } else { along })
     }
@@ -95,8 +98,27 @@ impl Slab {
         gap: f64,
     ) -> SimulationBuilder<'static, f64> {
         let velocity = self.velocities().collect();
-        let wall = LinearRows::new().unilateral(&[(0, 1.0)], gap).friction(self.friction, &[&[(1, 1.0)]]);
-        Simulation::builder(system, scheme, h).velocity(velocity).constraint(wall)
+        Simulation::builder(system, scheme, h).velocity(velocity).constraint(self.wall(ContactLaw::Rigid, gap))
+    }
+
+    /// The rough wall, under any law.
+    pub fn wall(&self, law: ContactLaw, gap: f64) -> LinearRows<'static, f64> {
+        LinearRows::new().row(law, &[(0, 1.0)], gap).friction(self.friction, &[&[(1, 1.0)]])
+    }
+
+    /// What treatments of the mass need of it: the node at the wall may lose its mass in both directions.
+    pub fn body(&self) -> Body {
+        let (nodes, size) = (self.elements + 1, self.length / self.elements as f64);
+        let element = [self.density * size / 3.0, self.density * size / 6.0];
+        let places: Vec<[f64; 2]> = (0..nodes).map(|node| [node as f64 * size, 0.0]).collect();
+        let dofs: Vec<[usize; 2]> = (0..nodes).map(|node| [2 * node, 2 * node + 1]).collect();
+        Body {
+            consistent: matrix(self.dofs(), self.entries([element; 2])),
+            stiffness: matrix(self.dofs(), self.stiffness()),
+            contact: vec![0, 1],
+            groups: (0..self.dofs()).map(|dof| dof % 2).collect(),
+            motions: affine_motions(self.dofs(), &places, &dofs).expect("places of all dofs"),
+        }
     }
 
     /// On a lumped mass, with the correctors given.
