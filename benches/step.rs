@@ -22,6 +22,7 @@ use std::hint::black_box;
 const RATIOS: &[Ratio] = &[
     Ratio { heading: "/ bare solve", to: &["bare solve"] },
     Ratio { heading: "/ (solve + K)", to: &["bare solve", "bare K product"] },
+    Ratio { heading: "/ (solve + rows)", to: &["bare solve", "K product by compressed rows"] },
     Ratio { heading: "/ by hand", to: &["composite step by hand"] },
     Ratio { heading: "/ Newmark by hand", to: &["Newmark step by hand"] },
     Ratio { heading: "/ (K + vectors)", to: &["K product and vectors"] },
@@ -48,6 +49,7 @@ fn table<T: Real>(scalar: &str, n: usize, arguments: &Arguments, more: impl FnOn
     let mut table = Table::new(Unit::Micro, RATIOS);
     table.reference("bare solve", timing::solve(factor, bars.dofs()));
     table.reference("bare K product", timing::force(bars.system::<T>()));
+    table.reference("K product by compressed rows", yardsticks::gather(&bars.stiffness::<T>()));
     table.reference("composite step by hand", yardsticks::composite_by_hand::<T>(&bars, h));
     table.reference("Newmark step by hand, closed, corrected", yardsticks::newmark_by_hand::<T>(&bars, h));
     let limit = yardsticks::explicit_limit(bars.system::<T>(), 0.9 * h);
