@@ -303,3 +303,53 @@ fn tridiagonal<T: Real>(bars: &Bars) -> (Vec<T>, Vec<T>) {
     let beside = (0..dofs).map(|i| if i + 1 < dofs { entry(i, i + 1) } else { T::zero() }).collect();
     ((0..dofs).map(|i| entry(i, i)).collect(), beside)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_dynamics::{LinearRows, Newmark, PersistencyCorrection, Simulation};
+
+    /// What is measured against must do the same.
+    #[test]
+    fn newmark_by_hand_is_the_step_of_the_crate() {
+        let bars = Bars::paper(12);
+        let (dofs, [left, right]) = (bars.dofs(), bars.contact_dofs());
+        let h = 0.7 * bars.element_size(0) / 100.0;
+        let mut by_hand = NewmarkByHand::<f64>::new(&bars, h);
+        let mut run = Simulation::builder(
+            bars.system().load(move |_, f| (f[0], f[dofs - 1]) = (1.0, -1.0)),
+            Newmark::trapezoidal(),
+            h,
+        )
+        .displacement(by_hand.u.clone())
+        .velocity(by_hand.v.clone())
+        .constraint(LinearRows::new().unilateral(&[(left, -1.0), (right, 1.0)], 0.0))
+        .corrector(PersistencyCorrection::new())
+        .build()
+        .expect("the scene is well posed");
+        for step in 0..200 {
+            by_hand.step(|x, l, y| x - l * y);
+            run.step().expect("a well-posed step");
+            for (of, ours, hand) in [
+                ("u", run.state().displacement(), &by_hand.u),
+                ("v", run.state().velocity(), &by_hand.v),
+                ("a", run.state().acceleration(), &by_hand.a),
+            ] {
+                let size = hand.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+                let difference = ours.iter().zip(hand).fold(0.0_f64, |most, (x, y)| most.max((x - y).abs()));
+                assert!(difference <= 1e-9 * size, "{of} in step {step}: {difference} of {size}");
+            }
+            assert!(run.state().contacts().closed()[0], "step {step}");
+        }
+    }
+
+    #[test]
+    fn products_by_compressed_rows_are_forces() {
+        let bars = Bars::paper(9);
+        let u: Vec<f64> = (0..bars.dofs()).map(|i| (0.4 * i as f64).sin()).collect();
+        let [mut ours, mut rows] = [vec![0.0; u.len()], vec![0.0; u.len()]];
+        bars.system::<f64>().force(0.0, &u, &u, &mut ours).expect("a linear system");
+        compressed_rows(&bars.stiffness::<f64>())(&u, &mut rows);
+        assert!(ours.iter().zip(&rows).all(|(x, y)| (x + y).abs() <= 1e-12 * x.abs().max(1.0)));
+    }
+}
