@@ -11,9 +11,8 @@ use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vect
 use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
 use crate::kernels::vector::{self, Accumulate};
-use crate::kernels::{block_sweep, product, sweep};
+use crate::kernels::{block_sweep, product, supernodal, sweep};
 use crate::scalar::Scalar;
-use faer::Par;
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::LuError;
@@ -65,17 +64,24 @@ pub trait Kernels: Sized {
     fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
     /// `y = c A x` for symmetric A.
     fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
-    /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller. Only
-    /// supernodal factors use threads.
-    fn cholesky(
-        kind: Factorization,
+    /// Factorizes a simplicial L D Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of
+    /// the caller.
+    fn simplicial_cholesky(
         symbolic: &SymbolicCholesky<usize>,
         a: SparseColMatRef<'_, usize, Self>,
         values: &mut [Self],
         pivots: &mut [Self],
-        par: Par,
         memory: &mut MemBuffer,
     ) -> Result<(), usize>;
+    /// Factorizes a supernodal L Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of the
+    /// matrix.
+    fn supernodal_cholesky(
+        problem: &supernodal::Problem<'_, Self>,
+        values: &mut [Self],
+        pivots: &mut [Self],
+    ) -> Result<(), usize>;
+    /// What a thread needs to factorize a matrix with so many dofs; nothing if there is no memory.
+    fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>>;
     /// Solves in place for the columns of `rhs` with a supernodal factor.
     fn supernodal_solve(
         symbolic: &SymbolicCholesky<usize>,
@@ -138,8 +144,8 @@ pub trait Kernels: Sized {
         b: &mut [Self],
         vectors: Vectors<'_, Self>,
     ) -> Outcome;
-    /// Scratch for factorizing and for solving `columns` right-hand sides.
-    fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize, par: Par) -> StackReq;
+    /// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
+    fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq;
     /// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
     fn lu(
         symbolic: &SymbolicLu<usize>,
@@ -199,16 +205,24 @@ macro_rules! kernels {
             fn symmetric_product_into(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
                 product::symmetric_product(a, x, y, |y, sum| *y = c * sum);
             }
-            fn cholesky(
-                kind: Factorization,
+            fn simplicial_cholesky(
                 symbolic: &SymbolicCholesky<usize>,
                 a: SparseColMatRef<'_, usize, Self>,
                 values: &mut [Self],
                 pivots: &mut [Self],
-                par: Par,
                 memory: &mut MemBuffer,
             ) -> Result<(), usize> {
-                cholesky::factorize(kind, symbolic, a, values, pivots, par, memory)
+                cholesky::simplicial(symbolic, a, values, pivots, memory)
+            }
+            fn supernodal_cholesky(
+                problem: &supernodal::Problem<'_, Self>,
+                values: &mut [Self],
+                pivots: &mut [Self],
+            ) -> Result<(), usize> {
+                supernodal::factorize(problem, values, pivots)
+            }
+            fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>> {
+                supernodal::workspace(dofs)
             }
             fn supernodal_solve(
                 symbolic: &SymbolicCholesky<usize>,
@@ -295,13 +309,8 @@ macro_rules! kernels {
                     _ => conjugate_gradients::solve::<$scalar, 1>(iteration, b, vectors),
                 }
             }
-            fn cholesky_scratch(
-                kind: Factorization,
-                symbolic: &SymbolicCholesky<usize>,
-                columns: usize,
-                par: Par,
-            ) -> StackReq {
-                cholesky::scratch::<$scalar>(kind, symbolic, columns, par)
+            fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
+                cholesky::scratch::<$scalar>(kind, symbolic, columns)
             }
             fn lu(
                 symbolic: &SymbolicLu<usize>,
