@@ -12,9 +12,8 @@ use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
 use crate::kernels::product::{self, LowerColumns, Tridiagonal};
 use crate::kernels::vector::{self, Accumulate};
-use crate::kernels::{block_sweep, sweep};
+use crate::kernels::{block_sweep, supernodal, sweep};
 use crate::scalar::Scalar;
-use faer::Par;
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::LuError;
@@ -69,17 +68,24 @@ pub trait Kernels: Sized {
     /// `y += c A x` with some columns of a symmetric A from the diagonal down, and their mirror images; `y` begins at
     /// the first of the columns.
     fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]);
-    /// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller. Only
-    /// supernodal factors use threads.
-    fn cholesky(
-        kind: Factorization,
+    /// Factorizes a simplicial L D Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of
+    /// the caller.
+    fn simplicial_cholesky(
         symbolic: &SymbolicCholesky<usize>,
         a: SparseColMatRef<'_, usize, Self>,
         values: &mut [Self],
         pivots: &mut [Self],
-        par: Par,
         memory: &mut MemBuffer,
     ) -> Result<(), usize>;
+    /// Factorizes a supernodal L Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of the
+    /// matrix.
+    fn supernodal_cholesky(
+        problem: &supernodal::Problem<'_, Self>,
+        values: &mut [Self],
+        pivots: &mut [Self],
+    ) -> Result<(), usize>;
+    /// What a thread needs to factorize a matrix with so many dofs; nothing if there is no memory.
+    fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>>;
     /// Solves in place for the columns of `rhs` with a supernodal factor.
     fn supernodal_solve(
         symbolic: &SymbolicCholesky<usize>,
@@ -142,8 +148,8 @@ pub trait Kernels: Sized {
         b: &mut [Self],
         vectors: Vectors<'_, Self>,
     ) -> Outcome;
-    /// Scratch for factorizing and for solving `columns` right-hand sides.
-    fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize, par: Par) -> StackReq;
+    /// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
+    fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq;
     /// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
     fn lu(
         symbolic: &SymbolicLu<usize>,
@@ -212,16 +218,24 @@ macro_rules! kernels {
             fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]) {
                 product::lower_product(c, columns, x, y);
             }
-            fn cholesky(
-                kind: Factorization,
+            fn simplicial_cholesky(
                 symbolic: &SymbolicCholesky<usize>,
                 a: SparseColMatRef<'_, usize, Self>,
                 values: &mut [Self],
                 pivots: &mut [Self],
-                par: Par,
                 memory: &mut MemBuffer,
             ) -> Result<(), usize> {
-                cholesky::factorize(kind, symbolic, a, values, pivots, par, memory)
+                cholesky::simplicial(symbolic, a, values, pivots, memory)
+            }
+            fn supernodal_cholesky(
+                problem: &supernodal::Problem<'_, Self>,
+                values: &mut [Self],
+                pivots: &mut [Self],
+            ) -> Result<(), usize> {
+                supernodal::factorize(problem, values, pivots)
+            }
+            fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>> {
+                supernodal::workspace(dofs)
             }
             fn supernodal_solve(
                 symbolic: &SymbolicCholesky<usize>,
@@ -308,13 +322,8 @@ macro_rules! kernels {
                     _ => conjugate_gradients::solve::<$scalar, 1>(iteration, b, vectors),
                 }
             }
-            fn cholesky_scratch(
-                kind: Factorization,
-                symbolic: &SymbolicCholesky<usize>,
-                columns: usize,
-                par: Par,
-            ) -> StackReq {
-                cholesky::scratch::<$scalar>(kind, symbolic, columns, par)
+            fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
+                cholesky::scratch::<$scalar>(kind, symbolic, columns)
             }
             fn lu(
                 symbolic: &SymbolicLu<usize>,

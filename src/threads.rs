@@ -1,27 +1,9 @@
 //! Work on several threads with the feature `rayon`, in sequence without it.
 
-use faer::Par;
+use std::sync::{Mutex, PoisonError};
 
 /// The smallest factor, in scalars, that is worth a thread of its own: reading it takes a tenth of a millisecond.
 pub(crate) const GRAIN: usize = 1 << 18;
-
-/// The parallelism with which faer computes a factor of so many scalars: all threads of the current pool if the factor
-/// is large, else one.
-#[cfg(feature = "rayon")]
-pub(crate) fn parallelism(scalars: usize) -> Par {
-    /// In smaller factors threads wait for each other longer than they work.
-    const WORTHWHILE: usize = 1 << 20;
-    match rayon::current_num_threads() {
-        count if count > 1 && scalars >= WORTHWHILE => Par::rayon(count),
-        _ => Par::Seq,
-    }
-}
-
-/// The parallelism with which faer computes a factor: one thread.
-#[cfg(not(feature = "rayon"))]
-pub(crate) fn parallelism(_: usize) -> Par {
-    Par::Seq
-}
 
 /// Runs both, on two threads if the current pool has them, else one after the other.
 #[cfg(feature = "rayon")]
@@ -34,6 +16,87 @@ pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
 pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     first();
     second();
+}
+
+/// How many threads may share some work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Threads {
+    /// The one that is there.
+    One,
+    /// All of the current pool.
+    All,
+}
+
+/// Runs both, on so many threads.
+pub(crate) fn join_by(threads: Threads, first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
+    match threads {
+        Threads::All => join(first, second),
+        Threads::One => {
+            first();
+            second();
+        }
+    }
+}
+
+/// Calls `act` with the number and the entries of each chunk of so many entries; the last one may have fewer.
+pub(crate) fn each_chunk<T: Send>(
+    threads: Threads,
+    values: &mut [T],
+    length: usize,
+    act: &(impl Fn(usize, &mut [T]) + Sync),
+) {
+    fn from<T: Send>(first: usize, values: &mut [T], length: usize, act: &(impl Fn(usize, &mut [T]) + Sync)) {
+        let chunks = values.len().div_ceil(length);
+        if chunks <= 1 {
+            return act(first, values);
+        }
+        let (low, high) = values.split_at_mut(chunks / 2 * length);
+        join(|| from(first, low, length, act), || from(first + chunks / 2, high, length, act));
+    }
+    match threads {
+        Threads::All if !values.is_empty() => from(0, values, length, act),
+        _ => values.chunks_mut(length).enumerate().for_each(|(chunk, values)| act(chunk, values)),
+    }
+}
+
+/// Memory for each thread of a pool.
+#[derive(Debug)]
+pub(crate) struct PerThread<W>(Vec<Mutex<W>>);
+
+impl<W> PerThread<W> {
+    /// One for each thread of the current pool; nothing if `make` fails.
+    pub(crate) fn new(make: impl FnMut() -> Option<W>) -> Option<Self> {
+        let made: Option<Vec<W>> = std::iter::repeat_with(make).take(count()).collect();
+        made.map(|made| Self(made.into_iter().map(Mutex::new).collect()))
+    }
+
+    /// Lends one to the present thread. In a larger pool than that of [`new`](Self::new) threads may wait for each
+    /// other, so `act` must not wait for other threads, nor borrow again.
+    pub(crate) fn with<R>(&self, act: impl FnOnce(&mut W) -> R) -> R {
+        let workspace = &self.0[index() % self.0.len()];
+        // What a panic left there is overwritten.
+        act(&mut workspace.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(feature = "rayon")]
+fn count() -> usize {
+    rayon::current_num_threads()
+}
+
+#[cfg(feature = "rayon")]
+fn index() -> usize {
+    rayon::current_thread_index().unwrap_or(0)
+}
+
+#[cfg(not(feature = "rayon"))]
+fn count() -> usize {
+    1
+}
+
+#[cfg(not(feature = "rayon"))]
+fn index() -> usize {
+    0
 }
 
 /// Whether two or more of the parts, whose factors have these sizes in scalars, are worth a thread each.

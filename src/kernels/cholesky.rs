@@ -3,11 +3,11 @@
 use crate::scalar::Scalar;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::{LdltError, LdltRegularization};
-use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::ReborrowMut;
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
 use std::ops::Range;
@@ -58,78 +58,43 @@ pub(super) fn supernodes<T>(factor: &Supernodal<'_, T>, columns: &Range<usize>) 
     }
 }
 
-/// Factorizes and writes the pivots; `Err` holds the failing index. Both in the numbering of the caller.
+/// Factorizes a simplicial L D Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of the
+/// caller.
 #[inline]
-pub(crate) fn factorize<T: Scalar>(
-    kind: Factorization,
+pub(crate) fn simplicial<T: Scalar>(
     symbolic: &SymbolicCholesky<usize>,
     a: SparseColMatRef<'_, usize, T>,
     values: &mut [T],
     pivots: &mut [T],
-    par: Par,
     memory: &mut MemBuffer,
 ) -> Result<(), usize> {
-    let stack = MemStack::new(memory);
-    let failure = match kind {
-        Factorization::Llt => symbolic
-            .factorize_numeric_llt(values, a, Side::Lower, LltRegularization::default(), par, stack, Spec::default())
-            .err()
-            .map(|LltError::NonPositivePivot { index }| index),
-        Factorization::Ldlt => symbolic
-            .factorize_numeric_ldlt(
-                values,
-                a,
-                Side::Lower,
-                LdltRegularization::default(),
-                Par::Seq,
-                stack,
-                Spec::default(),
-            )
-            .err()
-            .map(|LdltError::ZeroPivot { index }| index),
-    };
-    let original = |k: usize| symbolic.perm().map_or(k, |p| p.arrays().0[k]);
-    if let Some(index) = failure {
-        // faer counts pivots from one in simplicial factors and from zero in supernodal ones.
-        let base = usize::from(matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)));
-        return Err(original(index.saturating_sub(base)));
+    let (regularization, stack) = (LdltRegularization::default(), MemStack::new(memory));
+    let factorized =
+        symbolic.factorize_numeric_ldlt(values, a, Side::Lower, regularization, Par::Seq, stack, Spec::default());
+    let original = |k: usize| symbolic.perm().map_or(k, |perm| perm.arrays().0[k]);
+    if let Err(LdltError::ZeroPivot { index }) = factorized {
+        // faer counts the pivots of simplicial factors from one.
+        return Err(original(index.saturating_sub(1)));
     }
     // The caller checks the pivots: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
     // rounding.
-    match symbolic.raw() {
-        SymbolicCholeskyRaw::Simplicial(raw) => {
-            for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
-                pivots[original(k)] = values[start];
-                // The sweeps multiply by 1/D.
-                values[start] = T::recip_impl(&values[start]);
-            }
-        }
-        SymbolicCholeskyRaw::Supernodal(raw) => {
-            for s in 0..raw.n_supernodes() {
-                let (start, block) = (raw.supernode_begin()[s], SupernodalLltRef::new(raw, values).supernode(s).val());
-                for j in 0..block.ncols() {
-                    pivots[original(start + j)] = T::abs2_impl(&block[(j, j)]);
-                }
-            }
+    if let SymbolicCholeskyRaw::Simplicial(raw) = symbolic.raw() {
+        for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
+            pivots[original(k)] = values[start];
+            // The sweeps multiply by 1/D.
+            values[start] = T::recip_impl(&values[start]);
         }
     }
     Ok(())
 }
 
-/// Scratch for factorizing and for solving `columns` right-hand sides.
+/// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
 #[inline]
-pub(crate) fn scratch<T: Scalar>(
-    kind: Factorization,
-    symbolic: &SymbolicCholesky<usize>,
-    columns: usize,
-    par: Par,
-) -> StackReq {
-    let solve = symbolic.solve_in_place_scratch::<T>(columns, Par::Seq);
-    let factorize = match kind {
-        Factorization::Llt => symbolic.factorize_numeric_llt_scratch::<T>(par, Spec::default()),
+pub(crate) fn scratch<T: Scalar>(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
+    match kind {
+        Factorization::Llt => symbolic.solve_in_place_scratch::<T>(columns, Par::Seq),
         Factorization::Ldlt => symbolic.factorize_numeric_ldlt_scratch::<T>(Par::Seq, Spec::default()),
-    };
-    solve.or(factorize)
+    }
 }
 
 /// Solves in place for the columns of `rhs` with a supernodal factor.

@@ -7,6 +7,7 @@
 //! therefore be swept at the same time. All sums and their order depend on the factor alone: results are the same bit
 //! for bit on any number of threads.
 
+use super::plan::{Plan, plan};
 use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
@@ -30,17 +31,6 @@ pub struct Forest {
     pub(crate) plan: Plan,
 }
 
-/// The order of a sweep: forward from the branches to the stem, backward from the stem to the branches.
-#[derive(Debug)]
-pub(crate) enum Plan {
-    /// Supernodes one after the other.
-    Serial(Range<usize>),
-    /// A branch (all supernodes before those of the stem), then the stem.
-    Stem(Box<Plan>, Range<usize>),
-    /// Two branches without a common supernode; the second one begins with this supernode.
-    Fork(Box<[Plan; 2]>, usize),
-}
-
 impl Forest {
     /// The supernodes whose columns all lie before `interior`.
     pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>, interior: usize) -> Self {
@@ -52,12 +42,7 @@ impl Forest {
         for s in 0..count {
             offsets.push(offsets[s] + begins[s + 1] - begins[s] + symbolic.supernode(s).pattern().len());
         }
-        let parents: Vec<usize> = (0..count)
-            .map(|s| match symbolic.supernode(s).pattern().iter().min() {
-                Some(&row) if row < end => begins.partition_point(|&begin| begin <= row) - 1,
-                _ => count, // a root
-            })
-            .collect();
+        let parents = supernode_parents(symbolic, count);
         let (children, first_child) = lists(&parents);
         let mut forest = Self {
             end,
@@ -70,7 +55,8 @@ impl Forest {
             offsets,
         };
         forest.places = forest.places_in_parents(symbolic, &parents);
-        forest.plan = Planner::new(&forest, &parents).plan(0..count);
+        let reads: Vec<usize> = (0..count).map(|s| forest.reads(s)).collect();
+        forest.plan = plan(&parents, &reads, GRAIN);
         forest
     }
 
@@ -149,6 +135,14 @@ impl Forest {
     }
 }
 
+/// The parent of each of the first supernodes; `count` where it is none of these.
+pub(super) fn supernode_parents(symbolic: &SymbolicSupernodalCholesky<usize>, count: usize) -> Vec<usize> {
+    let ends = &symbolic.supernode_end()[..count];
+    let parent =
+        |s: usize| symbolic.supernode(s).pattern().iter().min().map(|row| ends.partition_point(|end| end <= row));
+    (0..count).map(|s| parent(s).unwrap_or(count)).collect()
+}
+
 /// The children of each parent, and where the list of each begins; a parent out of range has no list.
 fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let count = parents.len();
@@ -166,74 +160,6 @@ fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
         next[parent] += 1;
     }
     (children, first)
-}
-
-/// Cuts a forest into branches.
-struct Planner<'f> {
-    parents: &'f [usize],
-    /// Scalars that a sweep reads of all supernodes before each one.
-    read_before: Vec<usize>,
-    /// For each supernode the first one of its branch, if the branch is contiguous; else nothing.
-    first: Vec<Option<usize>>,
-}
-
-impl<'f> Planner<'f> {
-    fn new(forest: &Forest, parents: &'f [usize]) -> Self {
-        let mut read_before = vec![0];
-        let (mut first, mut members): (Vec<usize>, Vec<usize>) = (0..parents.len()).map(|s| (s, 1)).unzip();
-        for s in 0..parents.len() {
-            read_before.push(read_before[s] + forest.reads(s));
-            let parent = parents[s];
-            if parent < parents.len() {
-                first[parent] = first[parent].min(first[s]);
-                members[parent] += members[s];
-            }
-        }
-        let whole = |s: usize| (s + 1 - first[s] == members[s]).then_some(first[s]);
-        Self { parents, read_before, first: (0..parents.len()).map(whole).collect() }
-    }
-
-    fn reads(&self, range: &Range<usize>) -> usize {
-        self.read_before[range.end] - self.read_before[range.start]
-    }
-
-    /// A plan for a range that is a forest of its own.
-    fn plan(&self, range: Range<usize>) -> Plan {
-        if self.reads(&range) < 2 * GRAIN {
-            return Plan::Serial(range);
-        }
-        // The stem: the root while only one tree is left, and trees that are not worth a thread.
-        let mut end = range.end;
-        while let Some(first) = end.checked_sub(1).filter(|last| *last >= range.start).and_then(|last| self.first[last])
-        {
-            match first {
-                first if first <= range.start => end -= 1,
-                first if self.reads(&(first..end)) < GRAIN => end = first,
-                _ => break,
-            }
-        }
-        let branches = range.start..end;
-        let plan = match self.cut(&branches) {
-            Some(cut) => Plan::Fork(Box::new([self.plan(range.start..cut), self.plan(cut..end)]), cut),
-            None => return Plan::Serial(range),
-        };
-        if end == range.end { plan } else { Plan::Stem(Box::new(plan), end..range.end) }
-    }
-
-    /// The supernode that splits a forest into two of about the same weight, both worth a thread.
-    fn cut(&self, range: &Range<usize>) -> Option<usize> {
-        // From the last tree to the first one.
-        let (mut cuts, mut end) = (Vec::new(), range.end);
-        while end > range.start {
-            // A tree that is not contiguous ends the search: it cannot be separated from those before it.
-            let Some(first) = self.first[end - 1].filter(|first| *first >= range.start) else { break };
-            cuts.push(first);
-            end = first;
-        }
-        let lighter = |&cut: &usize| self.reads(&(range.start..cut)).min(self.reads(&(cut..range.end)));
-        debug_assert!(cuts.iter().all(|&cut| (range.start..cut).all(|s| !(cut..range.end).contains(&self.parents[s]))));
-        cuts.into_iter().max_by_key(lighter).filter(|cut| lighter(cut) >= GRAIN)
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
 use super::cholesky::{Columns, Supernodal, supernodes};
-use super::forest::{Forest, Plan};
+use super::forest::Forest;
+use super::plan::Plan;
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;

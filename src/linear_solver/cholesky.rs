@@ -4,11 +4,12 @@ use super::ordering::{self, Ordering};
 use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::kernels::cholesky::{Columns, Factorization as Kind, Simplicial, Supernodal};
+use crate::kernels::elimination::Elimination;
 use crate::kernels::forest::Forest;
-use crate::memory;
+use crate::kernels::supernodal::{Problem, Workspace};
 use crate::real::Real;
-use crate::{sparse, threads};
-use faer::Par;
+use crate::threads::PerThread;
+use crate::{memory, sparse};
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -82,8 +83,9 @@ struct Factor<T: Real> {
     kind: Kind,
     values: Vec<T>,
     memory: Option<MemBuffer>,
-    /// The parallelism that `memory` has room for.
-    par: Par,
+    /// How a supernodal factor is computed, and what threads need for it.
+    elimination: Option<Elimination>,
+    workspaces: Option<PerThread<Workspace<T>>>,
     /// Right-hand sides that `memory` has room for.
     columns: usize,
     /// Pivots in the numbering of the matrix.
@@ -127,16 +129,16 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
             SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
         };
-        let par = threads::parallelism(values.len());
-        let scratch = T::cholesky_scratch(kind, &symbolic, 1, par);
-        let memory = Some(buffer(scratch)?);
+        let memory = Some(buffer(T::cholesky_scratch(kind, &symbolic, 1))?);
         let n = symbolic.nrows();
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
         let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
-        let forest = match symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(_) => None,
-            SymbolicCholeskyRaw::Supernodal(raw) => Some(Forest::new(raw, first)),
+        let (forest, elimination, workspaces) = match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(_) => (None, None, None),
+            SymbolicCholeskyRaw::Supernodal(raw) => {
+                (Some(Forest::new(raw, first)), Some(Elimination::new(raw)), Some(workspaces(n)?))
+            }
         };
         let work = memory::zeros(forest.as_ref().map_or(0, Forest::work), 1, "the sweeps of a sparse Cholesky factor")?;
         let (pivots, sweep) = (vec![T::zero(); n], vec![T::zero(); n]);
@@ -150,7 +152,8 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             kind,
             values,
             memory,
-            par,
+            elimination,
+            workspaces,
             columns: 1,
             pivots,
             forest,
@@ -167,6 +170,11 @@ impl<T: Real> LinearSolver<T> for Cholesky {
 /// Scratch of faer's kernels.
 fn buffer(size: StackReq) -> Result<MemBuffer> {
     MemBuffer::try_new(size).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })
+}
+
+/// What the threads of the current pool need for a factorization.
+fn workspaces<T: Real>(dofs: usize) -> Result<PerThread<Workspace<T>>> {
+    PerThread::new(|| T::supernodal_workspace(dofs)).ok_or(Error::OutOfMemory { what: "sparse Cholesky scratch" })
 }
 
 /// The largest number of rows that a sweep over part of a supernode's columns has below it.
@@ -289,15 +297,31 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { fingerprint, symbolic, kind, values, pivots, memory, par, cursor, columns, .. } = self;
+        let Self {
+            fingerprint, symbolic, kind, values, pivots, memory, elimination, workspaces: threads, cursor, ..
+        } = self;
         fingerprint.check(a)?;
-        let memory = match memory {
-            Some(memory) => memory,
-            None => memory.insert(buffer(T::cholesky_scratch(*kind, symbolic, *columns, *par))?),
-        };
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
-        T::cholesky(*kind, symbolic, a, values, pivots, *par, memory).map_err(singular)?;
+        match (symbolic.raw(), elimination) {
+            (SymbolicCholeskyRaw::Supernodal(raw), Some(elimination)) => {
+                let workspaces = match threads {
+                    Some(workspaces) => workspaces,
+                    None => threads.insert(workspaces(pivots.len())?),
+                };
+                let order = symbolic.perm().map(|perm| perm.arrays());
+                let problem = Problem { symbolic: raw, elimination, a, order, workspaces };
+                T::supernodal_cholesky(&problem, values, pivots)
+            }
+            _ => {
+                let memory = match memory {
+                    Some(memory) => memory,
+                    None => memory.insert(buffer(T::cholesky_scratch(*kind, symbolic, 1))?),
+                };
+                T::simplicial_cholesky(symbolic, a, values, pivots, memory)
+            }
+        }
+        .map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());
         // Written so that NaN is refused too.
         let sound = |(dof, &pivot): (usize, &T)| pivot > negligible * sparse::entry(a, dof, dof);
@@ -314,9 +338,8 @@ impl<T: Real> Factorization<T> for Factor<T> {
             if columns > self.columns {
                 (self.memory, self.columns) = (None, columns);
             }
-            let Self { kind, symbolic, values, memory, par, columns: most, .. } = self;
-            let memory =
-                memory.get_or_insert_with(|| MemBuffer::new(T::cholesky_scratch(*kind, symbolic, *most, *par)));
+            let Self { kind, symbolic, values, memory, columns: most, .. } = self;
+            let memory = memory.get_or_insert_with(|| MemBuffer::new(T::cholesky_scratch(*kind, symbolic, *most)));
             T::supernodal_solve(symbolic, values, rhs, columns, memory);
             return Ok(());
         }
@@ -329,7 +352,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
     }
 
     fn release(&mut self) {
-        (self.memory, self.cursor) = (None, Vec::new());
+        (self.memory, self.workspaces, self.cursor) = (None, None, Vec::new());
     }
 
     fn stored_values(&self) -> usize {
