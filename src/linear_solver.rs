@@ -8,6 +8,7 @@ mod dissection;
 mod lu;
 mod minimum_degree;
 pub(crate) mod ordering;
+mod shared;
 mod tridiagonal;
 
 pub use by_body::ByBody;

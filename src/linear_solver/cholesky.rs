@@ -1,6 +1,7 @@
 //! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
 
 use super::ordering::{self, Ordering};
+use super::shared::Analyses;
 use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::kernels::cholesky::{Columns, Factorization as Kind, Simplicial, Supernodal};
@@ -14,6 +15,7 @@ use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Sparse Cholesky factorization of symmetric positive definite matrices, the dofs of contact eliminated last, the
 /// others in an order with little fill ([`Ordering`]).
@@ -31,6 +33,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, Default)]
 pub struct Cholesky {
     ordering: Ordering,
+    shared: Option<Analyses>,
 }
 
 impl Cholesky {
@@ -47,7 +50,49 @@ impl Cholesky {
     /// # let _ = solver;
     /// ```
     pub fn ordered(ordering: Ordering) -> Self {
-        Self { ordering }
+        Self { ordering, shared: None }
+    }
+
+    /// Shares analyses among all clones of this value: a run whose matrix has the pattern of an earlier one takes its
+    /// order of elimination, and the memory that holds it. For studies of many runs, side by side or one after the
+    /// other; the factors are those without sharing, bit for bit. The last sixteen analyses are kept as long as a clone
+    /// is.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Cholesky, LinearSystem, Newmark, Simulation};
+    ///
+    /// let solver = Cholesky::default().sharing();
+    /// let mut last = Vec::new();
+    /// for stiffness in [1.0, 4.0, 9.0] {
+    ///     // Two masses on a spring: the first run analyzes, the others do not.
+    ///     let entries = [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)];
+    ///     let k = entries.map(|(i, j, k)| Triplet::new(i, j, stiffness * k));
+    ///     let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &k)?;
+    ///     let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0; 2], k)?, Newmark::trapezoidal(), 0.01)
+    ///         .velocity(vec![1.0, 0.0])
+    ///         .linear_solver(solver.clone())
+    ///         .build()?;
+    ///     run.run_until(1.0, &mut ())?;
+    ///     last.push(run.state().displacement()[0]);
+    /// }
+    /// assert!(last.iter().is_sorted_by(|softer, stiffer| softer > stiffer));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn sharing(self) -> Self {
+        Self { shared: Some(self.shared.unwrap_or_default()), ..self }
+    }
+
+    fn symbolic(
+        &self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        last: &[usize],
+    ) -> Result<Arc<SymbolicCholesky<usize>>> {
+        match &self.shared {
+            Some(analyses) => analyses.symbolic(&self.ordering, pattern, last),
+            None => Ok(Arc::new(ordering::symbolic_cholesky(&self.ordering, pattern, last)?)),
+        }
     }
 
     /// Number of scalars that the factor of a pattern (both triangles) will hold with `last` (ascending) eliminated
@@ -73,13 +118,13 @@ impl Cholesky {
     /// Those of [`analyze`](LinearSolver::analyze); [`Error::OutOfMemory`] only if the analysis itself finds no memory.
     pub fn estimate(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
         check_analysis(pattern, last)?;
-        Ok(ordering::symbolic_cholesky(&self.ordering, pattern, last)?.len_val())
+        Ok(self.symbolic(pattern, last)?.len_val())
     }
 }
 
 struct Factor<T: Real> {
     fingerprint: Fingerprint,
-    symbolic: SymbolicCholesky<usize>,
+    symbolic: Arc<SymbolicCholesky<usize>>,
     kind: Kind,
     values: Vec<T>,
     memory: Option<MemBuffer>,
@@ -123,7 +168,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
         check_analysis(pattern, last)?;
-        let symbolic = ordering::symbolic_cholesky(&self.ordering, pattern, last)?;
+        let symbolic = self.symbolic(pattern, last)?;
         let values = memory::zeros(symbolic.len_val(), 1, "a sparse Cholesky factor")?;
         let (kind, below) = match symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
