@@ -1,11 +1,12 @@
 //! Many small independent runs: a study of two bars that collide, on one thread and on two, and what a run costs to
-//! build beside its steps.
+//! build beside its steps; blocks with an analysis each, and with one for all.
 //!
 //! `cargo bench --bench batch -- [elements a bar]…` (default 20, 100 and 400: half a minute). Nothing but the standard
-//! library's threads: runs are `Send`, and share nothing.
+//! library's threads: runs are `Send`.
 
-use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
+use contact_dynamics::{Automatic, Cholesky, GeneralizedAlpha, LinearRows, LinearSolver, LinearSystem, Simulation};
 use contact_dynamics_scenes::Bars;
+use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{Arguments, median};
 use std::hint::black_box;
 use std::time::Instant;
@@ -21,6 +22,61 @@ fn main() {
     for &elements in &arguments.sizes {
         study(elements, runs, arguments.repeated(5));
     }
+    println!();
+    println!(
+        "{:<15} {:>6} {:>10} {:>12} {:>14} {:>16} {:>15}",
+        "block of hex8", "dofs", "step, µs", "build, µs", "build/step", "sharing: build", "build/step"
+    );
+    for cells in if arguments.quick { vec![3] } else { vec![4, 6, 10] } {
+        blocks(cells, arguments.repeated(9));
+    }
+}
+
+/// Blocks that stand on a floor, built with the default solver and with one that shares its analyses.
+fn blocks(cells: usize, samples: usize) {
+    let material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+    let block = Solid::block([1.0; 3], [cells; 3], material);
+    let h = 1.0 / cells as f64 / material.wave_speed();
+    let floor: Vec<usize> = block.surface_nodes().into_iter().filter(|&node| block.nodes[node][2] == 0.0).collect();
+    let build = |system: LinearSystem<'static, f64>, solver: Box<dyn LinearSolver<f64>>| {
+        let rows = floor.iter().fold(LinearRows::new(), |rows, &node| rows.unilateral(&[(3 * node + 2, 1.0)], 1e-3));
+        Simulation::builder(system, GeneralizedAlpha::chung_hulbert(0.8).expect("a radius"), h)
+            .velocity(block.uniform([0.0, 0.0, -1e-3]))
+            .constraint(rows)
+            .linear_solver(solver)
+            .build()
+            .expect("the scene is well posed")
+    };
+    let shared = Cholesky::default().sharing();
+    let mut runs: Vec<(Vec<f64>, Box<dyn Fn() -> Box<dyn LinearSolver<f64>>>)> =
+        vec![(Vec::new(), Box::new(|| Box::new(Automatic))), (Vec::new(), Box::new(move || Box::new(shared.clone())))];
+    for sample in 0..=samples {
+        for (times, solver) in &mut runs {
+            let (system, solver) = (block.system(), solver());
+            let start = Instant::now();
+            black_box(build(system, solver));
+            // The first one analyzes.
+            if sample > 0 {
+                times.push(start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    let mut run = build(block.system(), Box::new(Automatic));
+    let steps = 100;
+    let start = Instant::now();
+    (0..steps).for_each(|_| run.step().expect("a well-posed step"));
+    let step = start.elapsed().as_secs_f64() / f64::from(steps);
+    let [alone, shared] = [0, 1].map(|k| median(&runs[k].0));
+    println!(
+        "{:<15} {:>6} {:>10.1} {:>12.0} {:>14.1} {:>16.0} {:>15.1}",
+        format!("{cells}³"),
+        block.dofs(),
+        step * 1e6,
+        alone * 1e6,
+        alone / step,
+        shared * 1e6,
+        shared / step
+    );
 }
 
 /// One run of a study.
