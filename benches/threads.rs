@@ -3,7 +3,7 @@
 //! `cargo bench --features rayon --bench threads -- [elements a side]…` (default 10, 20 and 30)
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::{ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, Simulation};
+use contact_dynamics::{ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, Simulation, System};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments};
 use std::hint::black_box;
@@ -32,6 +32,8 @@ fn main() {
             report(&format!("{name} of {n}³: factorization"), [&runs[0][0], &runs[1][0]]);
             report(&format!("{name} of {n}³: solve"), [&runs[0][1], &runs[1][1]]);
         }
+        let runs = [1, available].map(|threads| product(threads, &block, 10 * repetitions));
+        report(&format!("block of {n}³: product with K"), [&runs[0], &runs[1]]);
         let runs = [1, available].map(|threads| steps(threads, &block, &face, step_size(n), repetitions));
         report(&format!("block of {n}³: step, {} nodes pressed", face.len()), [&runs[0], &runs[1]]);
     }
@@ -77,6 +79,20 @@ fn linear(threads: usize, bodies: usize, a: &SparseColMat<usize, f64>, repetitio
             black_box(&x);
         });
         [Measured { milliseconds: factorization, numbers: x.clone() }, Measured { milliseconds: solve, numbers: x }]
+    })
+}
+
+/// The force of the block: a product with K.
+fn product(threads: usize, block: &Solid<3>, repetitions: usize) -> Measured {
+    in_pool(threads, || {
+        let mut system = block.system::<f64>();
+        let u: Vec<f64> = (0..block.dofs()).map(|i| (0.1 * i as f64).sin()).collect();
+        let (v, mut f) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        let milliseconds = median(repetitions, || {
+            system.force(0.0, black_box(&u), &v, &mut f).expect("a linear system");
+            black_box(&f);
+        });
+        Measured { milliseconds, numbers: f }
     })
 }
 

@@ -5,7 +5,7 @@
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, LinearSystem, PersistencyCorrection,
-    Simulation,
+    Simulation, System,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
 
@@ -82,6 +82,19 @@ fn solutions_are_the_same_by_any_number_of_threads() {
 }
 
 /// A body that fails names its own dof, whichever thread meets it first.
+/// Large enough for four parts.
+#[test]
+fn forces_are_the_same_by_any_number_of_threads() {
+    let block = Solid::block([1.0; 3], [16; 3], MATERIAL);
+    assert!(block.stiffness::<f64>().val().len() > 1 << 20);
+    let u: Vec<f64> = (0..block.dofs()).map(|i| (0.1 * i as f64).sin()).collect();
+    same_bits("a force", || {
+        let mut f = vec![0.0; u.len()];
+        block.system::<f64>().force(0.0, &u, &u, &mut f).unwrap();
+        f
+    });
+}
+
 #[test]
 fn the_first_body_that_fails_is_told() {
     let block = Solid::block([1.0; 3], [9; 3], MATERIAL);
