@@ -17,6 +17,7 @@ pages! {
     Choosing = "docs/choosing.md";
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";
+    Performance = "docs/performance.md";
     Bars = "docs/tutorials/bars.md";
     OwnSystem = "docs/tutorials/own_system.md";
     OwnConstraint = "docs/tutorials/own_constraint.md";
