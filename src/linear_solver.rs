@@ -5,9 +5,12 @@ mod cholesky;
 mod conjugate_gradients;
 mod diagonal;
 mod dissection;
+mod elimination_tree;
+mod graph;
 mod lu;
 mod minimum_degree;
 pub(crate) mod ordering;
+mod quotient;
 mod shared;
 mod tridiagonal;
 

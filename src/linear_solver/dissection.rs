@@ -2,155 +2,128 @@
 //! same way (George, SIAM J. Numer. Anal. 10, 1973).
 
 mod coordinates;
-mod graph;
+mod leaf;
 mod multilevel;
 mod separator;
 
+use super::graph::{Graph, NONE, number};
 use super::minimum_degree::minimum_degree;
+use super::quotient::Quotient;
 use crate::error::Result;
-use faer::sparse::SymbolicSparseColMatRef;
-use graph::{Graph, Quotient};
-use multilevel::Random;
+use crate::threads;
 use separator::{BETWEEN, Separator};
 
-/// Parts of at most this many nodes are ordered by minimum degree.
-const LEAF: usize = 8;
+/// Parts of at most this many vertices are ordered by minimum degree.
+const LEAF: usize = 64;
 
-/// The order of all dofs but those of `last`, by separators of the graph; nothing for a pattern that is not symmetric.
-pub(super) fn by_graph(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<Option<Vec<usize>>> {
-    let Some(mut quotient) = Quotient::new(pattern, last) else { return Ok(None) };
-    quotient.graph.weigh_edges();
-    let mut random = Random::new();
-    let vertices = dissect(&quotient.graph, |part, _| multilevel::bisect(part, &mut random))?;
-    Ok(Some(quotient.expanded(&vertices)))
+/// The smallest part, in vertices, that is worth a thread of its own.
+const GRAIN: usize = 2000;
+
+/// The order of all vertices that are not eliminated last, by separators of the graph.
+pub(super) fn by_graph(quotient: &Quotient) -> Result<Vec<u32>> {
+    dissect(quotient, true, |part, _| multilevel::bisect(part))
 }
 
 /// The same by separators across the longest axis, from the coordinates of all dofs.
-pub(super) fn by_coordinates(
-    pattern: SymbolicSparseColMatRef<'_, usize>,
-    last: &[usize],
-    places: &[[f64; 3]],
-) -> Result<Option<Vec<usize>>> {
-    let Some(quotient) = Quotient::new(pattern, last) else { return Ok(None) };
-    let place = |&vertex: &usize| places[quotient.dofs(vertex)[0]];
-    let bisect =
-        |part: &Graph, names: &[usize]| coordinates::bisect(part, &names.iter().map(place).collect::<Vec<_>>());
-    let vertices = dissect(&quotient.graph, bisect)?;
-    Ok(Some(quotient.expanded(&vertices)))
+pub(super) fn by_coordinates(quotient: &Quotient, places: &[[f64; 3]]) -> Result<Vec<u32>> {
+    let place = |&vertex: &u32| places[quotient.dofs(vertex)[0]];
+    dissect(quotient, false, |part, names| coordinates::bisect(part, &names.iter().map(place).collect::<Vec<_>>()))
 }
 
-/// An order of the vertices of a graph; `bisect` gets connected parts of it with the names of their vertices.
-fn dissect(graph: &Graph, mut bisect: impl FnMut(&Graph, &[usize]) -> Separator) -> Result<Vec<usize>> {
-    let mut local = vec![usize::MAX; graph.size()];
-    let (sparse, dense) = without_dense(graph);
-    let mut order = vec![0; sparse.len()];
-    // Parts still to be ordered: graph, names of its vertices, first place in the order.
-    let mut parts = vec![(graph.part(&sparse, &mut local), sparse, 0)];
-    while let Some((part, names, start)) = parts.pop() {
-        // Writes vertices of the part into the last places that it has left.
-        let mut end = start + names.len();
-        let mut put = |vertices: &[usize]| {
-            end -= vertices.len();
-            for (place, &vertex) in order[end..].iter_mut().zip(vertices) {
-                *place = names[vertex];
-            }
-        };
-        if part.size() <= LEAF {
-            put(&minimum_degree(part.pattern())?);
-            continue;
-        }
-        let mut pieces = part.components();
-        if pieces.len() == 1 {
-            let separator = bisect(&part, &names);
-            let [one, other, _] = separator.weights;
-            if one.min(other) * 8 < one + other {
-                // So unequal that separators gain nothing.
-                put(&minimum_degree(part.pattern())?);
-                continue;
-            }
-            let all = |label| (0..part.size()).filter(|&vertex| separator.label[vertex] == label).collect::<Vec<_>>();
-            put(&all(BETWEEN));
-            pieces = vec![all(0), all(1)];
-        } else {
-            // Small pieces are ordered together.
-            let (small, large): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|piece| piece.len() <= LEAF);
-            let crumbs = small.concat();
-            let order = minimum_degree(part.part(&crumbs, &mut local).pattern())?;
-            put(&order.into_iter().map(|vertex| crumbs[vertex]).collect::<Vec<_>>());
-            pieces = large;
-        }
-        let mut first = start;
-        for piece in pieces {
-            let names = piece.iter().map(|&vertex| names[vertex]).collect();
-            parts.push((part.part(&piece, &mut local), names, first));
-            first += piece.len();
-        }
+/// `bisect` gets connected parts of the graph with the names of their vertices; `weigh` says whether it reads weights
+/// of edges.
+fn dissect(quotient: &Quotient, weigh: bool, bisect: impl Fn(&Graph, &[u32]) -> Separator + Sync) -> Result<Vec<u32>> {
+    let whole = &quotient.graph;
+    let mut local = vec![NONE; whole.size()];
+    let interior: Vec<u32> = (0..number(whole.size())).filter(|&vertex| !quotient.is_last(vertex)).collect();
+    let (sparse, dense) = without_dense(whole, interior);
+    let mut part = whole.part(&sparse, &mut local);
+    if weigh {
+        part.weigh_edges();
     }
+    let mut order = vec![0; sparse.len()];
+    let dissection = Dissection { whole, bisect };
+    dissection.pieces(&part, &sparse, part.components(), &mut order, &mut local)?;
     order.extend(dense);
     Ok(order)
 }
 
-/// The vertices of a graph, and those with so many neighbors that every separator would contain them: they are
+/// Vertices of a graph, and those of them with so many neighbors that every separator would contain them: they are
 /// eliminated last.
-fn without_dense(graph: &Graph) -> (Vec<usize>, Vec<usize>) {
-    let n = graph.size();
-    let many = 10.0 * (n as f64).sqrt().max(1.6);
-    (0..n).partition(|&vertex| graph.neighbors(vertex).len() as f64 <= many)
+fn without_dense(graph: &Graph, vertices: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
+    let many = 10.0 * (vertices.len() as f64).sqrt().max(1.6);
+    vertices.into_iter().partition(|&vertex| graph.neighbors(vertex).len() as f64 <= many)
+}
+
+/// A graph, and how connected parts of it are cut.
+struct Dissection<'g, F> {
+    whole: &'g Graph,
+    bisect: F,
+}
+
+impl<F: Fn(&Graph, &[u32]) -> Separator + Sync> Dissection<'_, F> {
+    /// Orders pieces of a part, between which there is no edge, one after the other; `names` are those of the part's
+    /// vertices, `local` is scratch as for [`Graph::part`].
+    fn pieces(
+        &self,
+        part: &Graph,
+        names: &[u32],
+        pieces: Vec<Vec<u32>>,
+        mut order: &mut [u32],
+        local: &mut [u32],
+    ) -> Result<()> {
+        let mut large = Vec::new();
+        for piece in pieces {
+            let (first, rest) = std::mem::take(&mut order).split_at_mut(piece.len());
+            order = rest;
+            match piece.len() < GRAIN {
+                true => self.piece(part, names, &piece, first, local)?,
+                false => large.push((piece, first)),
+            }
+        }
+        // The order of a piece does not depend on the others.
+        if let [(piece, order)] = &mut large[..] {
+            return self.piece(part, names, piece, order, local);
+        }
+        threads::try_each(&mut large, &|(piece, order)| {
+            self.piece(part, names, piece, order, &mut vec![NONE; self.whole.size()])
+        })
+    }
+
+    /// Orders one piece.
+    fn piece(&self, part: &Graph, names: &[u32], piece: &[u32], order: &mut [u32], local: &mut [u32]) -> Result<()> {
+        let names: Vec<u32> = piece.iter().map(|&vertex| names[vertex as usize]).collect();
+        let put = |order: &mut [u32], vertices: &[u32]| {
+            order.iter_mut().zip(vertices).for_each(|(place, &vertex)| *place = names[vertex as usize]);
+        };
+        if piece.len() <= LEAF {
+            put(order, &leaf::order(self.whole, &names, local));
+            return Ok(());
+        }
+        let part = part.part(piece, local);
+        let components = part.components();
+        if components.len() > 1 {
+            return self.pieces(&part, &names, components, order, local);
+        }
+        let separator = (self.bisect)(&part, &names);
+        let [one, other, _] = separator.weights;
+        if one.min(other) * 8 < one + other {
+            // So unequal that separators gain nothing.
+            put(order, &minimum_degree(part.pattern())?);
+            return Ok(());
+        }
+        let [one, other, between] = [0, 1, BETWEEN].map(|label| separator.labeled(label));
+        let (sides, last) = order.split_at_mut(one.len() + other.len());
+        put(last, &between);
+        self.pieces(&part, &names, vec![one, other], sides, local)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::separator::{grow, refine};
     use super::*;
-    use faer::sparse::SymbolicSparseColMat;
-
-    /// The pattern with these pairs, both triangles.
-    fn pattern(n: usize, pairs: &[(usize, usize)]) -> SymbolicSparseColMat<usize> {
-        let mut columns: Vec<Vec<usize>> = (0..n).map(|i| vec![i]).collect();
-        for &(i, j) in pairs {
-            columns[i].push(j);
-            columns[j].push(i);
-        }
-        let mut starts = vec![0];
-        for column in &mut columns {
-            column.sort_unstable();
-            column.dedup();
-            starts.push(starts[starts.len() - 1] + column.len());
-        }
-        SymbolicSparseColMat::new_checked(n, n, starts, None, columns.concat())
-    }
-
-    fn chain(n: usize) -> Vec<(usize, usize)> {
-        (1..n).map(|i| (i - 1, i)).collect()
-    }
-
-    fn clique(from: usize, to: usize) -> Vec<(usize, usize)> {
-        (from..to).flat_map(|i| (from..i).map(move |j| (j, i))).collect()
-    }
-
-    /// A cube of nodes with 27 neighbors each, the node itself included, and three dofs a node.
-    fn cube(side: usize) -> (usize, Vec<(usize, usize)>) {
-        let node = |x: usize, y: usize, z: usize| x + side * (y + side * z);
-        let near = |x: usize| x.saturating_sub(1)..(x + 2).min(side);
-        let mut pairs = Vec::new();
-        for (x, y, z) in (0..side.pow(3)).map(|i| (i % side, i / side % side, i / side / side)) {
-            for (a, b, c) in near(x).flat_map(|a| near(y).flat_map(move |b| near(z).map(move |c| (a, b, c)))) {
-                let (one, other) = (3 * node(x, y, z), 3 * node(a, b, c));
-                pairs.extend((0..9).map(|k| (one + k / 3, other + k % 3)));
-            }
-        }
-        (3 * side.pow(3), pairs)
-    }
-
-    /// Pairs by a linear congruential generator (Knuth's MMIX): the package has the tests of this file, but no crate for
-    /// them.
-    fn strewn(n: usize, pairs: usize, mut state: u64) -> Vec<(usize, usize)> {
-        let mut dof = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            usize::try_from(state >> 33).unwrap() % n
-        };
-        (0..pairs).map(|_| (dof(), dof())).collect()
-    }
+    use crate::linear_solver::quotient::patterns::{chain, clique, cube, frame, pattern, strewn};
 
     #[test]
     fn orders_name_each_dof_once() {
@@ -167,6 +140,7 @@ mod tests {
             (900, (1..900).map(|i| (0, i)).collect()),
             (900, (2..900).flat_map(|i| [(0, i), (1, i)]).collect()),
             (cube_size, cube),
+            frame(600),
             (500, strewn(500, 400, 1)),
             (500, strewn(500, 1500, 2)),
             (500, strewn(500, 9000, 3)),
@@ -176,11 +150,9 @@ mod tests {
             let places: Vec<[f64; 3]> = (0..n).map(|i| [(i % 7) as f64, (i % 11) as f64, (i / 77) as f64]).collect();
             let side: Vec<usize> = (0..n / 5).collect();
             for last in [vec![], side, (0..n).step_by(3).collect(), (0..n).collect()] {
-                let orders = [
-                    by_graph(pattern.as_ref(), &last).unwrap().unwrap(),
-                    by_coordinates(pattern.as_ref(), &last, &places).unwrap().unwrap(),
-                ];
-                for mut order in orders {
+                let quotient = Quotient::new(pattern.as_ref(), &last).unwrap();
+                for vertices in [by_graph(&quotient).unwrap(), by_coordinates(&quotient, &places).unwrap()] {
+                    let mut order = quotient.expanded(&vertices);
                     order.extend(&last);
                     order.sort_unstable();
                     assert!(order.into_iter().eq(0..n), "{n} dofs, {} pairs, {} last", pairs.len(), last.len());
@@ -193,33 +165,15 @@ mod tests {
     fn orders_are_the_same_in_every_run() {
         let (n, pairs) = cube(7);
         let pattern = pattern(n, &pairs);
-        assert_eq!(by_graph(pattern.as_ref(), &[1]).unwrap(), by_graph(pattern.as_ref(), &[1]).unwrap());
-    }
-
-    #[test]
-    fn dofs_of_a_node_are_one_vertex() {
-        let (n, pairs) = cube(4);
-        let pattern = pattern(n, &pairs);
-        let whole = Quotient::new(pattern.as_ref(), &[]).unwrap();
-        assert_eq!((whole.graph.size(), whole.graph.total()), (64, 192));
-        // A node of which some dofs are left, and one of which none are.
-        let part = Quotient::new(pattern.as_ref(), &[0, 3, 4, 5]).unwrap();
-        assert_eq!((part.graph.size(), part.graph.total(), part.graph.weight(0)), (63, 188, 2));
-        assert_eq!(part.dofs(0), [1, 2]);
-    }
-
-    #[test]
-    fn one_sided_patterns_have_no_graph() {
-        let one_sided = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 3], None, vec![0, 1, 1]);
-        assert!(Quotient::new(one_sided.as_ref(), &[]).is_none());
+        let order = || by_graph(&Quotient::new(pattern.as_ref(), &[1]).unwrap()).unwrap();
+        assert_eq!(order(), order());
     }
 
     fn check_separates(graph: &Graph, separator: &Separator) {
         let mut weights = [0; 3];
-        for vertex in 0..graph.size() {
-            let label = separator.label[vertex];
-            weights[label] += graph.weight(vertex);
-            let crosses = |&next: &usize| label != BETWEEN && separator.label[next] == 1 - label;
+        for (vertex, &label) in (0..).zip(&separator.label) {
+            weights[usize::from(label)] += i64::from(graph.weight(vertex));
+            let crosses = |&next: &u32| label != BETWEEN && separator.label[next as usize] == 1 - label;
             assert!(!graph.neighbors(vertex).iter().any(crosses), "vertex {vertex}");
         }
         assert_eq!(weights, separator.weights);
@@ -227,19 +181,18 @@ mod tests {
 
     #[test]
     fn separators_separate_and_refinement_makes_them_lighter() {
-        let mut random = Random::new();
         for (n, pairs) in [cube(8), (600, strewn(600, 900, 5)), (300, chain(300))] {
             let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
             let largest = graph.components().into_iter().max_by_key(Vec::len).unwrap();
-            let graph = graph.part(&largest, &mut vec![usize::MAX; graph.size()]);
+            let graph = graph.part(&largest, &mut vec![NONE; graph.size()]);
             for seed in [0, graph.size() / 3, graph.size() - 1] {
-                let grown = grow(&graph, seed);
+                let grown = grow(&graph, number(seed));
                 check_separates(&graph, &grown);
                 let refined = refine(&graph, grown.clone());
                 check_separates(&graph, &refined);
                 assert!(refined.cost() <= grown.cost());
             }
-            check_separates(&graph, &multilevel::bisect(&graph, &mut random));
+            check_separates(&graph, &multilevel::bisect(&graph));
         }
     }
 
@@ -249,7 +202,7 @@ mod tests {
             let (n, pairs) = cube(side);
             let mut graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
             graph.weigh_edges();
-            let separator = multilevel::bisect(&graph, &mut Random::new());
+            let separator = multilevel::bisect(&graph);
             check_separates(&graph, &separator);
             let [one, other, between] = separator.weights;
             let plane = 3 * i64::try_from(side * side).unwrap();

@@ -1,7 +1,9 @@
 //! The choice of an elimination order, with the dofs of contact behind all others.
 
 use super::dissection;
+use super::elimination_tree::EliminationTree;
 use super::minimum_degree::{minimum_degree, out_of_memory};
+use super::quotient::Quotient;
 use crate::error::{Error, Result};
 use faer::Side;
 use faer::perm::PermRef;
@@ -43,8 +45,8 @@ use faer::sparse::linalg::cholesky::{
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Ordering {
-    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has less
-    /// fill. Never more fill than with [`MinimumDegree`](Self::MinimumDegree).
+    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has fewer
+    /// entries in the factor (zeros that faer adds where columns are much alike are not counted).
     #[default]
     Automatic,
     /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and
@@ -62,9 +64,9 @@ pub enum Ordering {
     Given(Vec<usize>),
 }
 
-/// Scalars in the factor for each dof from which on nested dissection is tried: blocks of seven elements a side and
+/// Entries in the factor for each dof from which on nested dissection is tried: blocks of seven elements a side and
 /// more have them. Plates and slender beams do not; dissected, they gain a few percent or lose (`benches/ordering.rs`).
-const WORTHWHILE: usize = 200;
+const WORTHWHILE: u64 = 150;
 
 /// The symbolic factorization with `last` (ascending) eliminated last.
 pub(crate) fn symbolic_cholesky(
@@ -73,24 +75,67 @@ pub(crate) fn symbolic_cholesky(
     last: &[usize],
 ) -> Result<SymbolicCholesky<usize>> {
     match ordering {
-        Ordering::Automatic => {
-            let degree = by_degree(pattern, last)?;
-            if degree.len_val() < WORTHWHILE * pattern.nrows() || simplicial(&degree) {
-                return Ok(degree);
-            }
-            let dissected = dissected(pattern, last, dissection::by_graph(pattern, last)?)?;
-            Ok(if dissected.len_val() < degree.len_val() { dissected } else { degree })
-        }
-        Ordering::MinimumDegree => by_degree(pattern, last),
-        Ordering::NestedDissection => dissected(pattern, last, dissection::by_graph(pattern, last)?),
-        Ordering::Coordinates(places) => {
-            check_coordinates(places, pattern.nrows())?;
-            dissected(pattern, last, dissection::by_coordinates(pattern, last, places)?)
-        }
+        Ordering::Coordinates(places) => check_coordinates(places, pattern.nrows())?,
         Ordering::Given(order) => {
             check_order(order, pattern.nrows())?;
-            with_order(pattern, &moved_last(order, last))
+            return with_order(pattern, &moved_last(order, last));
         }
+        _ => {}
+    }
+    // A pattern that is not symmetric has no graph, and is refused when it is factorized.
+    let Some(quotient) = Quotient::new(pattern, last) else {
+        return with_order(pattern, &moved_last(&minimum_degree(pattern)?, last));
+    };
+    let best = match ordering {
+        Ordering::NestedDissection => Elimination::new(&quotient, dissection::by_graph(&quotient)?),
+        Ordering::Coordinates(places) => Elimination::new(&quotient, dissection::by_coordinates(&quotient, places)?),
+        _ => {
+            let degree = Elimination::new(&quotient, minimum_degree(quotient.graph.pattern())?);
+            if matches!(ordering, Ordering::Automatic) && degree.fill() > WORTHWHILE * pattern.nrows() as u64 {
+                let dissected = Elimination::new(&quotient, dissection::by_graph(&quotient)?);
+                if dissected.fill() < degree.fill() { dissected } else { degree }
+            } else {
+                degree
+            }
+        }
+    };
+    let symbolic = with_order(pattern, &quotient.expanded(&best.postordered()))?;
+    // Only structures as thin as a chain gain by elimination toward the contact.
+    if last.is_empty() || !simplicial(&symbolic) || !matches!(ordering, Ordering::Automatic | Ordering::MinimumDegree) {
+        return Ok(symbolic);
+    }
+    let other = with_order(pattern, &moved_last(&toward(pattern, last), last))?;
+    Ok(if other.len_val() < symbolic.len_val() { other } else { symbolic })
+}
+
+/// An order of the vertices of a graph, with those of contact behind.
+struct Elimination {
+    order: Vec<u32>,
+    /// Vertices that are not eliminated last.
+    interior: usize,
+    tree: EliminationTree,
+}
+
+impl Elimination {
+    /// With an order of all vertices, or of all but those of contact.
+    fn new(quotient: &Quotient, order: Vec<u32>) -> Self {
+        let (mut order, mut last): (Vec<_>, Vec<_>) = order.into_iter().partition(|&vertex| !quotient.is_last(vertex));
+        let interior = order.len();
+        if last.is_empty() {
+            last = (0..).take(quotient.graph.size()).filter(|&vertex| quotient.is_last(vertex)).collect();
+        }
+        order.extend(last);
+        let tree = EliminationTree::new(&quotient.graph, &order);
+        Self { order, interior, tree }
+    }
+
+    fn fill(&self) -> u64 {
+        self.tree.fill
+    }
+
+    /// The order with each branch of the tree in one piece.
+    fn postordered(&self) -> Vec<u32> {
+        self.tree.postordered(&self.order, self.interior)
     }
 }
 
@@ -126,52 +171,13 @@ fn check_order(order: &[usize], n: usize) -> Result<()> {
     })
 }
 
-/// With `interior`, an order of the dofs that are not in `last`. (The dofs of `last` fill a dense triangle in any
-/// order.) A pattern that is not symmetric has no such order, and is refused when it is factorized.
-fn dissected(
-    pattern: SymbolicSparseColMatRef<'_, usize>,
-    last: &[usize],
-    interior: Option<Vec<usize>>,
-) -> Result<SymbolicCholesky<usize>> {
-    match interior {
-        Some(mut order) => {
-            order.extend(last);
-            with_order(pattern, &order)
-        }
-        None => by_degree(pattern, last),
-    }
-}
-
-/// Minimum degree with `last` behind, or, for structures as thin as a chain, the order toward the contact if it has
-/// less fill.
-fn by_degree(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<SymbolicCholesky<usize>> {
-    if last.is_empty() {
-        return factorize(pattern, SymmetricOrdering::Amd);
-    }
-    let degree = minimum_degree(pattern)?;
-    let best = with_order(pattern, &moved_last(&degree, last))?;
-    // Only structures as thin as a chain gain by elimination toward the contact.
-    if !simplicial(&best) {
-        return Ok(best);
-    }
-    let other = with_order(pattern, &moved_last(&toward(pattern, last), last))?;
-    Ok(if other.len_val() < best.len_val() { other } else { best })
-}
-
-fn factorize(
-    pattern: SymbolicSparseColMatRef<'_, usize>,
-    ordering: SymmetricOrdering<'_, usize>,
-) -> Result<SymbolicCholesky<usize>> {
-    factorize_symbolic_cholesky(pattern, Side::Lower, ordering, CholeskySymbolicParams::default())
-        .map_err(out_of_memory)
-}
-
 fn with_order(pattern: SymbolicSparseColMatRef<'_, usize>, order: &[usize]) -> Result<SymbolicCholesky<usize>> {
     let mut inverse = vec![0; order.len()];
     for (place, &dof) in order.iter().enumerate() {
         inverse[dof] = place;
     }
-    factorize(pattern, SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len())))
+    let order = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len()));
+    factorize_symbolic_cholesky(pattern, Side::Lower, order, CholeskySymbolicParams::default()).map_err(out_of_memory)
 }
 
 /// The same order with the dofs of `last` behind the others.

@@ -1,7 +1,7 @@
 //! Separators by coordinates: one layer of vertices across the longest axis.
 
-use super::graph::Graph;
 use super::separator::{BETWEEN, Separator};
+use crate::linear_solver::graph::{Graph, number};
 
 /// Side 0 are the vertices below the median of the longest axis; those above with a neighbor below separate.
 pub(super) fn bisect(graph: &Graph, places: &[[f64; 3]]) -> Separator {
@@ -16,11 +16,11 @@ pub(super) fn bisect(graph: &Graph, places: &[[f64; 3]]) -> Separator {
     let (_, &mut median, _) = along.select_nth_unstable_by(middle, f64::total_cmp);
     // Nodes of one layer differ by rounding.
     let layer = 1e-9 * extent(longest);
-    let below = |vertex: usize| places[vertex][longest] < median - layer;
-    let label = |vertex: usize| match below(vertex) {
+    let below = |vertex: u32| places[vertex as usize][longest] < median - layer;
+    let label = |vertex: u32| match below(vertex) {
         true => 0,
         false if graph.neighbors(vertex).iter().any(|&neighbor| below(neighbor)) => BETWEEN,
         false => 1,
     };
-    Separator::new(graph, (0..graph.size()).map(label).collect())
+    Separator::new(graph, (0..number(graph.size())).map(label).collect())
 }

@@ -1,7 +1,7 @@
 //! Separators from the graph alone: found on a coarsened graph, and refined while it is made finer again.
 
-use super::graph::Graph;
 use super::separator::{Separator, grow, refine};
+use crate::linear_solver::graph::{Graph, NONE, number};
 
 /// Number of vertices at which coarsening ends.
 const COARSEST: usize = 50;
@@ -13,11 +13,10 @@ const HEAVIEST: i64 = 33;
 const STARTS: usize = 5;
 
 /// Pseudo-random numbers, the same in every run (xorshift of Marsaglia, J. Stat. Softw. 8, 2003).
-#[derive(Clone, Debug)]
-pub(super) struct Random(u64);
+struct Random(u64);
 
 impl Random {
-    pub(super) fn new() -> Self {
+    fn new() -> Self {
         Self(0x9e37_79b9_7f4a_7c15)
     }
 
@@ -29,7 +28,7 @@ impl Random {
         usize::try_from((self.0 >> 11) % bound as u64).unwrap_or(0)
     }
 
-    fn shuffle(&mut self, items: &mut [usize]) {
+    fn shuffle(&mut self, items: &mut [u32]) {
         for k in (1..items.len()).rev() {
             items.swap(k, self.below(k + 1));
         }
@@ -37,19 +36,20 @@ impl Random {
 }
 
 /// A separator of a connected graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998).
-pub(super) fn bisect(graph: &Graph, random: &mut Random) -> Separator {
+pub(super) fn bisect(graph: &Graph) -> Separator {
+    let mut random = Random::new();
     let heaviest = 1 + graph.total() / HEAVIEST;
-    let mut levels: Vec<(Graph, Vec<usize>)> = Vec::new();
+    let mut levels: Vec<(Graph, Vec<u32>)> = Vec::new();
     loop {
         let finest = levels.last().map_or(graph, |(graph, _)| graph);
         if finest.size() <= COARSEST {
             break;
         }
-        let Some(level) = coarsen(finest, heaviest, random) else { break };
+        let Some(level) = coarsen(finest, heaviest, &mut random) else { break };
         levels.push(level);
     }
     let coarsest = levels.last().map_or(graph, |(graph, _)| graph);
-    let starts = (0..STARTS).map(|k| refine(coarsest, grow(coarsest, k * coarsest.size() / STARTS)));
+    let starts = (0..STARTS).map(|k| refine(coarsest, grow(coarsest, number(k * coarsest.size() / STARTS))));
     let best = starts.min_by_key(Separator::cost);
     let mut separator = best.unwrap_or_else(|| Separator::new(graph, Vec::new()));
     while let Some((_, coarse)) = levels.pop() {
@@ -61,43 +61,42 @@ pub(super) fn bisect(graph: &Graph, random: &mut Random) -> Separator {
 
 /// A smaller graph, vertices joined in pairs along the heaviest edges, and for each vertex the one it became part of;
 /// nothing if hardly any can be joined without exceeding the weight `heaviest`.
-fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, Vec<usize>)> {
-    const FREE: usize = usize::MAX;
+fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, Vec<u32>)> {
     let n = graph.size();
     // Visited in order of their numbers, the vertices of a regular mesh would all be paired along one axis.
-    let mut visits: Vec<usize> = (0..n).collect();
+    let mut visits: Vec<u32> = (0..number(n)).collect();
     random.shuffle(&mut visits);
-    let mut coarse = vec![FREE; n];
-    let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(n / 2 + 1);
+    let mut coarse = vec![NONE; n];
+    let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(n / 2 + 1);
     for vertex in visits {
-        if coarse[vertex] != FREE {
+        if coarse[vertex as usize] != NONE {
             continue;
         }
-        let room = heaviest - graph.weight(vertex);
+        let room = heaviest - i64::from(graph.weight(vertex));
         let mut best = (0, vertex);
         for (neighbor, edges) in graph.edges(vertex) {
-            if coarse[neighbor] == FREE && edges > best.0 && graph.weight(neighbor) <= room {
+            if edges > best.0 && coarse[neighbor as usize] == NONE && i64::from(graph.weight(neighbor)) <= room {
                 best = (edges, neighbor);
             }
         }
-        coarse[vertex] = pairs.len();
-        coarse[best.1] = pairs.len();
+        coarse[vertex as usize] = number(pairs.len());
+        coarse[best.1 as usize] = number(pairs.len());
         pairs.push((vertex, best.1));
     }
     if pairs.len() * 20 > n * 19 {
         return None;
     }
     let mut joined = Graph::with_capacity(pairs.len(), graph.entries() / 2);
-    let mut place = vec![(FREE, 0); pairs.len()];
-    for (name, &(one, other)) in pairs.iter().enumerate() {
+    let mut place = vec![(NONE, 0); pairs.len()];
+    for (name, &(one, other)) in (0_u32..).zip(&pairs) {
         let both = if one == other { &[one][..] } else { &[one, other][..] };
         for &vertex in both {
             for (neighbor, edges) in graph.edges(vertex) {
-                let to = coarse[neighbor];
-                match place[to] {
+                let to = coarse[neighbor as usize];
+                match place[to as usize] {
                     _ if to == name => {}
                     (seen, at) if seen == name => joined.thicken(at, edges),
-                    _ => place[to] = (name, joined.push(to, edges)),
+                    _ => place[to as usize] = (name, joined.push(to, edges)),
                 }
             }
         }

@@ -1,11 +1,11 @@
 //! Vertex separators, grown from a vertex and made lighter by moves of single vertices.
 
-use super::graph::Graph;
+use crate::linear_solver::graph::{Graph, number};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// The label of vertices that separate side 0 from side 1.
-pub(super) const BETWEEN: usize = 2;
+pub(super) const BETWEEN: u8 = 2;
 
 /// Neither side may weigh more than this share of the whole.
 const BALANCE: f64 = 0.57;
@@ -20,16 +20,16 @@ const PASSES: usize = 6;
 #[derive(Clone, Debug)]
 pub(super) struct Separator {
     /// For each vertex its side, or [`BETWEEN`].
-    pub(super) label: Vec<usize>,
+    pub(super) label: Vec<u8>,
     /// Weights of the sides and of the separator.
     pub(super) weights: [i64; 3],
 }
 
 impl Separator {
-    pub(super) fn new(graph: &Graph, label: Vec<usize>) -> Self {
+    pub(super) fn new(graph: &Graph, label: Vec<u8>) -> Self {
         let mut weights = [0; 3];
-        for (vertex, &label) in label.iter().enumerate() {
-            weights[label] += graph.weight(vertex);
+        for (vertex, &label) in (0..).zip(&label) {
+            weights[usize::from(label)] += i64::from(graph.weight(vertex));
         }
         Self { label, weights }
     }
@@ -41,9 +41,14 @@ impl Separator {
         [(one.max(other) - self.limit()).max(0), between, (one - other).abs()]
     }
 
+    /// The vertices with a label.
+    pub(super) fn labeled(&self, label: u8) -> Vec<u32> {
+        (0..).zip(&self.label).filter(|(_, found)| **found == label).map(|(vertex, _)| vertex).collect()
+    }
+
     /// The same separator in the finer graph, whose vertex i is part of vertex `coarse[i]` of this one's.
-    pub(super) fn projected(&self, coarse: &[usize]) -> Self {
-        Self { label: coarse.iter().map(|&vertex| self.label[vertex]).collect(), weights: self.weights }
+    pub(super) fn projected(&self, coarse: &[u32]) -> Self {
+        Self { label: coarse.iter().map(|&vertex| self.label[vertex as usize]).collect(), weights: self.weights }
     }
 
     /// The most that a side may weigh.
@@ -60,13 +65,13 @@ struct Mover<'g> {
     graph: &'g Graph,
     separator: Separator,
     /// The side that vertices are moved to.
-    side: usize,
+    side: u8,
     /// For each vertex of the separator, the weight of its neighbors on the other side: they would take its place.
     beyond: Vec<i64>,
     /// Vertices of the separator by the weight that the separator loses with them; some entries are outdated.
-    queue: BinaryHeap<(i64, Reverse<usize>)>,
+    queue: BinaryHeap<(i64, Reverse<u32>)>,
     /// Vertices that have changed their label, with the one they had.
-    log: Vec<(usize, usize)>,
+    log: Vec<(u32, u8)>,
 }
 
 impl<'g> Mover<'g> {
@@ -74,53 +79,57 @@ impl<'g> Mover<'g> {
         Self { graph, separator, side: 0, beyond: vec![0; graph.size()], queue: BinaryHeap::new(), log: Vec::new() }
     }
 
-    fn gain(&self, vertex: usize) -> i64 {
-        self.graph.weight(vertex) - self.beyond[vertex]
+    fn weight(&self, vertex: u32) -> i64 {
+        i64::from(self.graph.weight(vertex))
     }
 
-    fn offer(&mut self, vertex: usize) {
+    fn gain(&self, vertex: u32) -> i64 {
+        self.weight(vertex) - self.beyond[vertex as usize]
+    }
+
+    fn offer(&mut self, vertex: u32) {
         self.queue.push((self.gain(vertex), Reverse(vertex)));
     }
 
     /// Adds a vertex of the separator to the queue.
-    fn enter(&mut self, vertex: usize) {
+    fn enter(&mut self, vertex: u32) {
         let other = 1 - self.side;
-        let beyond = self.graph.neighbors(vertex).iter().filter(|&&next| self.separator.label[next] == other);
-        self.beyond[vertex] = beyond.map(|&next| self.graph.weight(next)).sum();
+        let beyond = self.graph.neighbors(vertex).iter().filter(|&&next| self.separator.label[next as usize] == other);
+        self.beyond[vertex as usize] = beyond.map(|&next| self.weight(next)).sum();
         self.offer(vertex);
     }
 
     /// The vertex with which the separator loses most.
-    fn best(&mut self) -> Option<usize> {
+    fn best(&mut self) -> Option<u32> {
         while let Some((gain, Reverse(vertex))) = self.queue.pop() {
-            if self.separator.label[vertex] == BETWEEN && self.gain(vertex) == gain {
+            if self.separator.label[vertex as usize] == BETWEEN && self.gain(vertex) == gain {
                 return Some(vertex);
             }
         }
         None
     }
 
-    fn relabel(&mut self, vertex: usize, to: usize) -> usize {
-        let from = std::mem::replace(&mut self.separator.label[vertex], to);
-        self.separator.weights[from] -= self.graph.weight(vertex);
-        self.separator.weights[to] += self.graph.weight(vertex);
-        from
+    fn relabel(&mut self, vertex: u32, to: u8) {
+        let from = std::mem::replace(&mut self.separator.label[vertex as usize], to);
+        let weight = self.weight(vertex);
+        self.separator.weights[usize::from(from)] -= weight;
+        self.separator.weights[usize::from(to)] += weight;
     }
 
     /// Moves a vertex from the separator to the side; its neighbors on the other side take its place.
-    fn shift(&mut self, vertex: usize) {
+    fn shift(&mut self, vertex: u32) {
         let (graph, other) = (self.graph, 1 - self.side);
         self.relabel(vertex, self.side);
         self.log.push((vertex, BETWEEN));
         for &neighbor in graph.neighbors(vertex) {
-            if self.separator.label[neighbor] != other {
+            if self.separator.label[neighbor as usize] != other {
                 continue;
             }
             self.relabel(neighbor, BETWEEN);
             self.log.push((neighbor, other));
             for &next in graph.neighbors(neighbor) {
-                if self.separator.label[next] == BETWEEN {
-                    self.beyond[next] -= graph.weight(neighbor);
+                if self.separator.label[next as usize] == BETWEEN {
+                    self.beyond[next as usize] -= self.weight(neighbor);
                     self.offer(next);
                 }
             }
@@ -131,12 +140,12 @@ impl<'g> Mover<'g> {
     /// One pass of Fiduccia and Mattheyses (19th Design Automation Conference, 1982) toward a side: the best moves one
     /// after the other, also where they make the separator heavier for a while; what is kept is the best separator met.
     /// Whether that is better than the one before.
-    fn pass(&mut self, side: usize) -> bool {
+    fn pass(&mut self, side: u8) -> bool {
         self.side = side;
         self.log.clear();
         self.queue.clear();
-        for vertex in 0..self.graph.size() {
-            if self.separator.label[vertex] == BETWEEN {
+        for vertex in 0..number(self.graph.size()) {
+            if self.separator.label[vertex as usize] == BETWEEN {
                 self.enter(vertex);
             }
         }
@@ -145,7 +154,8 @@ impl<'g> Mover<'g> {
         while idle < PATIENCE {
             let Some(vertex) = self.best() else { break };
             let weights = self.separator.weights;
-            if weights[side] + self.graph.weight(vertex) > limit && weights[side] >= weights[1 - side] {
+            let [here, there] = [side, 1 - side].map(|side| weights[usize::from(side)]);
+            if here + self.weight(vertex) > limit && here >= there {
                 break;
             }
             self.shift(vertex);
@@ -166,7 +176,7 @@ impl<'g> Mover<'g> {
 /// neither helps. A slanted separator becomes straight by moving to one side and back; a pass that went both ways at
 /// once would only move vertices to and fro.
 pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
-    let mut side = usize::from(separator.weights[1] < separator.weights[0]);
+    let mut side = u8::from(separator.weights[1] < separator.weights[0]);
     let mut mover = Mover::new(graph, separator);
     let mut idle = 0;
     for _ in 0..PASSES {
@@ -181,9 +191,9 @@ pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
 
 /// Grows side 0 from a vertex, always by the vertex that makes its boundary lightest, until it weighs as much as the
 /// rest.
-pub(super) fn grow(graph: &Graph, seed: usize) -> Separator {
+pub(super) fn grow(graph: &Graph, seed: u32) -> Separator {
     let mut label = vec![1; graph.size()];
-    label[seed] = BETWEEN;
+    label[seed as usize] = BETWEEN;
     let mut mover = Mover::new(graph, Separator::new(graph, label));
     mover.enter(seed);
     while mover.separator.weights[0] < mover.separator.weights[1] {

@@ -1,0 +1,155 @@
+//! Undirected graphs with weights, and parts of them.
+
+use faer::sparse::SymbolicSparseColMatRef;
+
+/// No vertex: a graph has fewer.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// The number of a vertex, or of an edge. (Whoever makes a graph checks that it is not too large.)
+pub(super) fn number(index: usize) -> u32 {
+    u32::try_from(index).unwrap_or(NONE)
+}
+
+/// An undirected graph without loops, in compressed columns; every edge is stored at both ends.
+#[derive(Clone, Debug)]
+pub(super) struct Graph {
+    starts: Vec<u32>,
+    neighbors: Vec<u32>,
+    /// For each neighbor the weight of the edge to it.
+    edges: Vec<u32>,
+    /// For each vertex, the number of dofs it stands for.
+    weights: Vec<u32>,
+}
+
+impl Graph {
+    /// A graph without vertices, with room for some.
+    pub(super) fn with_capacity(vertices: usize, entries: usize) -> Self {
+        let mut starts = Vec::with_capacity(vertices + 1);
+        starts.push(0);
+        let (neighbors, edges) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
+        Self { starts, neighbors, edges, weights: Vec::with_capacity(vertices) }
+    }
+
+    /// Adds an edge of the vertex that the next [`close`](Self::close) adds, and returns its place.
+    #[inline]
+    pub(super) fn push(&mut self, neighbor: u32, edges: u32) -> u32 {
+        self.neighbors.push(neighbor);
+        self.edges.push(edges);
+        number(self.neighbors.len() - 1)
+    }
+
+    /// Makes the edge at a place heavier.
+    #[inline]
+    pub(super) fn thicken(&mut self, place: u32, edges: u32) {
+        let edge = &mut self.edges[place as usize];
+        *edge = edge.saturating_add(edges);
+    }
+
+    /// Adds a vertex with the edges pushed since the last one.
+    pub(super) fn close(&mut self, weight: u32) {
+        self.starts.push(number(self.neighbors.len()));
+        self.weights.push(weight);
+    }
+
+    /// Makes every edge as heavy as the number of neighbors that its ends have in common: pairs along heavy edges are
+    /// compact. Graphs so dense that this would take long are left as they are.
+    pub(super) fn weigh_edges(&mut self) {
+        let work: usize = (0..self.size()).map(|vertex| self.neighbors(number(vertex)).len().pow(2)).sum();
+        if work > 100 * self.entries() {
+            return;
+        }
+        let mut near = vec![NONE; self.size()];
+        for vertex in 0..number(self.size()) {
+            let range = self.range(vertex);
+            self.neighbors[range.clone()].iter().for_each(|&neighbor| near[neighbor as usize] = vertex);
+            for at in range {
+                let next = self.range(self.neighbors[at]);
+                let common = self.neighbors[next].iter().map(|&next| u32::from(near[next as usize] == vertex));
+                self.edges[at] = 1 + common.sum::<u32>();
+            }
+        }
+    }
+
+    pub(super) fn size(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Number of edges, each counted at both ends.
+    pub(super) fn entries(&self) -> usize {
+        self.neighbors.len()
+    }
+
+    #[inline]
+    pub(super) fn weight(&self, vertex: u32) -> u32 {
+        self.weights[vertex as usize]
+    }
+
+    pub(super) fn total(&self) -> i64 {
+        self.weights.iter().copied().map(i64::from).sum()
+    }
+
+    #[inline]
+    fn range(&self, vertex: u32) -> std::ops::Range<usize> {
+        self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize
+    }
+
+    #[inline]
+    pub(super) fn neighbors(&self, vertex: u32) -> &[u32] {
+        &self.neighbors[self.range(vertex)]
+    }
+
+    /// Neighbors with the weights of the edges to them.
+    #[inline]
+    pub(super) fn edges(&self, vertex: u32) -> impl Iterator<Item = (u32, u32)> {
+        let range = self.range(vertex);
+        self.neighbors[range.clone()].iter().copied().zip(self.edges[range].iter().copied())
+    }
+
+    pub(super) fn pattern(&self) -> SymbolicSparseColMatRef<'_, u32> {
+        SymbolicSparseColMatRef::new_unsorted_checked(self.size(), self.size(), &self.starts, None, &self.neighbors)
+    }
+
+    /// The graph of some of the vertices; `local` has room for all of them, with [`NONE`] everywhere, and is left so.
+    pub(super) fn part(&self, vertices: &[u32], local: &mut [u32]) -> Self {
+        let entries = vertices.iter().map(|&vertex| self.neighbors(vertex).len()).sum();
+        let mut part = Self::with_capacity(vertices.len(), entries);
+        for (place, &vertex) in vertices.iter().enumerate() {
+            local[vertex as usize] = number(place);
+        }
+        for &vertex in vertices {
+            for (neighbor, edges) in self.edges(vertex) {
+                if local[neighbor as usize] != NONE {
+                    part.push(local[neighbor as usize], edges);
+                }
+            }
+            part.close(self.weight(vertex));
+        }
+        for &vertex in vertices {
+            local[vertex as usize] = NONE;
+        }
+        part
+    }
+
+    /// The connected parts, each as a list of its vertices.
+    pub(super) fn components(&self) -> Vec<Vec<u32>> {
+        let mut components = Vec::new();
+        let mut reached = vec![false; self.size()];
+        for start in 0..self.size() {
+            if reached[start] {
+                continue;
+            }
+            reached[start] = true;
+            let (mut component, mut next) = (vec![number(start)], 0);
+            while let Some(&vertex) = component.get(next) {
+                next += 1;
+                for &neighbor in self.neighbors(vertex) {
+                    if !std::mem::replace(&mut reached[neighbor as usize], true) {
+                        component.push(neighbor);
+                    }
+                }
+            }
+            components.push(component);
+        }
+        components
+    }
+}
