@@ -8,5 +8,6 @@ pub(crate) mod conjugate_gradients;
 pub(crate) mod forest;
 pub(crate) mod lu;
 pub(crate) mod product;
+pub(crate) mod side_by_side;
 pub(crate) mod sweep;
 pub(crate) mod vector;

@@ -10,6 +10,7 @@ use crate::kernels::cholesky::{self, Columns, Factorization, Simplicial, Superno
 use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
 use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
+use crate::kernels::side_by_side::{self, LANES, SideVectors};
 use crate::kernels::vector::{self, Accumulate};
 use crate::kernels::{block_sweep, product, sweep};
 use crate::scalar::Scalar;
@@ -138,6 +139,12 @@ pub trait Kernels: Sized {
         b: &mut [Self],
         vectors: Vectors<'_, Self>,
     ) -> Outcome;
+    /// Solves for several right-hand sides with a scaled matrix, given below its diagonal entry by entry.
+    fn conjugate_gradients_side_by_side(
+        lower: &Blocks<'_, Self>,
+        ends: (f64, usize),
+        vectors: SideVectors<'_, Self>,
+    ) -> [Outcome; LANES];
     /// Scratch for factorizing and for solving `columns` right-hand sides.
     fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize, par: Par) -> StackReq;
     /// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
@@ -294,6 +301,13 @@ macro_rules! kernels {
                     2 => conjugate_gradients::solve::<$scalar, 2>(iteration, b, vectors),
                     _ => conjugate_gradients::solve::<$scalar, 1>(iteration, b, vectors),
                 }
+            }
+            fn conjugate_gradients_side_by_side(
+                lower: &Blocks<'_, Self>,
+                ends: (f64, usize),
+                vectors: SideVectors<'_, Self>,
+            ) -> [Outcome; LANES] {
+                side_by_side::solve(lower, ends, vectors)
             }
             fn cholesky_scratch(
                 kind: Factorization,
