@@ -10,6 +10,7 @@ pub(crate) mod forest;
 pub(crate) mod lu;
 pub(crate) mod plan;
 pub(crate) mod product;
+pub(crate) mod side_by_side;
 pub(crate) mod supernodal;
 pub(crate) mod sweep;
 pub(crate) mod vector;

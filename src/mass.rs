@@ -4,7 +4,10 @@
 mod assembly;
 mod bipenalty;
 mod blend;
+mod consistent;
 mod courant;
+mod inverse;
+mod layers;
 mod lump;
 mod reciprocal;
 mod redistribute;
@@ -13,7 +16,9 @@ mod singular;
 pub use bipenalty::bipenalty;
 pub(crate) use blend::dispersion_weight;
 pub use blend::{blend, optimal_weight};
+pub(crate) use consistent::ConsistentInverse;
 pub use courant::courant;
+pub(crate) use inverse::InverseMass;
 pub use lump::{lump, lump_diagonal};
 pub use reciprocal::reciprocal;
 pub use redistribute::{Redistribution, affine_motions, redistribute, redistribute_consistent};
@@ -21,7 +26,6 @@ pub use singular::{mixed, singular};
 
 use crate::error::{Error, Result};
 use crate::kernels::vector::Accumulate;
-use crate::linear_solver::{Automatic, Factorization, LinearSolver};
 use crate::real::Real;
 use crate::sparse;
 use faer::sparse::SparseColMatRef;
@@ -80,61 +84,4 @@ pub(crate) fn massless<T: Real>(mass: Mass<'_, T>, prescribed: &[usize]) -> Vec<
         Mass::Consistent(mass) => mass.ncols(),
     };
     (0..dofs).filter(|dof| prescribed.binary_search(dof).is_err() && is_massless(*dof)).collect()
-}
-
-/// M⁻¹ on the free dofs that have a mass: the others have no response, their rows and columns are left out of M.
-#[derive(Debug)]
-pub(crate) enum InverseMass<T> {
-    /// 1/m, zero on dofs without response.
-    Lumped(Vec<T>),
-    /// A factor of M with identity on the dofs without response, and these.
-    Consistent { factor: Box<dyn Factorization<T>>, fixed: Vec<usize> },
-}
-
-impl<T: Real> InverseMass<T> {
-    pub(crate) fn new(mass: Mass<'_, T>, prescribed: &[usize]) -> Result<Self> {
-        match mass {
-            Mass::Lumped(mass) => {
-                let mut inverse = Vec::with_capacity(mass.len());
-                for (dof, &m) in mass.iter().enumerate() {
-                    let free = prescribed.binary_search(&dof).is_err();
-                    if free && !(m >= T::zero() && m.is_finite()) {
-                        return Err(Error::Mass { dof, value: m.value() });
-                    }
-                    inverse.push(if free && m > T::zero() { m.recip() } else { T::zero() });
-                }
-                Ok(Self::Lumped(inverse))
-            }
-            Mass::Consistent(mass) => {
-                let mut fixed = massless(Mass::Consistent(mass), prescribed);
-                fixed.extend_from_slice(prescribed);
-                fixed.sort_unstable();
-                let reduced = sparse::Combination::new(mass.ncols(), &fixed, &[mass.symbolic()])?;
-                let mut values = vec![T::zero(); reduced.len()];
-                reduced.fill(&[(T::one(), mass.val())], None, &mut values);
-                let mut factor = Automatic.analyze(reduced.pattern(), &[])?;
-                factor.factorize(reduced.view(&values)).map_err(|error| match error {
-                    Error::Singular { dof, .. } => Error::Singular { matrix: "mass matrix", dof },
-                    other => other,
-                })?;
-                Ok(Self::Consistent { factor, fixed })
-            }
-        }
-    }
-
-    /// `x ← M⁻¹ x`, zero on dofs without response.
-    pub(crate) fn apply(&mut self, x: &mut [T]) {
-        match self {
-            Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
-            Self::Consistent { factor, fixed } => {
-                for &dof in fixed.iter() {
-                    x[dof] = T::zero();
-                }
-                if factor.solve(x).is_err() {
-                    // Direct solvers do not fail. If one ever does, NaN keeps the response from being used.
-                    x.fill(T::nan());
-                }
-            }
-        }
-    }
 }

@@ -11,6 +11,7 @@ use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vect
 use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
 use crate::kernels::product::{self, LowerColumns, Tridiagonal};
+use crate::kernels::side_by_side::{self, LANES, SideVectors};
 use crate::kernels::vector::{self, Accumulate};
 use crate::kernels::{block_sweep, supernodal, sweep};
 use crate::scalar::Scalar;
@@ -150,6 +151,12 @@ pub trait Kernels: Sized {
     ) -> Outcome;
     /// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
     fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq;
+    /// Solves for several right-hand sides with a scaled matrix, given below its diagonal entry by entry.
+    fn conjugate_gradients_side_by_side(
+        lower: &Blocks<'_, Self>,
+        ends: (f64, usize),
+        vectors: SideVectors<'_, Self>,
+    ) -> [Outcome; LANES];
     /// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
     fn lu(
         symbolic: &SymbolicLu<usize>,
@@ -324,6 +331,13 @@ macro_rules! kernels {
             }
             fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
                 cholesky::scratch::<$scalar>(kind, symbolic, columns)
+            }
+            fn conjugate_gradients_side_by_side(
+                lower: &Blocks<'_, Self>,
+                ends: (f64, usize),
+                vectors: SideVectors<'_, Self>,
+            ) -> [Outcome; LANES] {
+                side_by_side::solve(lower, ends, vectors)
             }
             fn lu(
                 symbolic: &SymbolicLu<usize>,

@@ -25,6 +25,7 @@ fn steps_do_not_allocate() {
     bars();
     explicit_massless();
     correctors();
+    consistent_masses();
     solids();
     large_motion();
     bodies_apart();
@@ -265,6 +266,24 @@ fn correctors() {
             assert_steps_allocate_nothing(&mut run, 400, 2, &format!("{name}, {mass:?}"));
         }
     }
+}
+
+/// A block with a consistent mass that bounces: once all contacts have pressed nothing is allocated.
+fn consistent_masses() {
+    let solid = Solid::block([1.0; 3], [5; 3], Material { young: 1e3, poisson: 0.3, density: 1.0 });
+    let mass = solid.lumped_mass::<f64>();
+    let system = LinearSystem::new(solid.consistent_mass(), solid.stiffness()).unwrap().load(move |_, f| {
+        f.iter_mut().zip(&mass).skip(2).step_by(3).for_each(|(f, m)| *f = -10.0 * m);
+    });
+    let bottom = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0);
+    let mut run = Simulation::builder(system, Composite, 5e-3)
+        .constraint(bottom.fold(LinearRows::new(), |rows, node| rows.unilateral(&[(3 * node + 2, 1.0)], 0.05)))
+        .build()
+        .unwrap();
+    for _ in 0..60 {
+        run.step().unwrap();
+    }
+    assert_steps_allocate_nothing(&mut run, 300, 72, "a consistent mass");
 }
 
 /// Two blocks, each with a factor of its own, one of them with a fixed dof amid its others.

@@ -146,17 +146,17 @@ pub(super) fn adds_no_velocity(tableau: &Tableau) -> std::result::Result<(), &'s
 fn act_implicitly<T: Real>(step: &mut Correction<'_, T>) -> Result<()> {
     let rows = std::mem::take(&mut step.buffers.closed);
     let mut impulses = std::mem::take(&mut step.buffers.impulses);
-    step.projection.prepare(step.g, &rows);
     let [u, v, a] = step.response();
     impulses.clear();
-    for &row in &rows {
-        let lambda = step.contacts.lambda_raw[row];
-        step.projection.push(step.g, row, -T::of(a) * lambda, &mut step.new.a);
+    impulses.extend(rows.iter().map(|&row| step.contacts.lambda_raw[row]));
+    let mut result = step.projection.push(step.g, (&rows, &impulses), -T::of(a), &mut step.new.a);
+    for (&row, impulse) in rows.iter().zip(&mut impulses) {
+        let lambda = *impulse;
         step.book_impulse(row, -(T::of(step.momentum_weights()[2] * a) * lambda));
         step.report_force(row, T::of(2.0 * u) * lambda);
-        impulses.push(T::of(step.h * (2.0 * u - v)) * lambda);
+        *impulse = T::of(step.h * (2.0 * u - v)) * lambda;
     }
-    let result = step.apply_impulses(&rows, &impulses);
+    result = result.and_then(|()| step.apply_impulses(&rows, &impulses));
     step.buffers.closed = rows;
     step.buffers.impulses = impulses;
     result

@@ -270,13 +270,12 @@ impl<T: Real> Correction<'_, T> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
         }
-        self.projection.prepare(self.g, rows);
         let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
         let Buffers { jump, rates, change, damping, before, .. } = &mut **buffers;
         jump.clear();
         jump.extend(rows.iter().map(|&row| g.product(row, &new.v)));
+        projection.push(g, (rows, impulses), T::one(), &mut new.v)?;
         for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
-            projection.push(g, row, impulse, &mut new.v);
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
         // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
@@ -296,9 +295,7 @@ impl<T: Real> Correction<'_, T> {
         }
         if !change.is_empty() {
             change.fill(T::zero());
-            for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
-                projection.push(g, row, impulse, change);
-            }
+            projection.push(g, (rows, impulses), T::one(), change)?;
             // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
             let linearity = system.0.linearity();
             let Some(force) = system.0.damping_force() else { return Ok(()) };
@@ -324,7 +321,7 @@ impl<T: Real> Correction<'_, T> {
         let change = &mut buffers.damping;
         if !scheme.read.iter().any(|[.., a]| *a) {
             // No step starts from a.
-            projection.apply_inverse(change);
+            projection.apply_inverse(change)?;
             T::axpy(-T::one(), change, &mut new.a);
             return Ok(());
         }
@@ -360,44 +357,57 @@ impl<T: Real> Correction<'_, T> {
 
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
-    pub fn push_acceleration(&mut self) {
+    ///
+    /// # Errors
+    ///
+    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    pub fn push_acceleration(&mut self) -> Result<()> {
         if self.rubs() {
             return self.push_rubbing_acceleration();
         }
         let rows = std::mem::take(&mut self.buffers.engaged);
         let forces = std::mem::take(&mut self.buffers.forces);
-        self.push_forces(&rows, &forces);
+        let result = self.push_forces(&rows, &forces);
         (self.buffers.engaged, self.buffers.forces) = (rows, forces);
+        result
     }
 
     /// Adds forces that remove jumps to a, to the reported forces and to the impulses.
-    fn push_forces(&mut self, rows: &[usize], forces: &[T]) {
+    fn push_forces(&mut self, rows: &[usize], forces: &[T]) -> Result<()> {
         let Self { contacts, projection, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
-        projection.prepare(g, rows);
+        projection.push(g, (rows, forces), T::one(), &mut new.a)?;
         for (&row, &force) in rows.iter().zip(forces) {
-            projection.push(g, row, force, &mut new.a);
             contacts.lambda[row] += share * force;
             contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;
             contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
         }
+        Ok(())
     }
 
     /// Applies forces to a along rows, a ← a + M⁻¹ Gᵀ forces, and books their impulses. Reported forces are left as
     /// they are ([`report_force`](Self::report_force), [`force_share`](Self::force_share)).
-    pub fn apply_forces(&mut self, rows: &[usize], forces: &[T]) {
-        self.projection.prepare(self.g, rows);
+    ///
+    /// # Errors
+    ///
+    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    pub fn apply_forces(&mut self, rows: &[usize], forces: &[T]) -> Result<()> {
         let weight = T::of(self.momentum_weights()[2]);
+        self.projection.push(self.g, (rows, forces), T::one(), &mut self.new.a)?;
         for (&row, &force) in rows.iter().zip(forces) {
-            self.projection.push(self.g, row, force, &mut self.new.a);
             self.contacts.impulse[row] += weight * force;
         }
+        Ok(())
     }
 
     /// Writes S = G M⁻¹ Gᵀ of some rows, entry (i, j) at i + j n for n rows: the change of the gap rate of the i-th by
     /// a unit impulse along the j-th.
-    pub fn compliances(&mut self, rows: &[usize], s: &mut Vec<T>) {
-        self.projection.assemble(self.g, rows, s);
+    ///
+    /// # Errors
+    ///
+    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    pub fn compliances(&mut self, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
+        self.projection.assemble(self.g, rows, s)
     }
 
     /// Gaps of all rows where the stage starts; empty if nothing is known of the past.
@@ -413,12 +423,16 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// S of one row: the change of its gap rate by a unit impulse along it.
-    pub fn compliance(&mut self, row: usize) -> T {
+    ///
+    /// # Errors
+    ///
+    /// As [`compliances`](Self::compliances).
+    pub fn compliance(&mut self, row: usize) -> Result<T> {
         let mut s = std::mem::take(&mut self.buffers.s);
-        self.projection.assemble(self.g, &[row], &mut s);
+        let result = self.projection.assemble(self.g, &[row], &mut s);
         let compliance = s.first().copied().unwrap_or(T::zero());
         self.buffers.s = s;
-        compliance
+        result.map(|()| compliance)
     }
 
     /// The rate of the gap of a row.
@@ -431,10 +445,16 @@ impl<T: Real> Correction<'_, T> {
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
     }
 
+    /// Chooses the rows whose jumps the projection removes.
+    fn close(&mut self, rows: &[usize]) -> Result<()> {
+        let (t, ids) = (self.t, &self.contacts.ids);
+        self.projection.close_rows(self.g, rows, |row| no_response(t, ids[row]))
+    }
+
     /// Solves S x + jump for the multipliers x of `rows` of their sets.
     fn solve(&mut self, rows: &[usize], sets: &[AdmissibleSet], x: &mut [T]) -> Result<()> {
         if sets.iter().all(|&set| set == AdmissibleSet::Free) {
-            self.projection.close_rows(self.g, rows).map_err(|row| self.no_response(row))?;
+            self.close(rows)?;
             for (x, &jump) in x.iter_mut().zip(&self.buffers.jump) {
                 *x = -jump;
             }
@@ -445,9 +465,5 @@ impl<T: Real> Correction<'_, T> {
         let jumps = Jumps { rows, sets, jump, tolerance };
         let ids = &self.contacts.ids;
         group.solve((self.g, &mut *self.projection), &mut *self.solver, jumps, x, (self.t, |row| ids[row]))
-    }
-
-    fn no_response(&self, row: usize) -> Error {
-        no_response(self.t, self.contacts.ids[row])
     }
 }

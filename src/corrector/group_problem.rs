@@ -61,7 +61,7 @@ impl<T: Real> GroupProblem<T> {
                 tolerance.push(jumps.tolerance[position]);
                 multipliers.push(x[position]);
             }
-            projection.assemble(g, rows, s);
+            projection.assemble(g, rows, s)?;
             let problem = ContactProblem::of(s, offset, sets, tolerance, 0);
             solver.solve(&problem, multipliers).map_err(|failure| contact_error(t, failure, |row| id(rows[row])))?;
             for (&position, &multiplier) in projection.groups().group(group).iter().zip(multipliers.iter()) {

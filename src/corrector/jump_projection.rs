@@ -5,7 +5,7 @@ use crate::contact_solver::FORESEEN;
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
-use crate::mass::{InverseMass, Mass};
+use crate::mass::{ConsistentInverse, InverseMass, Mass};
 use crate::memory;
 use crate::real::Real;
 use crate::sparse;
@@ -14,8 +14,8 @@ use crate::sparse;
 ///
 /// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the mass
 /// norm: momentum is conserved (rows of G that sum to zero), kinetic energy falls by `½ jumpᵀ S⁻¹ jump`, never rises.
-/// For a lumped mass everything is local to the contact nodes; for a consistent one a factor of M is kept and every dof
-/// changes. Rows that share nodes or dofs are projected together. Prescribed dofs are not moved.
+/// For a lumped mass everything is local to the contact nodes; for a consistent one all dofs around them change, found by
+/// conjugate gradients on M (by a factor, if M is a chain or badly conditioned). Rows that share nodes or dofs are projected together. Prescribed dofs are not moved.
 ///
 /// The correction of Zhang et al. (Eng. Mech. 40 (Suppl.), 2023, eqs. (12), (13), in the form derived in
 /// `docs/theory.md`), in a loop of one's own, after the contact problem of a step gave u, v, a and the raw multiplier
@@ -49,11 +49,13 @@ use crate::sparse;
 pub struct JumpProjection<T: Real> {
     inverse: InverseMass<T>,
     dofs: usize,
-    /// For each row the column of M⁻¹ Gᵀ, made when it is first closed; consistent masses only.
+    /// For each row its column of M⁻¹ Gᵀ, made when it is first closed; consistent masses only.
     slots: Vec<usize>,
-    columns: Vec<Vec<T>>,
+    columns: Vec<Column<T>>,
     /// Number of columns that belong to the present G.
     computed: usize,
+    /// Rows whose columns are being made.
+    missing: Vec<usize>,
     closed: Vec<usize>,
     /// The closed rows by the dofs that they share. S couples no two groups.
     groups: Groups,
@@ -66,8 +68,28 @@ pub struct JumpProjection<T: Real> {
     factored: bool,
 }
 
+/// A column of M⁻¹ Gᵀ in the order of the places of M⁻¹.
+#[derive(Debug)]
+struct Column<T> {
+    values: Vec<T>,
+    extent: Extent,
+}
+
+/// How far a column goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Extent {
+    /// The places near contact, which S is made of.
+    Near,
+    /// All that respond.
+    All,
+}
+
 /// A row without a column.
 const NONE: usize = usize::MAX;
+
+/// Up to so many rows are pushed along their columns, more of them by a solve for all at once: columns of hundreds of
+/// rows would take as much memory as a factor of M. So many columns of all places are kept.
+const FEW: usize = FORESEEN;
 
 impl<T: Real> JumpProjection<T> {
     /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those
@@ -77,8 +99,8 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// [`Error::Mass`](crate::Error::Mass) or [`Error::Singular`](crate::Error::Singular) if M is negative or
     /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::MissingDof`] and
-    /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`] for a matrix
-    /// that is not square.
+    /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`],
+    /// [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] for a matrix that is not square, finite or symmetric.
     pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
@@ -94,14 +116,14 @@ impl<T: Real> JumpProjection<T> {
                 false => Error::Incompatible { part: what.into(), reason: "it is not ascending" },
             });
         }
-        Self::with(InverseMass::new(mass, prescribed)?, dofs, rows)
+        Self::with(InverseMass::new(mass, prescribed, &[])?, dofs, rows)
     }
 
     pub(crate) fn with(inverse: InverseMass<T>, dofs: usize, rows: usize) -> Result<Self> {
         memory::reserve::<usize>(rows, 8, "a jump projection")?;
         let (stored, keys) = match inverse {
             InverseMass::Lumped(_) => (0, if rows > 0 { dofs } else { 0 }),
-            InverseMass::Consistent { .. } => (rows, 0),
+            InverseMass::Consistent(_) => (rows, 0),
         };
         // (Columns of small scenes take little memory, and have it at once.)
         let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
@@ -109,8 +131,9 @@ impl<T: Real> JumpProjection<T> {
             inverse,
             dofs,
             slots: vec![NONE; stored],
-            columns: (0..foreseen).map(|_| vec![T::zero(); dofs]).collect(),
+            columns: (0..foreseen).map(|_| Column { values: Vec::with_capacity(dofs), extent: Extent::Near }).collect(),
             computed: 0,
+            missing: Vec::with_capacity(stored),
             closed: Vec::with_capacity(rows),
             groups: Groups::with_capacity(rows, keys),
             roots: Vec::with_capacity(rows),
@@ -134,11 +157,12 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// [`Error::Incompatible`] for a row that G does not have, or with a consistent mass one beyond those announced;
     /// [`Error::MissingDof`] for a dof of G that the mass does not have; [`Error::ContactNotFinite`] for a row whose S
-    /// is not a number (`feature` is the row of G).
+    /// is not a number (`feature` is the row of G). Of a consistent mass [`Error::LinearNotConverged`] and
+    /// [`Error::Singular`], if a solve with M fails.
     pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.check_rows(g, rows)?;
         let contact = |feature| ContactId { constraint: 0, feature, candidate: 0 };
-        self.close_rows(g, rows).map_err(|row| no_response(0.0, contact(row)))
+        self.close_rows(g, rows, |row| no_response(0.0, contact(row)))
     }
 
     fn check_rows(&self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
@@ -146,7 +170,7 @@ impl<T: Real> JumpProjection<T> {
         // Of a consistent mass columns of M⁻¹Gᵀ are stored, one for each row announced.
         let stored = match self.inverse {
             InverseMass::Lumped(_) => usize::MAX,
-            InverseMass::Consistent { .. } => self.slots.len(),
+            InverseMass::Consistent(_) => self.slots.len(),
         };
         for &row in rows {
             if row >= g.rows() {
@@ -162,15 +186,21 @@ impl<T: Real> JumpProjection<T> {
         Ok(())
     }
 
-    /// [`close`](Self::close) with rows that are known to be sound; `Err` is the row whose S is not a number.
-    pub(crate) fn close_rows(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> std::result::Result<(), usize> {
+    /// [`close`](Self::close) with rows that are known to be sound; `refuse` makes the error of a row whose S is not a
+    /// number.
+    pub(crate) fn close_rows(
+        &mut self,
+        g: &ContactJacobian<T>,
+        rows: &[usize],
+        refuse: impl Fn(usize) -> Error,
+    ) -> Result<()> {
         if self.factored && self.closed == rows {
             return Ok(());
         }
         self.factored = false;
         self.closed.clear();
         self.closed.extend_from_slice(rows);
-        self.prepare(g, rows);
+        self.prepare(g, rows)?;
         self.sort(g, rows);
         let mut roots = std::mem::take(&mut self.roots);
         let mut factors = std::mem::take(&mut self.factors);
@@ -187,7 +217,7 @@ impl<T: Real> JumpProjection<T> {
             if used == factors.len() {
                 factors.push(DenseCholesky::default());
             }
-            result = result.and(factors[used].factorize(own.len(), entry).map_err(|i| rows[own[i]]));
+            result = result.and(factors[used].factorize(own.len(), entry).map_err(|i| refuse(rows[own[i]])));
             used += 1;
         }
         (self.roots, self.factors) = (roots, factors);
@@ -204,7 +234,8 @@ impl<T: Real> JumpProjection<T> {
     /// # Errors
     ///
     /// [`Error::Dimension`] unless x has one entry a dof, and target and multipliers one a closed row; those of
-    /// [`close`](Self::close) for a G that the closed rows do not fit. Nothing is changed then.
+    /// [`close`](Self::close) for a G that the closed rows do not fit, and for a solve with M that fails. x is not
+    /// changed then.
     pub fn remove_jump(
         &mut self,
         g: &ContactJacobian<T>,
@@ -227,10 +258,10 @@ impl<T: Real> JumpProjection<T> {
             *multiplier = g.product(row, x) - target;
         }
         self.solve(multipliers);
-        for (&row, &multiplier) in self.closed.iter().zip(multipliers.iter()) {
-            self.push(g, row, -multiplier, x);
-        }
-        Ok(())
+        let rows = std::mem::take(&mut self.closed);
+        let result = self.push(g, (&rows, multipliers), -T::one(), x);
+        self.closed = rows;
+        result
     }
 
     /// Number of degrees of freedom.
@@ -270,7 +301,7 @@ impl<T: Real> JumpProjection<T> {
                 };
                 self.groups.sort(rows, self.dofs, |row| g.is_tangential(row), acts_on);
             }
-            InverseMass::Consistent { .. } => self.groups.together(rows.len()),
+            InverseMass::Consistent(_) => self.groups.together(rows.len()),
         }
         self.factored = false;
     }
@@ -280,54 +311,98 @@ impl<T: Real> JumpProjection<T> {
         &self.groups
     }
 
-    /// `x += c M⁻¹ G_rowᵀ`; the row must have been closed or prepared.
-    pub(crate) fn push(&self, g: &ContactJacobian<T>, row: usize, c: T, x: &mut [T]) {
-        match &self.inverse {
-            InverseMass::Lumped(inverse) => {
+    /// `x += c Σ m_k M⁻¹ G_kᵀ` of rows k and their multipliers.
+    pub(crate) fn push(
+        &mut self,
+        g: &ContactJacobian<T>,
+        (rows, multipliers): (&[usize], &[T]),
+        c: T,
+        x: &mut [T],
+    ) -> Result<()> {
+        let pushes = rows.iter().zip(multipliers).map(|(&row, &multiplier)| (row, c * multiplier));
+        if let InverseMass::Lumped(inverse) = &self.inverse {
+            for (row, c) in pushes {
                 for (dof, weight) in g.row(row) {
                     x[dof] += c * weight * inverse[dof];
                 }
             }
-            InverseMass::Consistent { .. } => {
-                T::axpy(c, &self.columns[self.slots[row]], x);
-            }
+            return Ok(());
         }
+        if multipliers.iter().all(|&multiplier| multiplier == T::zero()) {
+            return Ok(());
+        }
+        let is_few = rows.len() <= FEW;
+        if is_few {
+            self.make_columns(g, rows, Extent::All)?;
+        }
+        let Self { inverse, columns, slots, .. } = self;
+        let InverseMass::Consistent(inverse) = inverse else { return Ok(()) };
+        if is_few {
+            inverse.combine(pushes.map(|(row, c)| (c, &columns[slots[row]].values[..])), x);
+            return Ok(());
+        }
+        let forces = pushes.flat_map(|(row, c)| g.row(row).map(move |(dof, weight)| (dof, c * weight)));
+        inverse.add_response(forces, x)
     }
 
     /// `x ← M⁻¹ x`.
-    pub(crate) fn apply_inverse(&mut self, x: &mut [T]) {
-        self.inverse.apply(x);
+    pub(crate) fn apply_inverse(&mut self, x: &mut [T]) -> Result<()> {
+        self.inverse.apply(x)
     }
 
     /// S of `rows`, dense and column-major.
-    pub(crate) fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], s: &mut Vec<T>) {
-        self.prepare(g, rows);
+    pub(crate) fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
+        self.prepare(g, rows)?;
         s.clear();
         for &j in rows {
             s.extend(rows.iter().map(|&i| self.entry(g, i, j)));
         }
+        Ok(())
     }
 
-    /// Makes the rows known to [`push`](Self::push).
-    pub(crate) fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
-        let Self { inverse, slots, columns, computed, dofs, .. } = self;
-        if let InverseMass::Consistent { .. } = inverse {
-            let count = rows.iter().max().map_or(0, |last| last + 1);
-            slots.resize(count.max(slots.len()), NONE);
-            for &row in rows {
-                if slots[row] == NONE {
-                    if columns.len() == *computed {
-                        columns.push(vec![T::zero(); *dofs]);
-                    }
-                    let column = &mut columns[*computed];
-                    column.fill(T::zero());
-                    g.scatter(row, T::one(), column);
-                    inverse.apply(column);
-                    slots[row] = *computed;
-                    *computed += 1;
-                }
+    /// Finds what S of these rows is made of.
+    fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+        // (Few rows are pushed along the same columns.)
+        self.make_columns(g, rows, if rows.len() <= FEW { Extent::All } else { Extent::Near })
+    }
+
+    /// Makes the columns of these rows that there are not yet, or that end too soon. A column is the same whenever it
+    /// is made.
+    fn make_columns(&mut self, g: &ContactJacobian<T>, rows: &[usize], extent: Extent) -> Result<()> {
+        let Self { inverse, slots, columns, computed, missing, .. } = self;
+        let InverseMass::Consistent(inverse) = inverse else { return Ok(()) };
+        let count = rows.iter().max().map_or(0, |last| last + 1);
+        slots.resize(count.max(slots.len()), NONE);
+        let find = |missing: &mut Vec<usize>, columns: &[Column<T>]| {
+            let ends_too_soon = |slot: usize| extent == Extent::All && columns[slot].extent == Extent::Near;
+            missing.clear();
+            missing.extend(rows.iter().filter(|&&row| slots[row] == NONE || ends_too_soon(slots[row])));
+        };
+        find(missing, columns);
+        let made = &mut columns[..*computed];
+        let long = made.iter().filter(|column| column.extent == Extent::All).count();
+        if extent == Extent::All && !missing.is_empty() && missing.len() + long > FEW {
+            for column in made {
+                column.shorten(inverse.near());
             }
+            find(missing, columns);
         }
+        let (forces, near) = (|number: usize| g.row(missing[number]), inverse.near());
+        inverse.respond(missing.len(), forces, |number, response| {
+            let slot = &mut slots[missing[number]];
+            if *slot == NONE {
+                *slot = *computed;
+                *computed += 1;
+            }
+            if *slot == columns.len() {
+                columns.push(Column { values: Vec::new(), extent });
+            }
+            let kept = if extent == Extent::All { response } else { &response[..response.len().min(near)] };
+            let column = &mut columns[*slot];
+            column.extent = extent;
+            column.values.clear();
+            column.values.extend_from_slice(kept);
+        })
     }
 
     /// Entry (i, j) of S = G M⁻¹ Gᵀ; row j must be prepared.
@@ -344,7 +419,24 @@ impl<T: Real> JumpProjection<T> {
                 }
                 sum
             }
-            InverseMass::Consistent { .. } => g.product(i, &self.columns[self.slots[j]]),
+            InverseMass::Consistent(inverse) => self.columns[self.slots[j]].product(inverse, g.row(i)),
         }
+    }
+}
+
+impl<T: Real> Column<T> {
+    /// Keeps the places near contact.
+    fn shorten(&mut self, near: usize) {
+        if self.values.len() > near {
+            self.values.truncate(near);
+            self.values.shrink_to_fit();
+        }
+        self.extent = Extent::Near;
+    }
+
+    /// The product with a row of G.
+    fn product(&self, inverse: &ConsistentInverse<T>, row: impl Iterator<Item = (usize, T)>) -> T {
+        let response = |dof| self.values.get(inverse.place(dof)).copied().unwrap_or(T::zero());
+        row.map(|(dof, weight)| weight * response(dof)).sum()
     }
 }

@@ -67,15 +67,15 @@ fn exchange_by_forces<T: Real>(step: &mut Correction<'_, T>, energy: T) -> Resul
     let mut impulses = std::mem::take(&mut step.buffers.impulses);
     impulses.clear();
     impulses.extend(rows.iter().map(|&row| step.contacts.lambda_raw[row].max(T::zero())));
-    step.projection.assemble(step.g, &rows, &mut step.buffers.s);
+    let mut result = step.projection.assemble(step.g, &rows, &mut step.buffers.s);
     let size = rows.len();
     let (mut square, mut rate) = (T::zero(), T::zero());
-    for (i, (&row, &x)) in rows.iter().zip(&impulses).enumerate() {
+    let answered = if result.is_ok() { &rows[..] } else { &[] };
+    for (i, (&row, &x)) in answered.iter().zip(&impulses).enumerate() {
         rate += x * (step.g.product(row, &step.new.v) + step.buffers.rates[row].rate);
         let column = &step.buffers.s[i * size..(i + 1) * size];
         square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
     }
-    let mut result = Ok(());
     if square > T::zero() {
         let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
         let factor = (root - rate) / square;

@@ -87,26 +87,28 @@ impl<T: Real> Corrector<T> for NonsmoothSplitting {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         step.solve_rubbing_velocity(Pressed::MayPart)?;
         step.push_rubbing_velocity()?;
-        step.split_forces();
-        Ok(())
+        step.split_forces()
     }
 }
 
 impl<T: Real> Correction<'_, T> {
     /// Takes the contact forces of closed contacts out of the accelerations, friction with them, and reports the total
     /// impulses of the velocities, which have been solved for, over h.
-    fn split_forces(&mut self) {
+    fn split_forces(&mut self) -> Result<()> {
         let (h, [.., by_a]) = (T::of(self.h), self.response());
         let Rubbing { rows, totals, .. } = &mut *self.buffers.rubbing;
         let (rows, totals) = (std::mem::take(rows), std::mem::take(totals));
-        self.projection.prepare(self.g, &rows);
+        let mut raw = std::mem::take(&mut self.buffers.forces);
+        raw.clear();
+        raw.extend(rows.iter().map(|&row| self.contacts.lambda_raw[row]));
+        let result = self.projection.push(self.g, (&rows, &raw), -T::of(by_a), &mut self.new.a);
         let weight = self.momentum_weights()[2];
-        for (&row, &total) in rows.iter().zip(&totals) {
-            let force = -T::of(by_a) * self.contacts.lambda_raw[row];
-            self.projection.push(self.g, row, force, &mut self.new.a);
+        for ((&row, &total), &raw) in rows.iter().zip(&totals).zip(&raw) {
+            let force = -T::of(by_a) * raw;
             self.book_impulse(row, T::of(weight) * force);
             self.report_force(row, total / h);
         }
-        (self.buffers.rubbing.rows, self.buffers.rubbing.totals) = (rows, totals);
+        (self.buffers.rubbing.rows, self.buffers.rubbing.totals, self.buffers.forces) = (rows, totals, raw);
+        result
     }
 }

@@ -125,7 +125,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
         }
         if self.parts != Parts::Velocity {
             step.solve_acceleration_jumps()?;
-            step.push_acceleration();
+            step.push_acceleration()?;
         }
         match self.history {
             HistoryProjection::Off => Ok(()),

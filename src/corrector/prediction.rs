@@ -68,8 +68,7 @@ impl<T: Real> Prediction<'_, T> {
         mu.clear();
         let mut result;
         loop {
-            self.advance(&rows, &mu);
-            result = self.read_gaps();
+            result = self.advance(&rows, &mu).and_then(|()| self.read_gaps());
             if result.is_err() {
                 break;
             }
@@ -95,11 +94,9 @@ impl<T: Real> Prediction<'_, T> {
         }
         if result.is_ok() {
             let [state, balance] = self.weights;
-            for (&row, &mu) in rows.iter().zip(&mu) {
-                self.projection.push(self.g, row, state * mu, &mut self.new.u);
-                if let Some(motion) = &mut self.balance {
-                    self.projection.push(self.g, row, balance * mu, &mut motion.u);
-                }
+            result = self.projection.push(self.g, (&rows, &mu), state, &mut self.new.u);
+            if let (Ok(()), Some(motion)) = (&result, &mut self.balance) {
+                result = self.projection.push(self.g, (&rows, &mu), balance, &mut motion.u);
             }
         }
         self.buffers.closed = rows;
@@ -108,15 +105,13 @@ impl<T: Real> Prediction<'_, T> {
     }
 
     /// u + h v + M⁻¹ Gᵀ μ, with supports where they will be.
-    fn advance(&mut self, rows: &[usize], mu: &[T]) {
+    fn advance(&mut self, rows: &[usize], mu: &[T]) -> Result<()> {
         self.shifted.copy_from_slice(&self.start.u);
         T::axpy(T::of(self.h), &self.start.v, self.shifted);
         for &dof in self.prescribed {
             self.shifted[dof] = self.new.u[dof];
         }
-        for (&row, &mu) in rows.iter().zip(mu) {
-            self.projection.push(self.g, row, mu, self.shifted);
-        }
+        self.projection.push(self.g, (rows, mu), T::one(), self.shifted)
     }
 
     /// Gaps at the shifted displacements; curved ones are linearized there.
@@ -128,7 +123,7 @@ impl<T: Real> Prediction<'_, T> {
 
     /// μ of the rows, for the gaps at u + h v.
     fn solve(&mut self, rows: &[usize], mu: &mut Vec<T>) -> Result<()> {
-        self.advance(&[], &[]);
+        self.advance(&[], &[])?;
         self.read_gaps()?;
         let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
         let Buffers { group, jump, tolerance, sets, gaps, .. } = &mut **buffers;

@@ -158,7 +158,7 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
             let impulse = match self.0 {
                 Waves::Transit(transit) => T::of(0.5 * transit) * force,
                 Waves::Impedances(sides) => {
-                    let s = step.compliance(row);
+                    let s = step.compliance(row)?;
                     let opening = T::of(sides.map(f64::recip).iter().sum()) * force;
                     if s > T::zero() { opening / s } else { T::zero() }
                 }

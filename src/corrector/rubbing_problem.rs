@@ -161,7 +161,10 @@ impl<T: Real> Rubbing<T> {
             // (Positions of a group ascend, and a block is in one group.)
             group.rows.clear();
             group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
-            projection.assemble(g, &group.rows, &mut group.s);
+            if let Err(error) = projection.assemble(g, &group.rows, &mut group.s) {
+                result = Err(error);
+                break;
+            }
             let positions = projection.groups().group(number);
             if let Err(failure) = self.solve_group(positions, &mut group, solver, presses) {
                 let owner = |unknown: usize| self.owners[positions[group.unknowns[unknown]]];

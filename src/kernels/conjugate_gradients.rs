@@ -30,6 +30,8 @@ pub struct Iteration<'a, T> {
     pub sweeps: Sweeps<'a, T>,
     /// Of the preconditioned residual, over that of the right-hand side.
     pub tolerance: f64,
+    /// A step that changes the solution by less than this part of it ends the iteration.
+    pub resolution: f64,
     pub limit: usize,
 }
 
@@ -316,22 +318,22 @@ pub(crate) fn factorize<T: Scalar, const B: usize>(
 }
 
 /// The criteria that end an iteration, tested after each step.
-struct Judge {
+pub(super) struct Judge {
     tolerance: f64,
     /// The squared norm of the right-hand side.
     first: f64,
     /// Σ α ρ: the square of the solution's length so far, as the matrix measures it (Hestenes and Stiefel, 1952,
     /// theorem 6:1: directions are orthogonal in that measure).
-    length: f64,
-    rounding: f64,
+    pub(super) length: f64,
+    /// Squared, as lengths are.
+    resolution: f64,
     iterations: usize,
     limit: usize,
 }
 
 impl Judge {
-    fn new<T: Scalar>(iteration: &Iteration<'_, T>) -> Self {
-        let (rounding, limit) = (T::epsilon().value().powi(2), iteration.limit);
-        Self { tolerance: iteration.tolerance, first: 0.0, length: 0.0, rounding, iterations: 0, limit }
+    pub(super) fn new([tolerance, resolution]: [f64; 2], limit: usize, first: f64) -> Self {
+        Self { tolerance, first, length: 0.0, resolution: resolution * resolution, iterations: 0, limit }
     }
 
     fn begin(&mut self, first: f64) {
@@ -339,12 +341,12 @@ impl Judge {
     }
 
     /// After a step α along a direction, ρ before it and after.
-    fn outcome(&mut self, alpha: f64, before: f64, after: f64) -> Option<Outcome> {
+    pub(super) fn outcome(&mut self, alpha: f64, before: f64, after: f64) -> Option<Outcome> {
         self.iterations += 1;
         let step = alpha * before;
         self.length += step;
-        // The second criterion: the scalar does not resolve the change of this step, nor that of any later one.
-        if after <= self.tolerance.powi(2) * self.first || step <= self.rounding * self.length {
+        // The second criterion: nothing sees the change of this step, nor that of any later one.
+        if after <= self.tolerance.powi(2) * self.first || step <= self.resolution * self.length {
             return Some(Outcome::Converged { iterations: self.iterations });
         }
         let residual = (after / self.first).sqrt();
@@ -354,7 +356,7 @@ impl Judge {
 
 /// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding fewer
 /// than two of its digits are significant: the matrix is singular to working precision.
-const NEGLIGIBLE: f64 = 64.0;
+pub(super) const NEGLIGIBLE: f64 = 64.0;
 
 /// Solves A x = b in place, starting from zero.
 #[inline]
@@ -386,7 +388,7 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
         *r *= down;
     }
     x.fill(T::zero());
-    let mut judge = Judge::new(iteration);
+    let mut judge = Judge::new([iteration.tolerance, iteration.resolution], iteration.limit, 0.0);
     let outcome = match sweeps {
         Sweeps::GaussSeidel => gauss_seidel::<T, B>(lower, &mut judge, [x, r, p, t, q]),
         Sweeps::Nodes => preconditioned::<T, B>(lower, &mut judge, [x, r, p, t, q], |r, z| z.copy_from_slice(r)),

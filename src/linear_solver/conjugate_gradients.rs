@@ -320,7 +320,8 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         };
         let lower = Blocks { pointers, columns, values };
         let (tolerance, limit) = (settings.tolerance, settings.iterations);
-        let iteration = Iteration { lower, scaling, sweeps, tolerance, limit };
+        let resolution = T::epsilon().value();
+        let iteration = Iteration { lower, scaling, sweeps, tolerance, resolution, limit };
         self.iterations = 0;
         for column in rhs.chunks_exact_mut(*dofs) {
             let mut parts = vectors.chunks_exact_mut(*dofs);

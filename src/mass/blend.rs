@@ -1,6 +1,6 @@
 //! Mass matrices between lumped and consistent, whose dispersion can cancel that of the scheme.
 
-use super::{InverseMass, Mass};
+use super::inverse::check_definite;
 use crate::analysis::period_elongation;
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -51,7 +51,7 @@ pub fn blend<T: Real>(
     let mut values = vec![T::zero(); sum.len()];
     sum.fill(&[(T::of(weight), consistent.val())], Some((T::of(1.0 - weight), lumped)), &mut values);
     if !(0.0..=1.0).contains(&weight) {
-        InverseMass::new(Mass::Consistent(sum.view(&values)), &[])?;
+        check_definite(sum.view(&values), &[])?;
     }
     Ok(sum.into_matrix(values))
 }

@@ -1,7 +1,7 @@
 //! Mass redistribution: contact dofs without mass, their mass on others.
 
 use super::assembly::{assembled, check_dofs, flags};
-use super::{InverseMass, Mass};
+use super::inverse::check_definite;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::sparse;
@@ -181,7 +181,7 @@ pub fn redistribute_consistent<T: Real>(
     let result = assembled(n, entries)?;
     if change.added.iter().any(|&m| m < 0.0) || change.density.iter().any(|&p| p != 0.0) {
         let massless: Vec<usize> = (0..n).filter(|&dof| loss.massless[dof]).collect();
-        InverseMass::new(Mass::Consistent(result.as_ref()), &massless)?;
+        check_definite(result.as_ref(), &massless)?;
     }
     Ok(result)
 }

@@ -350,7 +350,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         if constraints.may_press() {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
-        let mut projection = start::projection(&*system, dofs, constraints.room())?;
+        let mut projection = start::projection(&*system, &constraints)?;
         let is_smooth = self.correctors.iter().any(Corrector::leaves_smooth_motion);
         let begun = if let Some((state, history)) = resumed {
             constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;

@@ -123,8 +123,8 @@ impl<T: Real> Simulation<'_, T> {
         let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
-            let mut projection = start::projection(&**system, newest.u.len(), constraints.room())?;
-            projection.close_rows(g, &closed).map_err(|row| no_response(newest.t, constraints.ids[row]))?;
+            let mut projection = start::projection(&**system, constraints)?;
+            projection.close_rows(g, &closed, |row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
                 project(motion, constraints, g, &mut projection, &closed)?;
             }
@@ -165,7 +165,7 @@ impl<T: Real> Simulation<'_, T> {
         let is_smooth = correctors.iter().any(Corrector::leaves_smooth_motion);
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        let mut projection = start::projection(&**system, u.len(), constraints.room())?;
+        let mut projection = start::projection(&**system, constraints)?;
         let (system, contact_solver) = (&mut **system, &mut **contact_solver);
         let start =
             Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme, h, t, massless, is_smooth };

@@ -75,9 +75,13 @@ pub(super) struct Begun<T: Real> {
     pub(super) adjustment: Option<StartAdjustment<T>>,
 }
 
-/// M⁻¹ on the free dofs with room for `rows` contacts.
-pub(super) fn projection<T: Real>(system: &dyn System<T>, dofs: usize, rows: usize) -> Result<JumpProjection<T>> {
-    JumpProjection::with(InverseMass::new(system.mass(), system.prescribed())?, dofs, rows)
+/// M⁻¹ on the free dofs with room for the candidates.
+pub(super) fn projection<T: Real>(
+    system: &dyn System<T>,
+    constraints: &Constraints<'_, T>,
+) -> Result<JumpProjection<T>> {
+    let inverse = InverseMass::new(system.mass(), system.prescribed(), constraints.interface())?;
+    JumpProjection::with(inverse, system.dofs(), constraints.room())
 }
 
 impl<T: Real> Start<'_, T> {
@@ -97,8 +101,7 @@ impl<T: Real> Start<'_, T> {
             for (row, &force) in contacts.lambda.iter().enumerate() {
                 let owner = constraints.tangents().owner(row);
                 if constraints.law(owner).leaves_jumps() && !g.acts_on(owner, self.massless) {
-                    projection.prepare(g, &[row]);
-                    projection.push(g, row, -force, &mut motion.a);
+                    projection.push(g, (&[row], &[force]), -T::one(), &mut motion.a)?;
                 }
             }
         }
@@ -181,7 +184,7 @@ impl<T: Real> Start<'_, T> {
         system.force(t, &motion.u, &motion.v, &mut force)?;
         system.mass().add_product(-T::one(), &motion.a, &mut force);
         let unbalanced: Vec<T> = massless.iter().map(|&dof| force[dof]).collect();
-        projection.apply_inverse(&mut force);
+        projection.apply_inverse(&mut force)?;
         for (&dof, support) in prescribed.iter().zip(&supports) {
             force[dof] = support[2];
         }
@@ -199,8 +202,7 @@ impl<T: Real> Start<'_, T> {
             if law.is_spring() {
                 let force = law.force(contacts.gap[row]);
                 if force > T::zero() {
-                    projection.prepare(g, &[row]);
-                    projection.push(g, row, force, &mut motion.a);
+                    projection.push(g, (&[row], &[force]), T::one(), &mut motion.a)?;
                 }
                 (contacts.lambda[row], contacts.lambda_raw[row]) = (force, force);
                 contacts.closed[row] = force > T::zero();
@@ -220,7 +222,7 @@ impl<T: Real> Start<'_, T> {
             problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
             problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
-            problem.press(g, projection, &mut motion, &mut contacts);
+            problem.press(g, projection, &mut motion, &mut contacts)?;
         }
         let mut problem = match looks_ahead {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
@@ -233,7 +235,7 @@ impl<T: Real> Start<'_, T> {
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
         problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
-        problem.press(g, projection, &mut motion, &mut contacts);
+        problem.press(g, projection, &mut motion, &mut contacts)?;
         Ok(Found { motion, contacts, adjustment })
     }
 }
@@ -268,9 +270,10 @@ fn rub_springs<T: Real>(
     }
     solver.reserve(problem.rows.len());
     problem.solve((g, projection), solver, T::one(), (motion.t, |row| constraints.ids[row]))?;
-    projection.prepare(g, &problem.rows);
-    for (&row, &force) in problem.rows.iter().zip(&problem.totals).filter(|(row, _)| g.is_tangential(**row)) {
-        projection.push(g, row, force, &mut motion.a);
+    let rubs = problem.rows.iter().zip(&problem.totals).filter(|(row, _)| g.is_tangential(**row));
+    let (rows, forces): (Vec<usize>, Vec<T>) = rubs.unzip();
+    projection.push(g, (&rows, &forces), T::one(), &mut motion.a)?;
+    for (row, force) in rows.into_iter().zip(forces) {
         (contacts.lambda[row], contacts.lambda_raw[row]) = (force, force);
     }
     for (row, _) in sliding {
@@ -348,7 +351,7 @@ fn is_free_flight<T: Real>(
             Err(error) if error.is_recoverable() => return Ok(false),
             other => other?,
         }
-        projection.apply_inverse(&mut a);
+        projection.apply_inverse(&mut a)?;
         if !small(&a) {
             return Ok(false);
         }

@@ -208,10 +208,9 @@ impl<T: Real> StartProblem<T> {
         projection: &mut JumpProjection<T>,
         motion: &mut Motion<T>,
         contacts: &mut ContactState<T>,
-    ) {
-        projection.prepare(g, &self.solved);
+    ) -> Result<()> {
+        projection.push(g, (&self.solved, &self.lambda), T::one(), &mut motion.a)?;
         for (&row, &lambda) in self.solved.iter().zip(&self.lambda) {
-            projection.push(g, row, lambda, &mut motion.a);
             contacts.lambda[row] = lambda;
             contacts.lambda_raw[row] = lambda;
             if !g.is_tangential(row) {
@@ -222,6 +221,7 @@ impl<T: Real> StartProblem<T> {
             let bound = T::of(contacts.tangents.friction(row)) * contacts.lambda[row];
             contacts.sliding[row] = slides(contacts.tangential(row, &contacts.lambda), bound);
         }
+        Ok(())
     }
 
     pub(super) fn solve(
@@ -240,10 +240,7 @@ impl<T: Real> StartProblem<T> {
             }
             let Self { rows, waiting, offset, tolerance, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];
-            projection.prepare(g, solved);
-            for (&row, &lambda) in solved.iter().zip(lambda.iter()) {
-                projection.push(g, row, lambda, &mut pushed);
-            }
+            projection.push(g, (solved, lambda), T::one(), &mut pushed)?;
             let violated = |row: &usize| offset[*row] + g.product(*row, &pushed) < -tolerance[*row];
             let joining: Vec<usize> = waiting.iter().copied().filter(violated).collect();
             if joining.is_empty() {
@@ -267,7 +264,7 @@ impl<T: Real> StartProblem<T> {
         let Self { rows, offset, tolerance, compliance, solved, lambda, .. } = self;
         solved.clone_from(rows);
         let mut s = Vec::new();
-        projection.assemble(g, rows, &mut s);
+        projection.assemble(g, rows, &mut s)?;
         for (k, &row) in rows.iter().enumerate() {
             s[k * rows.len() + k] += compliance[row];
         }

@@ -34,7 +34,7 @@ fn persistency(step: &mut Correction<'_, f64>) -> Result<()> {
     step.apply_impulses(&closed, &impulses)?;
     step.solve_acceleration_jumps()?;
     let (engaged, forces) = (step.engaged().to_vec(), step.jump_forces().to_vec());
-    step.apply_forces(&engaged, &forces);
+    step.apply_forces(&engaged, &forces)?;
     for (&row, &force) in engaged.iter().zip(&forces) {
         step.report_force(row, step.contacts().forces()[row] + step.force_share() * force);
     }
@@ -46,7 +46,7 @@ fn contact_implicit(step: &mut Correction<'_, f64>) -> Result<()> {
     let (rows, [u, v, a]) = (step.closed().to_vec(), step.response());
     let raw: Vec<f64> = rows.iter().map(|&row| step.contacts().raw_forces()[row]).collect();
     let times = |x: f64| raw.iter().map(|raw| x * raw).collect::<Vec<_>>();
-    step.apply_forces(&rows, &times(-a));
+    step.apply_forces(&rows, &times(-a))?;
     for (&row, &raw) in rows.iter().zip(&raw) {
         step.report_force(row, 2.0 * u * raw);
     }
@@ -64,7 +64,7 @@ fn laursen_love(step: &mut Correction<'_, f64>) -> Result<()> {
     let gaps = step.contacts().gaps();
     let work: f64 = rows.iter().zip(&raw).map(|(&row, raw)| raw * (gaps[row] - start[row])).sum();
     let mut s = Vec::new();
-    step.compliances(&rows, &mut s);
+    step.compliances(&rows, &mut s)?;
     let size = rows.len();
     let (mut square, mut rate) = (0.0, 0.0);
     for (i, &row) in rows.iter().enumerate() {

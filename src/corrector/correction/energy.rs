@@ -13,7 +13,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn exchange_energy(&mut self, row: usize, energy: T) -> Result<T> {
-        let (s, rate) = (self.compliance(row), self.rate(row)?);
+        let (s, rate) = (self.compliance(row)?, self.rate(row)?);
         // The gap rate is a small difference of larger numbers; this is their rounding.
         let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
         if !(s > T::zero() && T::of(2.0) * s * energy.abs() > noise * noise && energy.is_finite()) {

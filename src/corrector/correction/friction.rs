@@ -187,9 +187,8 @@ impl<T: Real> Correction<'_, T> {
             1 => (&mut motion.v, psi),
             _ => (&mut motion.a, psi * h),
         };
-        projection.prepare(g, &rubbing.rows);
+        projection.push(g, (&rubbing.rows, &rubbing.increments), T::one(), values)?;
         for (&row, &multiplier) in rubbing.rows.iter().zip(&rubbing.increments) {
-            projection.push(g, row, multiplier, values);
             contacts.impulse[row] += T::of(unit) * multiplier;
         }
         Ok(())
@@ -220,11 +219,12 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Applies the forces found along gaps and tangents.
-    pub(super) fn push_rubbing_acceleration(&mut self) {
+    pub(super) fn push_rubbing_acceleration(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
-        self.push_forces(&rows, &increments);
+        let result = self.push_forces(&rows, &increments);
         (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
+        result
     }
 }
 

@@ -24,7 +24,7 @@ impl<T: Real> Correction<'_, T> {
         let rows = std::mem::take(&mut self.buffers.engaged);
         let mut closing = match self.rubs() {
             true => self.read_slip_rates(),
-            false => self.projection.close_rows(self.g, &rows).map_err(|row| self.no_response(row)),
+            false => self.close(&rows),
         };
         // States not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
@@ -78,8 +78,8 @@ impl<T: Real> Correction<'_, T> {
             1 => (&mut motion.v, psi),
             _ => (&mut motion.a, psi * h),
         };
+        projection.push(g, (rows, jump), -T::one(), values)?;
         for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
-            projection.push(g, row, -multiplier, values);
             contacts.impulse[row] -= T::of(unit) * multiplier;
         }
         Ok(())
@@ -93,7 +93,8 @@ impl<T: Real> Correction<'_, T> {
     /// # Errors
     ///
     /// [`Error::Incompatible`](crate::Error::Incompatible) if later rows read the past, and the corrector's
-    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
+    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); those of
+    /// [`compliances`](Self::compliances).
     pub fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
         // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
@@ -107,11 +108,11 @@ impl<T: Real> Correction<'_, T> {
             let (motion, steps) = (&mut past[k - 1], (k + 1 - scheme.stages) as f64);
             let [by_u, by_v, _] = scheme.covector[k];
             if scheme.read[k][0] {
-                projection.push(g, row, T::of(-steps * *h) * impulse, &mut motion.u);
+                projection.push(g, (&[row], &[impulse]), T::of(-steps * *h), &mut motion.u)?;
                 contacts.impulse[row] -= T::of(steps * by_u) * impulse;
             }
             if scheme.read[k][1] {
-                projection.push(g, row, impulse, &mut motion.v);
+                projection.push(g, (&[row], &[impulse]), T::one(), &mut motion.v)?;
                 contacts.impulse[row] += T::of(by_v) * impulse;
             }
         }

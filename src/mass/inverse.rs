@@ -1,0 +1,49 @@
+//! M⁻¹ on the degrees of freedom that are free to move and have a mass.
+
+use super::Mass;
+use super::consistent::{ConsistentInverse, factor, without_response};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use faer::sparse::SparseColMatRef;
+
+/// M⁻¹ on the free dofs that have a mass: the others have no response, their rows and columns are left out of M.
+#[derive(Debug)]
+pub(crate) enum InverseMass<T: Real> {
+    /// 1/m, zero on dofs without response.
+    Lumped(Vec<T>),
+    Consistent(Box<ConsistentInverse<T>>),
+}
+
+impl<T: Real> InverseMass<T> {
+    /// Forces will act above all on the dofs `near`; nowhere in particular if there are none.
+    pub(crate) fn new(mass: Mass<'_, T>, prescribed: &[usize], near: &[usize]) -> Result<Self> {
+        match mass {
+            Mass::Lumped(mass) => {
+                let mut inverse = Vec::with_capacity(mass.len());
+                for (dof, &m) in mass.iter().enumerate() {
+                    let free = prescribed.binary_search(&dof).is_err();
+                    if free && !(m >= T::zero() && m.is_finite()) {
+                        return Err(Error::Mass { dof, value: m.value() });
+                    }
+                    inverse.push(if free && m > T::zero() { m.recip() } else { T::zero() });
+                }
+                Ok(Self::Lumped(inverse))
+            }
+            Mass::Consistent(mass) => Ok(Self::Consistent(Box::new(ConsistentInverse::new(mass, prescribed, near)?))),
+        }
+    }
+
+    /// `x ← M⁻¹ x`, zero on dofs without response.
+    pub(crate) fn apply(&mut self, x: &mut [T]) -> Result<()> {
+        match self {
+            Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
+            Self::Consistent(inverse) => inverse.apply(x)?,
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a matrix that is not positive definite on the dofs that are not prescribed and have a mass.
+pub(super) fn check_definite<T: Real>(mass: SparseColMatRef<'_, usize, T>, prescribed: &[usize]) -> Result<()> {
+    factor(mass, &without_response(mass, prescribed)).map(|_| ())
+}

@@ -1,0 +1,164 @@
+//! An order of the dofs of a matrix by their distance, in couplings, from some of them.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+use faer::sparse::SparseColMatRef;
+
+/// Dofs in layers: those in the first, whatever they are coupled with in the next, and so on; behind them all others,
+/// which nothing couples with these. Dofs left out have no place.
+#[derive(Debug)]
+pub(super) struct Layers {
+    /// The dof of each place, and the place of each dof.
+    order: Vec<u32>,
+    places: Vec<u32>,
+    /// Where each layer ends.
+    ends: Vec<usize>,
+}
+
+/// A dof without a place.
+const NONE: u32 = u32::MAX;
+
+/// Colors of dofs: those of one color and one layer are not coupled, so that none of them waits for another in a sweep.
+struct Colors<'a, T> {
+    matrix: SparseColMatRef<'a, usize, T>,
+    colors: Vec<u8>,
+}
+
+const NO_COLOR: u8 = u8::MAX;
+
+impl Layers {
+    /// Layers around the dofs `near`, or all dofs as one layer if there are none of these. Entries of value zero couple
+    /// nothing.
+    pub(super) fn around<T: Real>(
+        near: &[usize],
+        matrix: SparseColMatRef<'_, usize, T>,
+        left_out: &[usize],
+    ) -> Result<Self> {
+        let dofs = matrix.ncols();
+        let count = u32::try_from(dofs).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits" })?;
+        let mut places = vec![NONE; dofs];
+        // (A place that no layer has, until the dofs left out lose it again.)
+        for &dof in left_out {
+            places[dof] = count;
+        }
+        let mut order = Vec::with_capacity(dofs - left_out.len());
+        let mut ends = Vec::new();
+        // (All numbers of dofs have just been seen to fit.)
+        #[allow(clippy::cast_possible_truncation)]
+        let mut take = |dof: usize, order: &mut Vec<u32>| {
+            if places[dof] == NONE {
+                places[dof] = order.len() as u32;
+                order.push(dof as u32);
+            }
+        };
+        for &dof in near {
+            take(dof, &mut order);
+        }
+        let mut start = 0;
+        while start < order.len() {
+            let end = order.len();
+            ends.push(end);
+            for at in start..end {
+                let dof = order[at] as usize;
+                for (&row, &value) in matrix.row_idx_of_col_raw(dof).iter().zip(matrix.val_of_col(dof)) {
+                    if value != T::zero() {
+                        take(row, &mut order);
+                    }
+                }
+            }
+            start = end;
+        }
+        (0..dofs).for_each(|dof| take(dof, &mut order));
+        let mut colors = Colors { matrix, colors: vec![NO_COLOR; dofs] };
+        start = 0;
+        for end in ends.iter().copied().chain([order.len()]) {
+            colors.sort(start, &mut order[start..end], &mut places);
+            start = end;
+        }
+        if ends.is_empty() {
+            ends.push(order.len());
+        }
+        for &dof in left_out {
+            places[dof] = NONE;
+        }
+        Ok(Self { order, places, ends })
+    }
+
+    /// The dof of each place.
+    pub(super) fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The place of a dof, beyond all others if it has none.
+    pub(super) fn place(&self, dof: usize) -> usize {
+        self.places[dof] as usize
+    }
+
+    /// The number of dofs in the first layer.
+    pub(super) fn first(&self) -> usize {
+        self.ends[0]
+    }
+
+    /// Where the layer ends that is `distance` beyond that of a place, and where it begins; the end of all that is
+    /// coupled with it if there are fewer.
+    pub(super) fn beyond(&self, place: usize, distance: usize) -> [usize; 2] {
+        let own = self.ends.partition_point(|&end| end <= place);
+        let far = own + distance;
+        match self.ends.get(far) {
+            Some(&end) if far > 0 => [self.ends[far - 1], end],
+            _ => [self.connected(place); 2],
+        }
+    }
+
+    /// The end of all that may be coupled with a place.
+    pub(super) fn connected(&self, place: usize) -> usize {
+        let reached = self.ends.last().copied().unwrap_or(0);
+        if place < reached { reached } else { self.order.len() }
+    }
+}
+
+impl<T: Real> Colors<'_, T> {
+    /// Sorts a layer that starts at a place by the colors of its dofs, each the first that none before it has taken.
+    fn sort(&mut self, start: usize, layer: &mut [u32], places: &mut [u32]) {
+        let own = start..start + layer.len();
+        for &dof in layer.iter() {
+            let mut taken = 0_u64;
+            let dof = dof as usize;
+            for (&other, &value) in self.matrix.row_idx_of_col_raw(dof).iter().zip(self.matrix.val_of_col(dof)) {
+                let color = self.colors[other];
+                if value != T::zero() && color < 64 && own.contains(&(places[other] as usize)) {
+                    taken |= 1 << color;
+                }
+            }
+            // (Where so many are coupled with one another the last color is taken by several.)
+            self.colors[dof] = u8::try_from(taken.trailing_ones().min(63)).unwrap_or(0);
+        }
+        layer.sort_by_key(|&dof| self.colors[dof as usize]);
+        for (place, &dof) in own.zip(layer.iter()) {
+            places[dof as usize] = u32::try_from(place).unwrap_or(NONE);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faer::sparse::{SparseColMat, Triplet};
+
+    #[test]
+    fn layers_of_two_chains() {
+        // 0 – 2 – 4 – 6 and 1 – 3 – 5 – 7, of which 7 is left out; 2 and 3 are coupled by a zero.
+        let chains = (0..6).flat_map(|i| [(i, i + 2, 1.0), (i + 2, i, 1.0)]);
+        let entries = chains.chain((0..8).map(|i| (i, i, 4.0))).chain([(2, 3, 0.0), (3, 2, 0.0)]);
+        let entries: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(8, 8, &entries).unwrap();
+        let layers = Layers::around(&[2, 7], matrix.as_ref(), &[7]).unwrap();
+        assert_eq!(layers.order(), [2, 0, 4, 6, 1, 5, 3]);
+        assert_eq!((layers.first(), layers.place(6), layers.place(7) > 7), (1, 3, true));
+        assert_eq!([layers.beyond(0, 1), layers.beyond(0, 2), layers.beyond(0, 3)], [[1, 3], [3, 4], [4, 4]]);
+        // The other chain has no layers.
+        assert_eq!([layers.beyond(5, 1), layers.beyond(3, 9)], [[7, 7], [4, 4]]);
+        let whole = Layers::around(&[], matrix.as_ref(), &[7]).unwrap();
+        assert_eq!((whole.order(), whole.first(), whole.connected(0)), (&[0, 1, 4, 5, 2, 3, 6][..], 7, 7));
+    }
+}
