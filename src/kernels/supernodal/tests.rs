@@ -4,6 +4,7 @@ use super::*;
 use faer::Side;
 use faer::dyn_stack::MemStack;
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
@@ -55,7 +56,7 @@ fn ours(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Res
     let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a supernodal factor") };
     let n = a.ncols();
     let workspaces = PerThread::new(|| workspace::<f64>(n)).unwrap();
-    let order = symbolic.perm().map(|perm| perm.arrays());
+    let order = symbolic.perm().map(PermRef::arrays);
     let elimination = &Elimination::new(raw);
     let problem = Problem { symbolic: raw, elimination, a: a.as_ref(), order, workspaces: &workspaces };
     let (mut values, mut pivots) = (vec![f64::NAN; raw.len_val()], vec![0.0; n]);
