@@ -1,4 +1,4 @@
-//! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
+//! Sparse Cholesky: faer's simplicial L D Lᵀ for chains (with sweeps of our own), a supernodal L Lᵀ for the rest.
 
 use super::ordering::{self, Ordering};
 use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
