@@ -7,8 +7,8 @@ use std::ops::Range;
 pub(crate) enum Plan {
     /// Supernodes one after the other.
     Serial(Range<usize>),
-    /// A branch (all supernodes before those of the stem), then the stem: one after the other, several threads may share
-    /// each.
+    /// A branch (all supernodes before those of the stem), then the stem: one supernode after the other, each of which
+    /// several threads may share.
     Stem(Box<Plan>, Range<usize>),
     /// Two branches without a common supernode; the second one begins with this supernode.
     Fork(Box<[Plan; 2]>, usize),

@@ -5,18 +5,18 @@
 //! cut into tiles, which go side by side too. Tiles, and what is summed in which order, are a matter of the factor
 //! alone: results are the same bit for bit on any number of threads.
 
+mod dense;
 #[cfg(test)]
 mod tests;
 
+use self::dense::{divide, lower_product, pivots, slab};
 use super::elimination::Elimination;
 use super::plan::Plan;
 use crate::scalar::Scalar;
 use crate::threads::{self, PerThread, Threads};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::dyn_stack::MemBuffer;
+use faer::linalg::cholesky::llt::factor::cholesky_in_place_scratch;
 use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
@@ -24,7 +24,7 @@ use faer::{Accum, MatMut, MatRef, Par, Spec};
 use std::ops::Range;
 
 /// Columns of a supernode that are updated together.
-const TILE: usize = 96;
+const TILE: usize = 128;
 /// Columns that are factorized before those behind them are updated.
 const PANEL: usize = 128;
 /// Rows that are multiplied at once: their product with a tile stays in the cache.
@@ -32,8 +32,11 @@ const ROWS: usize = 480;
 /// Columns of a source that are multiplied at once: with more of them faer's kernel slows down to half its speed.
 const DEPTH: usize = 128;
 
+/// Runs of this length and longer are subtracted one after the other, shorter ones row by row.
+const LONG: usize = 16;
+
 /// Of products as wide as this and wider, the upper triangle is left out.
-const TRIANGLE: usize = 48;
+const TRIANGLE: usize = 64;
 
 /// Rows of a product that follow each other in the supernode that takes it.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +51,7 @@ struct Run {
 pub struct Workspace<T> {
     /// The product of some rows with a tile, and where it goes.
     product: Vec<T>,
+    places: Vec<usize>,
     runs: Vec<Run>,
     /// For each row of the supernode at hand, its place there; others keep places of earlier ones.
     place_of: Vec<usize>,
@@ -70,6 +74,7 @@ pub(crate) fn workspace<T: Scalar>(dofs: usize) -> Option<Workspace<T>> {
     let scratch = cholesky_in_place_scratch::<T>(PANEL, Par::Seq, Spec::default());
     Some(Workspace {
         product: vec![T::zero(); TILE * ROWS.min(dofs)],
+        places: Vec::with_capacity(ROWS),
         runs: Vec::with_capacity(ROWS),
         place_of,
         memory: MemBuffer::try_new(scratch).ok()?,
@@ -257,7 +262,7 @@ impl<T: Scalar> Target<'_, T> {
         own: &mut [T],
         workspace: &mut Workspace<T>,
     ) {
-        let Workspace { product, runs, place_of, .. } = workspace;
+        let Workspace { product, places, runs, place_of, .. } = workspace;
         let columns = source.subrows(0, width);
         for (begin, chunk) in (0..).step_by(ROWS).zip(rows.chunks(ROWS)) {
             let count = chunk.len();
@@ -278,11 +283,18 @@ impl<T: Scalar> Target<'_, T> {
                 }
                 accumulate = Accum::Add;
             }
-            find_runs(chunk, place_of, runs);
+            find_places(chunk, place_of, places, runs);
+            let scattered = runs.len() * LONG > count;
             for ((j, &column), product) in rows[..width].iter().enumerate().zip(product.chunks_exact(count)) {
                 let own = &mut own[(column - start) * self.height..][..self.height];
                 // From the diagonal down.
                 let above = j.saturating_sub(begin).min(count);
+                if scattered {
+                    for (&place, &x) in places[above..].iter().zip(&product[above..]) {
+                        own[place] -= x;
+                    }
+                    continue;
+                }
                 for run in runs.iter().filter(|run| run.end > above) {
                     let begin = run.begin.max(above);
                     let (place, length) = (run.place + begin - run.begin, run.end - begin);
@@ -308,7 +320,7 @@ impl<T: Scalar> Target<'_, T> {
             let whole = MatMut::from_column_major_slice_mut(panel, self.height, width);
             let (mut top, below) = whole.subrows_mut(first, self.height - first).split_at_row_mut(width);
             pivots(top.rb_mut()).map_err(|pivot| self.columns.start + first + pivot)?;
-            divide(threads, top.rb(), below);
+            divide(threads, ROWS, top.rb(), below);
             first += width;
             let panel = MatRef::from_column_major_slice(panel, self.height, width);
             threads::each_chunk(threads, behind, TILE * self.height, &|tile, columns| {
@@ -330,44 +342,15 @@ impl<T: Scalar> Target<'_, T> {
     }
 }
 
-/// Some columns of a matrix.
-fn slab<'a, T>(a: MatRef<'a, T>, columns: &Range<usize>) -> MatRef<'a, T> {
-    a.subcols(columns.start, columns.len())
-}
-
-/// The lower triangle of c A Aᵀ.
-fn lower_product<T: Scalar>(result: MatMut<'_, T>, accumulate: Accum, a: MatRef<'_, T>, c: T) {
-    let (rectangle, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-    triangular::matmul(result, lower, accumulate, a, rectangle, a.transpose(), rectangle, c, Par::Seq);
-}
-
 /// Where the rows of a chunk are in the supernode at hand.
-fn find_runs(rows: &[usize], place_of: &[usize], runs: &mut Vec<Run>) {
+fn find_places(rows: &[usize], place_of: &[usize], places: &mut Vec<usize>, runs: &mut Vec<Run>) {
+    places.clear();
+    places.extend(rows.iter().map(|&row| place_of[row]));
     runs.clear();
-    for (k, &row) in rows.iter().enumerate() {
-        let place = place_of[row];
+    for (k, &place) in places.iter().enumerate() {
         match runs.last_mut() {
             Some(run) if run.place + (k - run.begin) == place => run.end = k + 1,
             _ => runs.push(Run { begin: k, end: k + 1, place }),
         }
     }
-}
-
-/// Factorizes a small block; `Err` holds the pivot that is not positive.
-fn pivots<T: Scalar>(block: MatMut<'_, T>, memory: &mut MemBuffer) -> Result<(), usize> {
-    let regularization = LltRegularization::default();
-    match cholesky_in_place(block, regularization, Par::Seq, MemStack::new(memory), Spec::default()) {
-        Ok(_) => Ok(()),
-        Err(LltError::NonPositivePivot { index }) => Err(index),
-    }
-}
-
-/// Solves X Lᵀ = B for the rows of B, so many at a time.
-fn divide<T: Scalar>(threads: Threads, l: MatRef<'_, T>, b: MatMut<'_, T>) {
-    let count = b.nrows();
-    if count <= ROWS {
-        return solve_lower_triangular_in_place(l, b.transpose_mut(), Par::Seq);
-    }
-    let (first, second) = b.split_at_row_mut((count / 2).next_multiple_of(ROWS));
-    threads::join_by(threads, || divide(threads, l, first), || divide(threads, l, second));
 }

@@ -1,4 +1,4 @@
-//! Sparse Cholesky through faer: simplicial L D Lᵀ for chains (with sweeps of our own), supernodal L Lᵀ for the rest.
+//! Sparse Cholesky: faer's simplicial L D Lᵀ for chains (with sweeps of our own), a supernodal L Lᵀ for the rest.
 
 use super::ordering::{self, Ordering};
 use super::shared::Analyses;
@@ -12,6 +12,7 @@ use crate::real::Real;
 use crate::threads::PerThread;
 use crate::{memory, sparse};
 use faer::dyn_stack::{MemBuffer, StackReq};
+use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
@@ -348,25 +349,23 @@ impl<T: Real> Factorization<T> for Factor<T> {
         fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
-        match (symbolic.raw(), elimination) {
-            (SymbolicCholeskyRaw::Supernodal(raw), Some(elimination)) => {
+        let factorized =
+            if let (SymbolicCholeskyRaw::Supernodal(raw), Some(elimination)) = (symbolic.raw(), elimination) {
                 let workspaces = match threads {
                     Some(workspaces) => workspaces,
                     None => threads.insert(workspaces(pivots.len())?),
                 };
-                let order = symbolic.perm().map(|perm| perm.arrays());
+                let order = symbolic.perm().map(PermRef::arrays);
                 let problem = Problem { symbolic: raw, elimination, a, order, workspaces };
                 T::supernodal_cholesky(&problem, values, pivots)
-            }
-            _ => {
+            } else {
                 let memory = match memory {
                     Some(memory) => memory,
                     None => memory.insert(buffer(T::cholesky_scratch(*kind, symbolic, 1))?),
                 };
                 T::simplicial_cholesky(symbolic, a, values, pivots, memory)
-            }
-        }
-        .map_err(singular)?;
+            };
+        factorized.map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());
         // Written so that NaN is refused too.
         let sound = |(dof, &pivot): (usize, &T)| pivot > negligible * sparse::entry(a, dof, dof);

@@ -2,6 +2,9 @@
 
 use super::*;
 use faer::Side;
+use faer::dyn_stack::MemStack;
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
@@ -12,9 +15,18 @@ use faer::sparse::{SparseColMat, Triplet};
 struct Numbers(u64);
 
 impl Numbers {
-    fn next(&mut self) -> f64 {
+    fn bits(&mut self) -> u32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / (1_u64 << 24) as f64
+        u32::try_from(self.0 >> 33).unwrap()
+    }
+
+    fn next(&mut self) -> f64 {
+        f64::from(self.bits()) / f64::from(1_u32 << 31)
+    }
+
+    /// A whole number below `n`.
+    fn below(&mut self, n: usize) -> usize {
+        self.bits() as usize % n
     }
 }
 
@@ -44,7 +56,7 @@ fn ours(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Res
     let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a supernodal factor") };
     let n = a.ncols();
     let workspaces = PerThread::new(|| workspace::<f64>(n)).unwrap();
-    let order = symbolic.perm().map(|perm| perm.arrays());
+    let order = symbolic.perm().map(PermRef::arrays);
     let elimination = &Elimination::new(raw);
     let problem = Problem { symbolic: raw, elimination, a: a.as_ref(), order, workspaces: &workspaces };
     let (mut values, mut pivots) = (vec![f64::NAN; raw.len_val()], vec![0.0; n]);
@@ -81,14 +93,14 @@ fn check(a: &SparseColMat<usize, f64>, symbolic: &SymbolicCholesky<usize>) {
 fn factors_of_random_matrices_are_those_of_faer() {
     let mut numbers = Numbers(1);
     for n in [1, 2, 3, 7, 20, 61, 150, 400] {
-        for density in [0.0, 0.5, 2.0, 6.0] {
-            let count = (density * n as f64) as usize;
+        for density in [0, 1, 4, 12] {
+            let count = n * density / 2;
             // Half of the entries reach far, the others not: forests with several trees, wide and narrow supernodes.
             let mut below: Vec<_> = (0..count)
                 .map(|k| {
-                    let i = (numbers.next() * n as f64) as usize;
+                    let i = numbers.below(n);
                     let reach = if k % 2 == 0 { i } else { i.min(4) };
-                    (i, i - ((numbers.next() * reach as f64) as usize).min(i))
+                    (i, i - numbers.below(reach + 1))
                 })
                 .filter(|(i, j)| i != j)
                 .collect();
