@@ -48,11 +48,11 @@ fn blocks(cells: usize, samples: usize) {
             .expect("the scene is well posed")
     };
     let shared = Cholesky::default().sharing();
-    let mut runs: Vec<(Vec<f64>, Box<dyn Fn() -> Box<dyn LinearSolver<f64>>>)> =
-        vec![(Vec::new(), Box::new(|| Box::new(Automatic))), (Vec::new(), Box::new(move || Box::new(shared.clone())))];
+    let mut times = [Vec::new(), Vec::new()];
     for sample in 0..=samples {
-        for (times, solver) in &mut runs {
-            let (system, solver) = (block.system(), solver());
+        let solvers: [Box<dyn LinearSolver<f64>>; 2] = [Box::new(Automatic), Box::new(shared.clone())];
+        for (times, solver) in times.iter_mut().zip(solvers) {
+            let system = block.system();
             let start = Instant::now();
             black_box(build(system, solver));
             // The first one analyzes.
@@ -66,7 +66,7 @@ fn blocks(cells: usize, samples: usize) {
     let start = Instant::now();
     (0..steps).for_each(|_| run.step().expect("a well-posed step"));
     let step = start.elapsed().as_secs_f64() / f64::from(steps);
-    let [alone, shared] = [0, 1].map(|k| median(&runs[k].0));
+    let [alone, shared] = times.map(|times| median(&times));
     println!(
         "{:<15} {:>6} {:>10.1} {:>12.0} {:>14.1} {:>16.0} {:>15.1}",
         format!("{cells}³"),
@@ -146,8 +146,9 @@ fn study(elements: usize, runs: usize, samples: usize) {
         .collect();
     let build = median(&builds);
     let mut simulation = study.build(study.system(), 1e-3);
-    let steps = 20_000;
-    let step = seconds(&mut || (0..steps).for_each(|_| simulation.step().expect("a well-posed step"))) / steps as f64;
+    let steps = 20_000_u32;
+    let step =
+        seconds(&mut || (0..steps).for_each(|_| simulation.step().expect("a well-posed step"))) / f64::from(steps);
     println!(
         "{elements:>9} {:>6} {:>7} {alone:>9.3} {shared:>9.3} {:>7.2} {same:>12} {:>9.2} {:>14.1} {:>12.1}",
         study.bars.dofs(),

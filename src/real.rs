@@ -1,7 +1,7 @@
 //! The scalar of a run, `f32` or `f64`, for which the kernels are compiled here, inside this crate.
 //!
 //! A host's debug build would compile generic loops without optimization. Functions instantiated here stay fast with
-//! `[profile.dev.package."*"] opt-level = 3`.
+//! `[profile.dev.package.contact-dynamics] opt-level = 3`.
 
 mod stored;
 

@@ -212,6 +212,14 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
+    /// Whether a row is at a place that was told by [`enter`](Self::enter), perhaps of another supernode.
+    fn is_row(&self, row: usize, place: usize) -> bool {
+        match place.checked_sub(self.columns.len()) {
+            None => self.columns.start + place == row,
+            Some(below) => self.pattern.get(below) == Some(&row),
+        }
+    }
+
     /// Brings A and the updates of all supernodes before into the columns of a tile.
     fn update(&self, tile: usize, own: &mut [T], workspace: &mut Workspace<T>) {
         let start = self.columns.start + tile * TILE;
@@ -237,15 +245,17 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
-    /// The lower triangle of A. (A is symmetric: its columns are read in place of its rows.)
+    /// The lower triangle of A. (A is symmetric: its columns are read in place of its rows. An entry that is zero to
+    /// rounding may have no partner across the diagonal, and then no place in the factor.)
     fn add_matrix(&self, columns: Range<usize>, own: &mut [T], place_of: &[usize]) {
         let a = self.problem.a;
         for (column, own) in columns.zip(own.chunks_exact_mut(self.height)) {
             let dof = self.problem.order.map_or(column, |(dofs, _)| dofs[column]);
             for (&row, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
                 let row = self.problem.order.map_or(row, |(_, columns)| columns[row]);
-                if row >= column {
-                    own[place_of[row]] += value;
+                let place = place_of[row];
+                if row >= column && self.is_row(row, place) {
+                    own[place] += value;
                 }
             }
         }

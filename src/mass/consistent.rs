@@ -441,7 +441,8 @@ mod tests {
                 left[dof] -= 1.0;
                 left[9] = 0.0;
                 assert!(x[9] == 0.0 && left.iter().all(|x| x.abs() < 4e-15), "{beside} {dof}");
-                assert_eq!(x[4 * 50] == 0.0, is_local, "{beside} {dof}");
+                // (Dof 9 is on the line of dof 1 and shields all behind it: M is a product of one along and one across.)
+                assert_eq!(x[4 * 50] == 0.0, is_local || dof == 1, "{beside} {dof}");
                 // The same alone, and among others.
                 assert_eq!(responses(&mut inverse, &[dof])[0], *x);
             }

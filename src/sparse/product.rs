@@ -290,14 +290,14 @@ mod tests {
     #[test]
     fn parts_of_a_large_matrix_add_up() {
         let band = |p: usize, q: usize| p - q < 14;
-        let a = matrix(&[3; 4500], band);
+        let a = matrix(&vec![3; 4500], band);
         let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
         let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
         assert!(parts.len() > 1 && parts.iter().all(|part| !part.sums.is_empty()));
         check(&a, &mut product);
 
-        let scattered = |p: usize| crate::sparse::scattered(p) as usize % 4500;
-        let far = matrix(&[3; 4500], |p, q| scattered(p).abs_diff(scattered(q)) < 14);
+        let scattered = |p: usize| crate::sparse::scattered(p) % 4500;
+        let far = matrix(&vec![3; 4500], |p, q| scattered(p).abs_diff(scattered(q)) < 14);
         let mut product = Product::new(far.as_ref(), Symmetry::Symmetric);
         let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
         assert!(parts.len() == 1 && far.val().len() > 4 * Supervariables::<f64>::GRAIN);

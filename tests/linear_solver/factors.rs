@@ -7,6 +7,7 @@ use contact_dynamics::{
     Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result, Tridiagonal,
 };
 use contact_dynamics_scenes::hosts::Uncondensed;
+use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, spring};
 
 /// A symmetric positive definite matrix with the given pairs as off-diagonal entries.
@@ -456,4 +457,30 @@ fn contact_at_the_ends_of_chains_costs_no_fill() {
     let a = tied::<f64>(n, &pairs, 0.1);
     let size = |last: &[usize]| LinearSolver::<f64>::analyze(&Automatic, a.symbolic(), last).unwrap().stored_values();
     assert_eq!(size(&[n / 2 - 1, n / 2]), size(&[]));
+}
+
+/// Assembly may leave an entry that is zero to rounding on one side of the diagonal alone: it is no part of the factor.
+#[test]
+fn entries_on_one_side_that_are_zero_to_rounding_change_nothing() {
+    let block = Solid::block([1.0; 3], [6; 3], Material { young: 1.0, poisson: 0.3, density: 1.0 });
+    let (k, n) = (block.stiffness::<f64>(), block.dofs());
+    let entries =
+        |j: usize| k.as_ref().row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)).map(move |(&i, &x)| (i, j, x));
+    let mut all: Vec<_> = (0..n).flat_map(entries).chain((0..n).map(|i| (i, i, 1.0))).collect();
+    let assembled = matrix(n, all.clone());
+    // Far from all others, below the diagonal and above it.
+    all.extend((0..n).map(|i| (i, (i * 7 + 331) % n, 1e-20)));
+    let strewn = matrix(n, all);
+    assert!(strewn.val().len() > assembled.val().len());
+    for last in [vec![], (0..60).collect::<Vec<_>>()] {
+        let solution = |a: &SparseColMat<usize, f64>| {
+            let mut factor: Box<dyn Factorization<f64>> = Cholesky::default().analyze(a.symbolic(), &last).unwrap();
+            factor.factorize(a.as_ref()).unwrap();
+            let mut x: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).sin()).collect();
+            factor.solve(&mut x).unwrap();
+            x
+        };
+        let (x, y) = (solution(&assembled), solution(&strewn));
+        assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12), "{} last", last.len());
+    }
 }
