@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_cube_is_cut_into_halves_by_a_plane() {
-        for side in [9, 12, 15] {
+        for side in [9, 12, 15, 24] {
             let (n, pairs) = cube(side);
             let mut graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
             graph.weigh_edges();
