@@ -13,7 +13,6 @@ use contact_dynamics::{
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing;
 use std::hint::black_box;
-use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 const COURANT: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
@@ -91,18 +90,6 @@ fn effective(block: &Solid<3>, h: f64) -> SparseColMat<usize, f64> {
     timing::effective(&block.stiffness(), &block.lumped_mass(), &Composite, h)
 }
 
-/// Milliseconds, the best of some: on a shared machine what is least disturbed.
-fn clock(samples: usize, mut work: impl FnMut()) -> f64 {
-    let times = (0..=samples)
-        .map(|_| {
-            let start = Instant::now();
-            work();
-            start.elapsed().as_secs_f64() * 1e3
-        })
-        .skip(1);
-    times.fold(f64::INFINITY, f64::min)
-}
-
 /// Milliseconds of factorization and solve, iterations and millions of scalars.
 struct Cost {
     factor: f64,
@@ -113,7 +100,8 @@ struct Cost {
 
 fn cost(solver: &dyn LinearSolver<f64>, a: &SparseColMat<usize, f64>, samples: usize) -> Cost {
     let mut factor: Box<dyn Factorization<f64>> = solver.analyze(a.symbolic(), &[]).expect("memory");
-    let factorize = clock(samples.min(3), || factor.factorize(a.as_ref()).expect("positive definite"));
+    let factorize =
+        timing::best_milliseconds(samples.min(3), || factor.factorize(a.as_ref()).expect("positive definite"));
     // All frequencies alike, as impacts leave them.
     let mut seed = 1_u64;
     let mut noise = || {
@@ -122,7 +110,7 @@ fn cost(solver: &dyn LinearSolver<f64>, a: &SparseColMat<usize, f64>, samples: u
     };
     let b: Vec<f64> = (0..a.ncols()).map(|_| noise()).collect();
     let mut x = b.clone();
-    let solve = clock(samples, || {
+    let solve = timing::best_milliseconds(samples, || {
         x.copy_from_slice(&b);
         factor.solve(&mut x).expect("positive definite");
         black_box(&x);

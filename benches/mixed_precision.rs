@@ -7,7 +7,6 @@ use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{Automatic, Composite, Factorization, LinearSolver, LinearSystem, System};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments};
-use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 
@@ -38,8 +37,8 @@ fn compare(cells: usize, courant: f64, samples: usize) {
     };
     let mut exact: Box<dyn Factorization<f64>> = Automatic.analyze(a.symbolic(), &[]).expect("memory");
     let mut coarse: Box<dyn Factorization<f32>> = Automatic.analyze(a.symbolic(), &[]).expect("memory");
-    let of_f64 = clock(samples, || exact.factorize(a.as_ref()).expect("positive definite"));
-    let of_f32 = clock(samples, || coarse.factorize(rounded.as_ref()).expect("positive definite"));
+    let of_f64 = timing::best_milliseconds(samples, || exact.factorize(a.as_ref()).expect("positive definite"));
+    let of_f32 = timing::best_milliseconds(samples, || coarse.factorize(rounded.as_ref()).expect("positive definite"));
 
     let n = a.nrows();
     let b: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).sin()).collect();
@@ -55,7 +54,7 @@ fn compare(cells: usize, courant: f64, samples: usize) {
     };
 
     let (mut x, mut r) = (b.clone(), vec![0.0; n]);
-    let solve = clock(samples, || {
+    let solve = timing::best_milliseconds(samples, || {
         x.copy_from_slice(&b);
         exact.solve(&mut x).expect("a direct solve");
     });
@@ -78,21 +77,11 @@ fn compare(cells: usize, courant: f64, samples: usize) {
     let mut residuals = Vec::new();
     refine(6, &mut residuals);
     let sweeps = 1 + residuals.iter().position(|&residual| residual <= 2.0 * reached).unwrap_or(residuals.len() - 1);
-    let refined = clock(samples, || refine(sweeps, &mut residuals));
+    let refined = timing::best_milliseconds(samples, || refine(sweeps, &mut residuals));
     let listed: Vec<String> = residuals.iter().map(|residual| format!("{residual:.0e}")).collect();
     println!(
         "{:>5} {courant:>9} {of_f64:>12.1} {of_f32:>12.1} {solve:>12.3} {refined:>12.3} {sweeps:>7} {reached:>16.0e} {}",
         format!("{cells}³"),
         listed.join(" ")
     );
-}
-
-/// Milliseconds, the best of some: on a shared machine what is least disturbed.
-fn clock(samples: usize, mut work: impl FnMut()) -> f64 {
-    let time = |_| {
-        let start = Instant::now();
-        work();
-        start.elapsed().as_secs_f64() * 1e3
-    };
-    (0..=samples).map(time).skip(1).fold(f64::INFINITY, f64::min)
 }

@@ -140,6 +140,13 @@ pub(crate) fn scattered(index: usize) -> u64 {
     x ^ (x >> 31)
 }
 
+/// The same between ½ and 1 in size, with either sign: a vector of these has a part of every other one.
+pub(crate) fn scattered_signed(index: usize) -> f64 {
+    let number = scattered(index);
+    let size = 0.5 + (number >> 12) as f64 / (1_u64 << 53) as f64;
+    if number & 1 == 0 { size } else { -size }
+}
+
 /// Entry (row, column), zero if it is not stored.
 pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, column: usize) -> T {
     let rows = a.row_idx_of_col_raw(column);

@@ -135,9 +135,7 @@ impl<T: Real> ConsistentInverse<T> {
     /// to the next (the residual polynomial is 1 at zero and has positive roots), and of one with none it stays.
     fn is_definite(&mut self) -> bool {
         for (k, (x, &scaling)) in self.response.iter_mut().zip(&self.scaling).enumerate() {
-            let number = sparse::scattered(k);
-            let size = 0.5 + (number >> 12) as f64 / (1_u64 << 53) as f64;
-            *x = T::of(if number & 1 == 0 { size } else { -size }) / scaling;
+            *x = T::of(sparse::scattered_signed(k)) / scaling;
         }
         let all = self.response.len();
         let outcome = self.iterate(all, TRIAL.0, TRIAL.1.max(T::epsilon().value().sqrt()));

@@ -250,9 +250,7 @@ impl<T: Real> Lanczos<T> {
         // q: the vector; old: M times the one before; image: K q, then M times the next; next: M⁻¹ of that.
         next.copy_from_slice(start);
         for (dof, x) in next.iter_mut().enumerate() {
-            let number = sparse::scattered(dof);
-            let size = 0.5 + (number >> 12) as f64 / (1_u64 << 53) as f64;
-            *x *= T::of(if number & 1 == 0 { size } else { -size });
+            *x *= T::of(sparse::scattered_signed(dof));
         }
         if let InverseMass::Consistent(inverse) = inverse {
             for &dof in inverse.fixed() {

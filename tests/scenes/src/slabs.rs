@@ -143,12 +143,9 @@ impl Slab {
     ///
     /// Those of the builder.
     pub fn preset(&self, preset: Preset, h: f64, gap: f64) -> Result<Simulation<'static, f64>> {
-        let size = self.length / self.elements as f64;
-        let m = matrix(self.dofs(), self.entries([[self.density * size / 3.0, self.density * size / 6.0]; 2]));
-        let k = matrix(self.dofs(), self.stiffness());
+        let Body { consistent: m, stiffness: k, contact, groups, .. } = self.body();
         let courant = mass::courant(Mass::Consistent(m.as_ref()), k.as_ref(), h)?[0];
-        let groups: Vec<_> = (0..self.dofs()).map(|dof| dof % 2).collect();
-        let m = preset.mass(m.as_ref(), k.symbolic(), &[0, 1], &groups, courant)?;
+        let m = preset.mass(m.as_ref(), k.symbolic(), &contact, &groups, courant)?;
         let system = LinearSystem::new(m, k)?;
         self.scene(system, preset.integrator(), h, gap).correctors(preset.correctors()).build()
     }

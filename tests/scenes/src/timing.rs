@@ -162,6 +162,16 @@ impl<'a> Table<'a> {
     }
 }
 
+/// Milliseconds, the best of so many calls after a first one: on a shared machine what is least disturbed.
+pub fn best_milliseconds(samples: usize, mut work: impl FnMut()) -> f64 {
+    let time = |_| {
+        let start = Instant::now();
+        work();
+        start.elapsed().as_secs_f64() * 1e3
+    };
+    (0..=samples).map(time).skip(1).fold(f64::INFINITY, f64::min)
+}
+
 /// The median.
 pub fn median(samples: &[f64]) -> f64 {
     let mut sorted = samples.to_vec();

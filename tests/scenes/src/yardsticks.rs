@@ -100,13 +100,8 @@ pub fn composite_by_hand<T: Real>(bars: &Bars, h: f64) -> impl FnMut() + 'static
     let mass = bars.lumped_mass::<T>();
     let zero = T::zero();
     let (diagonal, beside) = tridiagonal::<T>(bars);
-    // L D Lᵀ of 5/2 M/h² + K.
     let inertia = T::of(2.5 / (h * h));
-    let (mut lower, mut inverse) = (vec![zero; dofs], vec![zero; dofs]);
-    for i in 0..dofs {
-        let pivot = inertia * mass[i] + diagonal[i] - if i > 0 { lower[i - 1] * beside[i - 1] } else { zero };
-        (inverse[i], lower[i]) = (pivot.recip(), beside[i] / pivot);
-    }
+    let [lower, inverse] = factorize(inertia, &mass, &diagonal, &beside);
     let still = || vec![zero; dofs];
     let (mut u, mut u1, mut v, mut v1, mut x, mut a) = (still(), still(), still(), still(), still(), still());
     u.iter_mut().enumerate().for_each(|(i, u)| *u = T::of(1e-3 * (0.1 * i as f64).sin()));
@@ -192,11 +187,7 @@ impl<T: Real> NewmarkByHand<T> {
         let mass = bars.lumped_mass::<T>();
         let zero = T::zero();
         let inertia = T::of(4.0 / (h * h));
-        let (mut lower, mut inverse) = (vec![zero; dofs], vec![zero; dofs]);
-        for i in 0..dofs {
-            let pivot = inertia * mass[i] + diagonal[i] - if i > 0 { lower[i - 1] * beside[i - 1] } else { zero };
-            (inverse[i], lower[i]) = (pivot.recip(), beside[i] / pivot);
-        }
+        let [lower, inverse] = factorize(inertia, &mass, &diagonal, &beside);
         let mut load = vec![zero; dofs];
         (load[0], load[dofs - 1]) = (T::one(), -T::one());
         let mut response = vec![zero; dofs];
@@ -290,6 +281,18 @@ impl<T: Real> NewmarkByHand<T> {
             }
         }
     }
+}
+
+/// L D Lᵀ of `inertia` M + K: the entries of L below the diagonal, and 1/D.
+fn factorize<T: Real>(inertia: T, mass: &[T], diagonal: &[T], beside: &[T]) -> [Vec<T>; 2] {
+    let [mut lower, mut inverse] = [(); 2].map(|()| vec![T::zero(); mass.len()]);
+    let mut above = T::zero();
+    for i in 0..mass.len() {
+        let pivot = inertia * mass[i] + diagonal[i] - above;
+        (inverse[i], lower[i]) = (pivot.recip(), beside[i] / pivot);
+        above = lower[i] * beside[i];
+    }
+    [lower, inverse]
 }
 
 /// The diagonal of K and the entries beside it, the last one a zero.
