@@ -4,7 +4,7 @@
 //! `cargo bench --bench solids -- [elements a side]…` (default blocks of 10 and 20 after the plate of 300 × 300; 30
 //! takes four minutes, 40 a quarter of an hour and 8 GB)
 
-use contact_dynamics::{CentralDifference, Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
+use contact_dynamics::{CentralDifference, Cholesky, Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
 use contact_dynamics_scenes::yardsticks;
@@ -15,6 +15,7 @@ const RATIOS: &[Ratio] = &[
     Ratio { heading: "/ bare solve", to: &["bare solve, free"] },
     Ratio { heading: "/ (solve + K)", to: &["bare solve, free", "bare K product"] },
     Ratio { heading: "/ reading twice", to: &["reading the factor twice"] },
+    Ratio { heading: "/ its entries", to: &["reading its entries twice"] },
     Ratio { heading: "/ K by rows", to: &["K product by compressed rows"] },
     Ratio { heading: "/ by arrays", to: &["explicit step by arrays"] },
 ];
@@ -53,7 +54,13 @@ fn table<T: Real, const D: usize>(name: &str, solid: &Solid<D>, h: f64, argument
     let millions = |scalars: usize| scalars as f64 / 1e6;
     table.reference(format!("bare solve, free order ({:.1} M)", millions(stored)), timing::solve(factor, solid.dofs()));
     table.reference("bare K product", timing::force(solid.system::<T>()));
+    let order = Cholesky::default().order(a.symbolic(), &[]).expect("memory");
+    let entries = yardsticks::entries_of_factor(a.symbolic(), &order);
     table.reference("reading the factor twice", yardsticks::reading::<T>(stored));
+    table.reference(
+        format!("reading its entries twice ({:.1} M)", millions(entries)),
+        yardsticks::reading::<T>(entries),
+    );
     table.reference("K product by compressed rows", yardsticks::gather(&k));
     table.reference("explicit step by arrays", yardsticks::explicit_by_arrays(&k, &mass, 0.1 * h));
     table.row("central differences", explicit::<T, D>(solid, 0.1 * h));

@@ -79,8 +79,9 @@ impl<W> PerThread<W> {
     }
 }
 
+/// Threads of the current pool.
 #[cfg(feature = "rayon")]
-fn count() -> usize {
+pub(crate) fn count() -> usize {
     rayon::current_num_threads()
 }
 
@@ -89,8 +90,9 @@ fn index() -> usize {
     rayon::current_thread_index().unwrap_or(0)
 }
 
+/// Threads of the current pool.
 #[cfg(not(feature = "rayon"))]
-fn count() -> usize {
+pub(crate) fn count() -> usize {
     1
 }
 

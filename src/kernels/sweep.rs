@@ -4,19 +4,26 @@
 //! eighth as often. The inner loops are functions of their own, compiled for the vector units of the machine that they
 //! run on. (Inlined into larger functions, they are not always vectorized.)
 //!
-//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`; the
-//! columns behind it are swept on one thread.
+//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`, which
+//! also share out large supernodes.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
 use super::cholesky::{Columns, Supernodal, supernodes};
 use super::forest::Forest;
 use super::plan::Plan;
 use crate::scalar::Scalar;
+use crate::threads::{self, GRAIN, Threads};
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
 /// Partial sums of a dot product.
 const LANES: usize = 8;
+
+/// Columns of a heavy panel that are swept before threads share out what lies below them; the fewest rows that are worth
+/// a share forward, and columns of a share backward. (Multiples of eight: groups of columns are the same in all parts.)
+const BLOCK: usize = 128;
+const ROWS: usize = 256;
+const SHARE: usize = 16;
 
 /// A factor and its forest.
 #[derive(Debug)]
@@ -174,27 +181,93 @@ impl<'a, T> Panel<'a, T> {
 impl<T: Scalar> Panel<'_, T> {
     /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
     fn forward(&self, arch: Arch, w: &mut [T]) {
-        let [eights, fours] = self.groups();
-        (0..eights).step_by(8).for_each(|column| self.eliminate::<8>(arch, column, w));
-        (eights..fours).step_by(4).for_each(|column| self.eliminate::<4>(arch, column, w));
-        (fours..self.size).for_each(|column| self.eliminate::<1>(arch, column, w));
+        let threads = if self.is_heavy() { threads::count() } else { 1 };
+        if threads == 1 {
+            return self.eliminate(arch, 0..self.size, w);
+        }
+        // Each row has the same sum, whatever the blocks and shares.
+        for columns in parts(&(0..self.size), BLOCK) {
+            let (done, below) = w.split_at_mut(columns.end);
+            self.eliminate(arch, columns.clone(), done);
+            let share = below.len().div_ceil(threads).max(ROWS);
+            threads::each_chunk(Threads::All, below, share, &|chunk, y| {
+                self.subtract(arch, columns.clone(), done, columns.end + chunk * share, y);
+            });
+        }
     }
 
     /// Solves for the columns: `w` has their right-hand sides, then the solution on the rows below.
     fn backward(&self, arch: Arch, w: &mut [T]) {
-        let [eights, fours] = self.groups();
-        (fours..self.size).rev().for_each(|column| self.substitute::<1>(arch, column, w));
-        (eights..fours).rev().step_by(4).for_each(|last| self.substitute::<4>(arch, last - 3, w));
-        (0..eights).rev().step_by(8).for_each(|last| self.substitute::<8>(arch, last - 7, w));
+        if !self.is_heavy() {
+            return self.substitute(arch, 0..self.size, w);
+        }
+        // The sums of each column end with the block that it is in, with one thread as well; this one goes from group
+        // to group, to read memory in its order.
+        let width = if threads::count() == 1 { 8 } else { BLOCK };
+        let mut sums = [T::zero(); BLOCK];
+        for block in parts(&(0..self.size), BLOCK).rev() {
+            let (own, known) = w.split_at_mut(block.end);
+            for columns in parts(&block, width).rev() {
+                let sums = &mut sums[..columns.len()];
+                threads::each_chunk(Threads::All, sums, SHARE, &|chunk, sums| {
+                    self.dots(arch, columns.start + chunk * SHARE, block.end, known, sums);
+                });
+                own[columns.clone()].iter_mut().zip(sums).for_each(|(x, sum)| *x -= *sum);
+                self.substitute(arch, columns, own);
+            }
+        }
     }
 
-    /// The ends of the columns that are processed by eights, and by fours.
-    fn groups(&self) -> [usize; 2] {
-        [self.size - self.size % 8, self.size - self.size % 4]
+    /// Whether the panel is worth more than one thread.
+    fn is_heavy(&self) -> bool {
+        self.rows * self.size >= GRAIN
+    }
+
+    /// Eliminates some columns from `w`, which may end above the last row.
+    fn eliminate(&self, arch: Arch, columns: Range<usize>, w: &mut [T]) {
+        let [eights, fours] = groups(&columns);
+        (columns.start..eights).step_by(8).for_each(|column| self.eliminate_group::<8>(arch, column, w));
+        (eights..fours).step_by(4).for_each(|column| self.eliminate_group::<4>(arch, column, w));
+        (fours..columns.end).for_each(|column| self.eliminate_group::<1>(arch, column, w));
+    }
+
+    /// Solves for some columns with `w`, which may end above the last row.
+    fn substitute(&self, arch: Arch, columns: Range<usize>, w: &mut [T]) {
+        let [eights, fours] = groups(&columns);
+        (fours..columns.end).rev().for_each(|column| self.substitute_group::<1>(arch, column, w));
+        (eights..fours).rev().step_by(4).for_each(|last| self.substitute_group::<4>(arch, last - 3, w));
+        (columns.start..eights).rev().step_by(8).for_each(|last| self.substitute_group::<8>(arch, last - 7, w));
+    }
+
+    /// Subtracts the eliminated columns, whose unknowns are in `x`, from the rows `y` that begin at row `from`.
+    fn subtract(&self, arch: Arch, columns: Range<usize>, x: &[T], from: usize, y: &mut [T]) {
+        let [eights, fours] = groups(&columns);
+        (columns.start..eights).step_by(8).for_each(|column| self.subtract_group::<8>(arch, column, x, from, y));
+        (eights..fours).step_by(4).for_each(|column| self.subtract_group::<4>(arch, column, x, from, y));
+        (fours..columns.end).for_each(|column| self.subtract_group::<1>(arch, column, x, from, y));
+    }
+
+    /// Products of the columns from `first` on, one for each of the `sums`, and the solution `x` on the rows from `from`
+    /// on.
+    fn dots(&self, arch: Arch, first: usize, from: usize, x: &[T], sums: &mut [T]) {
+        let mut column = first;
+        let (eights, rest) = sums.as_chunks_mut();
+        for sums in eights {
+            *sums = self.dots_group::<8>(arch, column, from, x);
+            column += 8;
+        }
+        let (fours, rest) = rest.as_chunks_mut();
+        for sums in fours {
+            *sums = self.dots_group::<4>(arch, column, from, x);
+            column += 4;
+        }
+        for (sum, column) in rest.iter_mut().zip(column..) {
+            [*sum] = self.dots_group::<1>(arch, column, from, x);
+        }
     }
 
     /// Eliminates N columns: the small triangle, column by column, then the rows below it.
-    fn eliminate<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
+    fn eliminate_group<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
         let behind = column + N;
         for j in column..behind {
             let l = self.column(j, j);
@@ -205,15 +278,19 @@ impl<T: Scalar> Panel<'_, T> {
             }
         }
         let (done, y) = w.split_at_mut(behind);
-        let l = std::array::from_fn(|k| self.column(column + k, behind));
-        arch.dispatch(Subtract::<T, N> { c: std::array::from_fn(|k| done[column + k]), l, y });
+        self.subtract_group::<N>(arch, column, done, behind, y);
+    }
+
+    #[inline]
+    fn subtract_group<const N: usize>(&self, arch: Arch, column: usize, x: &[T], from: usize, y: &mut [T]) {
+        let l = std::array::from_fn(|k| self.column(column + k, from));
+        arch.dispatch(Subtract::<T, N> { c: std::array::from_fn(|k| x[column + k]), l, y });
     }
 
     /// Solves for N columns.
-    fn substitute<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
+    fn substitute_group<const N: usize>(&self, arch: Arch, column: usize, w: &mut [T]) {
         let behind = column + N;
-        let l = std::array::from_fn(|k| self.column(column + k, behind));
-        let sums = arch.dispatch(Dots::<T, N> { l, x: &w[behind..] });
+        let sums = self.dots_group::<N>(arch, column, behind, &w[behind..]);
         for (j, dot) in (column..behind).zip(sums).rev() {
             let l = self.column(j, j);
             let mut sum = w[j] - dot;
@@ -223,6 +300,23 @@ impl<T: Scalar> Panel<'_, T> {
             w[j] = sum / l[0];
         }
     }
+
+    #[inline]
+    fn dots_group<const N: usize>(&self, arch: Arch, column: usize, from: usize, x: &[T]) -> [T; N] {
+        let l = std::array::from_fn(|k| self.column(column + k, from));
+        arch.dispatch(Dots::<T, N> { l, x })
+    }
+}
+
+/// A range in parts of so many columns; the last one may have fewer.
+fn parts(columns: &Range<usize>, width: usize) -> impl DoubleEndedIterator<Item = Range<usize>> + use<> {
+    let Range { start, end } = *columns;
+    (0..columns.len().div_ceil(width)).map(move |part| start + part * width..(start + (part + 1) * width).min(end))
+}
+
+/// The ends of the columns that are processed by eights, and by fours.
+fn groups(columns: &Range<usize>) -> [usize; 2] {
+    [columns.end - columns.len() % 8, columns.end - columns.len() % 4]
 }
 
 /// Forward over `columns` for one right-hand side.

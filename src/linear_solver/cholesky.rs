@@ -121,6 +121,36 @@ impl Cholesky {
         check_analysis(pattern, last)?;
         Ok(self.symbolic(pattern, last)?.len_val())
     }
+
+    /// The order in which the dofs of a pattern are eliminated, `last` (ascending) behind the others: the first entry
+    /// names the dof eliminated first. To keep with a model: by [`Ordering::Given`] a later run finds it without a
+    /// search, and its factor is the same.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::Cholesky;
+    /// use contact_dynamics::linear_solver::Ordering;
+    ///
+    /// // A star: its center last, so that nothing fills in.
+    /// let entries: Vec<_> = (0..5).flat_map(|i| [(i, i, 2.0), (i, 5, -1.0), (5, i, -1.0)]).collect();
+    /// let entries: Vec<_> = entries.into_iter().chain([(5, 5, 9.0)]).map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+    /// let star = SparseColMat::<usize, f64>::try_new_from_triplets(6, 6, &entries)?;
+    /// let order = Cholesky::default().order(star.symbolic(), &[])?;
+    /// assert!(order[4..].contains(&5)); // with the last arm of the star it is as good
+    ///
+    /// let kept = Cholesky::ordered(Ordering::Given(order.clone()));
+    /// assert_eq!(kept.order(star.symbolic(), &[])?, order);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`estimate`](Self::estimate).
+    pub fn order(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<Vec<usize>> {
+        check_analysis(pattern, last)?;
+        let symbolic = self.symbolic(pattern, last)?;
+        Ok(symbolic.perm().map_or_else(|| (0..pattern.nrows()).collect(), |perm| perm.arrays().0.to_vec()))
+    }
 }
 
 struct Factor<T: Real> {

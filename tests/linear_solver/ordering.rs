@@ -301,3 +301,25 @@ fn whole_surfaces_may_be_candidates() {
         assert!(difference < 1e-9, "{difference:e}");
     }
 }
+
+#[test]
+fn an_order_that_was_kept_gives_the_same_factor() {
+    let block = block(7);
+    let plate = Solid::rectangle([1.0; 2], [12; 2], MATERIAL);
+    let chain = tied(40, (1..40).map(|i| (i - 1, i)));
+    let scenes = [(of_solid(&block), face(&block)), (of_solid(&plate), face(&plate)), (chain, vec![17])];
+    for (a, face) in &scenes {
+        for last in [&[], &face[..]] {
+            let order = Cholesky::default().order(a.symbolic(), last).unwrap();
+            assert_eq!(order.iter().copied().collect::<std::collections::BTreeSet<_>>().len(), a.nrows());
+            assert!(order[a.nrows() - last.len()..].iter().all(|dof| last.contains(dof)));
+            let solution = |order: Ordering| {
+                let mut x: Vec<f64> = (0..a.nrows()).map(|i| (i as f64 * 0.7).sin()).collect();
+                let mut factor = factor(order, a, last);
+                factor.solve(&mut x).unwrap();
+                (x, factor.stored_values())
+            };
+            assert_eq!(solution(Ordering::Given(order)), solution(Ordering::Automatic), "{} dofs", a.nrows());
+        }
+    }
+}

@@ -3,13 +3,32 @@
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
 
 use crate::Bars;
-use contact_dynamics::faer::sparse::SparseColMat;
+use contact_dynamics::faer::Side;
+use contact_dynamics::faer::perm::PermRef;
+use contact_dynamics::faer::sparse::linalg::SupernodalThreshold;
+use contact_dynamics::faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::faer::traits::pulp::{Arch, Simd, WithSimd};
 use contact_dynamics::{Mass, Real, System};
 use std::hint::black_box;
 
-/// Reads so many numbers from memory, twice: what a solve would take that does nothing else. (Upper halves of blocks
-/// are stored in a factor, and need not be read.)
+/// Entries of the Cholesky factor of a pattern in this order of elimination, those on the diagonal included. (A factor
+/// in blocks stores more: their upper halves, and zeros where columns are much alike.)
+pub fn entries_of_factor(pattern: SymbolicSparseColMatRef<'_, usize>, order: &[usize]) -> usize {
+    let mut inverse = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(place, &dof)| inverse[dof] = place);
+    let order = SymmetricOrdering::Custom(PermRef::new_checked(order, &inverse, order.len()));
+    let parameters = CholeskySymbolicParams {
+        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
+        ..Default::default()
+    };
+    let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, order, parameters).expect("memory");
+    symbolic.len_val()
+}
+
+/// Reads so many numbers from memory, twice: what a solve would take that does nothing else.
 pub fn reading<T: Real>(scalars: usize) -> impl FnMut() {
     let numbers = vec![T::one(); scalars];
     move || {
@@ -311,6 +330,15 @@ fn tridiagonal<T: Real>(bars: &Bars) -> (Vec<T>, Vec<T>) {
 mod tests {
     use super::*;
     use contact_dynamics::{LinearRows, Newmark, PersistencyCorrection, Simulation};
+
+    /// An arrow fills in completely if its tip comes first, and not at all if it comes last.
+    #[test]
+    fn entries_of_a_factor_are_counted_in_the_order_given() {
+        let arms = (1..6).flat_map(|i| [(i, i, 2.0), (0, i, -1.0), (i, 0, -1.0)]);
+        let arrow = crate::sparse::matrix::<f64>(6, arms.chain([(0, 0, 9.0)]));
+        assert_eq!(entries_of_factor(arrow.symbolic(), &[0, 1, 2, 3, 4, 5]), 21);
+        assert_eq!(entries_of_factor(arrow.symbolic(), &[5, 4, 3, 2, 1, 0]), 11);
+    }
 
     /// What is measured against must do the same.
     #[test]
