@@ -14,8 +14,12 @@ use integrals::Integrals;
 use pairs::Pairs;
 use rows::Rows;
 
-/// Share of the reach above which a row that has lost its surroundings is open.
+/// Share of the reach above which a row that nothing lies over any more is open.
 const OPEN: f64 = 0.01;
+
+/// Share of the smallest facet that surfaces may have moved against each other since the search where such a row goes on
+/// as it was: what slides off the rim ends its step.
+const BEYOND: f64 = 0.25;
 
 /// Contact of two deforming surfaces whose nodes need not match: gaps weighted over the facets of one surface, the
 /// slave, against those of the other, the master. Segments in two dimensions, triangles and bilinear quadrilaterals in
@@ -46,7 +50,9 @@ const OPEN: f64 = 0.01;
 ///
 /// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
 /// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are found by differences. What is close
-/// enough is found by boxes around the facets, as far as velocities take them; a step in which a facet has gone into or
+/// enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
+/// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the search
+/// it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
 /// through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a smaller step
 /// mends). Geometry is computed in `f64` in every run.
 ///
@@ -93,6 +99,8 @@ pub struct Mortar<T: Real> {
     pairs: Pairs,
     /// Positions when the lists of pairs were built, by node.
     built_at: Vec<Point>,
+    /// Positions at the last search, by body and place of the node there.
+    searched_at: [Vec<Point>; 2],
     integrals: Integrals,
     rows: Rows<T>,
     /// What the search under way finds.
@@ -137,6 +145,7 @@ impl<T: Real> Mortar<T> {
             skin: None,
             pairs: Pairs::default(),
             built_at: Vec::new(),
+            searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
             rows: Rows::new(),
             found: Rows::new(),
@@ -210,6 +219,15 @@ impl<T: Real> Mortar<T> {
         one.spread(&other)
     }
 
+    /// How far they have moved against each other since the last search.
+    fn moved_since_search(&self) -> f64 {
+        let [one, other] = [0, 1].map(|body| {
+            let moved = |(&node, &before): (&usize, &Point)| sub(self.nodes.positions[node], before);
+            Bounds::of_points(self.bodies[body].iter().zip(&self.searched_at[body]).map(moved))
+        });
+        one.farthest(&other)
+    }
+
     /// Pairs of facets within `range`, of those that the surfaces make now.
     fn find_pairs(&mut self, range: f64) {
         let surfaces = [&self.slave, &self.master];
@@ -252,6 +270,10 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let speeds =
             [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
         let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+        for (places, body) in self.searched_at.iter_mut().zip(&self.bodies) {
+            places.clear();
+            places.extend(body.iter().map(|&node| self.nodes.positions[node]));
+        }
         self.found.clear();
         self.pairs.clear();
         if boxes[0].inflated(range).intersects(&boxes[1]) {
@@ -275,14 +297,15 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         }
         self.integrate();
         self.found.clear();
-        let count = self.tangents();
+        let (count, moved) = (self.tangents(), self.moved_since_search());
+        let near = moved <= BEYOND * self.slave.finest().min(self.master.finest());
         let Self { rows, found, integrals, nodes, slave, reach, .. } = self;
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, nodes, count > 0, u) {
                 continue;
             }
-            // Nothing lies over it any more. What is open stays so.
-            if rows.affine.gap(row, u).value() <= OPEN * *reach {
+            // Nothing lies over it any more. What is open stays so, and what has just gone over the rim ends its step.
+            if !near && rows.affine.gap(row, u).value() <= OPEN * *reach {
                 let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
                 return Err(Error::ContactLost { t, contact });
             }

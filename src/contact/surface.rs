@@ -206,6 +206,11 @@ impl Surface {
         self.nodes.partition_point(|&other| other < node)
     }
 
+    /// The sides of a facet where the surface ends.
+    pub(crate) fn open_sides(&self, facet: usize) -> [bool; 4] {
+        self.rims[facet].sides
+    }
+
     /// The closest point of a facet, with the shape of the facet.
     pub(crate) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
         self.project_beyond(facet, p, RIM, positions)

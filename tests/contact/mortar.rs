@@ -57,21 +57,24 @@ fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
 #[test]
 fn rows_are_the_derivatives_of_gaps() {
     for seed in 1..6 {
-        // The slave is the smaller one: nothing is covered in part.
-        let [below, above] = plates(5, 3);
-        let above = above.mapped(|[x, y]| [0.1 + 0.8 * x, y]);
-        let stack = Stack::new([below, above], 0.1, |x| x);
-        let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
-        let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-        assert!(error.rows == 4 && error.rows_lost == 0 && error.jacobian < 1e-8, "{error:?}");
+        // The slave on the inside of the master, and beyond its rim.
+        for shift in [0.0, 0.35] {
+            let [below, above] = plates(5, 3);
+            let above = above.mapped(|[x, y]| [0.1 + shift + 0.8 * x, y]);
+            let stack = Stack::new([below, above], 0.1, |x| x);
+            let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
+            let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            // (One may be beyond.)
+            assert!(error.rows >= 3 && error.rows_lost == 0 && error.jacobian < 1e-8, "{error:?}");
 
-        let [below, above] = blocks([4, 3, 1], [2, 2, 1]);
-        let above = above.mapped(|[x, y, z]| [0.15 + 0.7 * x, 0.15 + 0.7 * y, z]);
-        let stack = Stack::new([below, above], 0.1, |x| x);
-        let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
-        let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-        // (Warped facets, and shape functions that are no polynomials in the plane: quadrature.)
-        assert!(error.rows == 9 && error.rows_lost == 0 && error.jacobian < 1e-3, "{error:?}");
+            let [below, above] = blocks([4, 3, 1], [2, 2, 1]);
+            let above = above.mapped(|[x, y, z]| [0.15 + shift + 0.7 * x, 0.15 + 0.5 * shift + 0.7 * y, z]);
+            let stack = Stack::new([below, above], 0.1, |x| x);
+            let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
+            let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature.)
+            assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-3, "{error:?}");
+        }
     }
 }
 
@@ -184,6 +187,46 @@ fn what_is_covered_in_part_has_gaps_of_full_size() {
         assert!(gaps.iter().all(|gap| (gap - 0.05).abs() < 1e-12), "{gaps:?}");
         let covered: f64 = (0..gaps.len()).map(|row| contact.area(row)).sum();
         assert!((covered / (1.0 - overhang) - 1.0).abs() < 1e-3, "{covered}");
+    }
+}
+
+#[test]
+fn a_block_slides_off_the_edge_of_another() {
+    let material = Material { young: 1e4, ..MATERIAL };
+    let below = Solid::rectangle([1.0; 2], [4, 2], material);
+    let above = Solid::rectangle([0.6, 1.0], [3, 3], material).moved([0.3, 0.0]);
+    for upper in [true, false] {
+        let stack = Stack::new([below.clone(), above.clone()], 0.0, |x| x);
+        let mass = stack.solid.lumped_mass::<f64>();
+        let heavy = mass.clone();
+        let mut system = stack.solid.system::<f64>().load(move |_, f| {
+            f.iter_mut().zip(&mass).skip(1).step_by(2).for_each(|(f, m)| *f = -m);
+        });
+        for node in (0..stack.split).filter(|&node| stack.solid.nodes[node][1] < 0.75) {
+            system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
+        }
+        let v = (0..stack.solid.dofs()).map(|dof| if dof >= 2 * stack.split && dof % 2 == 0 { 1.0 } else { 0.0 });
+        let mut run = Simulation::builder(system, Composite, 2e-3)
+            .velocity(v.collect())
+            .constraint(mortar(&stack, upper))
+            .step_control(StepControl::halving(1e-5).unwrap())
+            .build()
+            .unwrap();
+        let last = 2 * (stack.solid.nodes.len() - 1);
+        let (energy, weight) = (run.energy().total(), 0.6);
+        let mut forces = Vec::new();
+        while run.time() < 0.9 {
+            run.step().unwrap();
+            let sunk =
+                run.state().displacement().iter().zip(&heavy).skip(1).step_by(2).map(|(u, m)| m * u).sum::<f64>();
+            let total = run.energy().total() + sunk;
+            assert!(total < energy + 1e-4 * weight, "t = {}: {total} {energy}", run.time());
+            forces.push(run.state().contacts().forces().iter().sum::<f64>());
+        }
+        // First it is borne, then it tips and falls.
+        let mean = forces[..100].iter().sum::<f64>() / 100.0;
+        assert!((mean / weight - 1.0).abs() < 0.1 && forces[forces.len() - 1] == 0.0, "{mean}");
+        assert!(run.state().displacement()[last] > 0.7, "{}", run.state().displacement()[last]);
     }
 }
 

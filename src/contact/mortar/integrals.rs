@@ -6,11 +6,11 @@
 //! δg = μ·(δx_m − δx_s − g δn), μ = ν/(ν·n), δ∫N g dA = Σ ω N (J δg + g δJ):
 //!
 //! where the ray moves on along the master facet nothing changes to first order but what μ holds. The limits of the
-//! common parts move as well; over the sides that facets share this adds nothing, since gaps are continuous there, at a
-//! rim it adds (g − its mean), which is left out. Sums are invariant under translations and rotations, term by term: so
+//! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there; where
+//! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under translations and rotations, term by term: so
 //! forces along the derivative conserve linear and angular momentum to rounding.
 
-use super::overlap::{Base, Sample, middle};
+use super::overlap::{Base, RimSample, Sample, middle};
 use crate::contact::surface::{Facet, Point, Surface, add_scaled, cross, dot, norm};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
@@ -87,14 +87,49 @@ pub(super) struct Integrals {
     starts: Vec<usize>,
 }
 
-/// What one slave facet adds, by its corners.
+/// What a facet adds to the rows of a slave facet's corners, by its own corners.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
     moments: [[Point; 4]; 4],
     areas: [[Point; 4]; 4],
     shares: [[f64; 4]; 4],
-    /// What the derivative of n is multiplied by.
+    /// What the derivative of n is multiplied by, in moments and areas.
     turns: [[Point; 2]; 4],
+}
+
+impl Block {
+    /// Adds that the rim of a master moves over the slave facet, to this one and to the master's.
+    fn add_rim(&mut self, sample: &RimSample, count: usize, onto: &mut Self) {
+        let RimSample { length, slave, master, gap, outward } = *sample;
+        for a in 0..count {
+            let weight = length * slave[a];
+            for k in 0..4 {
+                let (own, other) = (-weight * slave[k], weight * master[k]);
+                self.moments[a][k] = add_scaled(self.moments[a][k], own * gap, outward);
+                self.areas[a][k] = add_scaled(self.areas[a][k], own, outward);
+                onto.moments[a][k] = add_scaled(onto.moments[a][k], other * gap, outward);
+                onto.areas[a][k] = add_scaled(onto.areas[a][k], other, outward);
+            }
+            let [of_moment, of_area] = &mut self.turns[a];
+            *of_moment = add_scaled(*of_moment, -weight * gap * gap, outward);
+            *of_area = add_scaled(*of_area, -weight * gap, outward);
+        }
+    }
+
+    /// Adds that the normal of the slave facet turns.
+    fn turn(&mut self, base: &Base) {
+        let (count, length) = (base.count(), norm(base.product));
+        // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
+        let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / length);
+        let Self { moments, areas, turns, .. } = self;
+        for (turns, rows) in turns.iter().zip(moments.iter_mut().zip(areas)).take(count) {
+            let [of_moment, of_area] = turns.map(|turn| base.turned(&middle(count), across(turn)));
+            for b in 0..count {
+                rows.0[b] = add_scaled(rows.0[b], 1.0, of_moment[b]);
+                rows.1[b] = add_scaled(rows.1[b], 1.0, of_area[b]);
+            }
+        }
+    }
 }
 
 impl Integrals {
@@ -118,16 +153,16 @@ impl Integrals {
             let Some(base) = Base::new(facet, positions) else { continue };
             let nodes = facet.nodes();
             let places: [usize; 4] = facet.nodes.map(|node| slave.place(node));
-            let whole = norm(base.middle) * [1.0, 0.5, 4.0][nodes.len() - 2] / nodes.len() as f64;
+            let whole = norm(base.product) * [1.0, 0.5, 4.0][nodes.len() - 2] / nodes.len() as f64;
             places[..nodes.len()].iter().for_each(|&place| self.sums[place].whole += whole);
             let mut block = Block::default();
             let mut touched = false;
             for &partner in partners(index) {
-                let other = &master.facets()[partner];
-                touched |= self.integrate_pair(&base, other, positions, &places, &mut block);
+                touched |= self.integrate_pair(&base, (master, partner), positions, &places, &mut block);
             }
             if touched {
-                self.close_block(&base, nodes, &places, &mut block);
+                block.turn(&base);
+                self.push_all(&places, nodes.len(), facet, &block);
             }
         }
         self.merge();
@@ -137,14 +172,13 @@ impl Integrals {
     fn integrate_pair(
         &mut self,
         base: &Base,
-        other: &Facet,
+        (master, partner): (&Surface, usize),
         positions: &[Point],
         places: &[usize; 4],
         block: &mut Block,
     ) -> bool {
-        let count = base.count();
-        let mut moments = [[[0.0; 3]; 4]; 4];
-        let mut shares = [[0.0; 4]; 4];
+        let (count, other) = (base.count(), &master.facets()[partner]);
+        let mut onto = Block::default();
         let mut touched = false;
         base.each_sample(other, positions, &mut |sample: &Sample| {
             touched = true;
@@ -175,48 +209,27 @@ impl Integrals {
                 *of_moment = add_scaled(*of_moment, by_area * gap, product);
                 *of_area = add_scaled(*of_area, by_area, product);
                 for (c, &share) in master.iter().enumerate() {
-                    moments[a][c] = add_scaled(moments[a][c], weight * share, direction);
-                    shares[a][c] -= weight * share;
+                    onto.moments[a][c] = add_scaled(onto.moments[a][c], weight * share, direction);
+                    onto.shares[a][c] -= weight * share;
                 }
             }
         });
         if touched {
-            for a in 0..count {
-                for (c, &node) in other.nodes().iter().enumerate() {
-                    self.push(Entry {
-                        row: places[a],
-                        node,
-                        moment: moments[a][c],
-                        area: [0.0; 3],
-                        share: shares[a][c],
-                    });
-                }
-            }
+            let open = master.open_sides(partner);
+            base.each_rim_sample(other, open, positions, &mut |sample| block.add_rim(sample, count, &mut onto));
+            self.push_all(places, count, other, &onto);
         }
         touched
     }
 
-    /// Adds that the normal of the slave facet turns, and makes entries of all.
-    fn close_block(&mut self, base: &Base, nodes: &[usize], places: &[usize; 4], block: &mut Block) {
-        let count = nodes.len();
-        // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
-        let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / norm(base.middle));
+    /// Makes entries of what rows have of the nodes of a facet.
+    fn push_all(&mut self, places: &[usize; 4], count: usize, facet: &Facet, block: &Block) {
         for (a, &row) in places.iter().enumerate().take(count) {
-            let [of_moment, of_area] = block.turns[a].map(|turn| base.turned(&middle(count), across(turn)));
-            for b in 0..count {
-                self.push(Entry {
-                    row,
-                    node: nodes[b],
-                    moment: add_scaled(block.moments[a][b], 1.0, of_moment[b]),
-                    area: add_scaled(block.areas[a][b], 1.0, of_area[b]),
-                    share: block.shares[a][b],
-                });
+            for (b, &node) in facet.nodes().iter().enumerate() {
+                let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
+                self.entries.push((self.entries.len(), Entry { row, node, moment, area, share }));
             }
         }
-    }
-
-    fn push(&mut self, entry: Entry) {
-        self.entries.push((self.entries.len(), entry));
     }
 
     /// Sums entries of a row that belong to one node, in the order in which they were found.

@@ -21,13 +21,25 @@ pub(super) struct Sample {
     pub(super) direction: Point,
 }
 
+/// A point of a slave facet that lies below a side where the master ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RimSample {
+    /// Its share of the length in the plane (one in two dimensions).
+    pub(super) length: f64,
+    pub(super) slave: [f64; 4],
+    pub(super) master: [f64; 4],
+    pub(super) gap: f64,
+    /// The direction in the plane in which the master ends: a unit vector.
+    pub(super) outward: Point,
+}
+
 /// A slave facet and the plane through its middle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Base {
     pub(super) shape: Shape,
     pub(super) normal: Point,
     /// The product of the tangents there, along the normal (of a segment with the unit vector out of the plane).
-    pub(super) middle: Point,
+    pub(super) product: Point,
     axes: [Point; 2],
     /// Its corners in the plane.
     corners: [[f64; 2]; 4],
@@ -57,7 +69,7 @@ impl Base {
         let normal = unit(product)?;
         let along = unit(first)?;
         let axes = [along, cross(normal, along)];
-        let mut base = Self { shape, normal, middle: product, axes, corners: [[0.0; 2]; 4], count, size: shape.size() };
+        let mut base = Self { shape, normal, product, axes, corners: [[0.0; 2]; 4], count, size: shape.size() };
         base.corners = std::array::from_fn(|k| base.in_plane(shape.corner(k)));
         Some(base)
     }
@@ -118,6 +130,47 @@ impl Base {
         // (A warped facet may be seen from its side somewhere.)
         if cosine < 0.0 && gap.is_finite() {
             act(&Sample { area, slave, master, gap, direction: normal.map(|x| x / cosine) });
+        }
+    }
+
+    /// Calls `act` with points below the sides of a master facet where its surface ends.
+    pub(super) fn each_rim_sample(
+        &self,
+        facet: &Facet,
+        open: [bool; 4],
+        positions: &[Point],
+        act: &mut impl FnMut(&RimSample),
+    ) {
+        let (shape, count) = (facet.shape(positions), facet.nodes().len());
+        let corners: [[f64; 2]; 4] = std::array::from_fn(|k| self.in_plane(shape.corner(k)));
+        let own = Flat { corners: self.corners, count: self.count };
+        for k in (0..count).filter(|&k| open[k]) {
+            let (from, to) = (corners[k], corners[(k + 1) % count]);
+            let mut sample = |length: f64, share: f64, slave: [f64; 4], outward: [f64; 2]| {
+                let master = shape.on_side(k, share);
+                let gap = dot(self.normal, sub(shape.point(&master), self.shape.point(&slave)));
+                let [along, across] = outward;
+                let outward = add_scaled(self.axes[0].map(|x| along * x), across, self.axes[1]);
+                act(&RimSample { length, slave, master, gap, outward });
+            };
+            if self.count == 2 {
+                // The sides of a segment are its ends.
+                let (x, length) = (from[0], self.corners[1][0]);
+                if x > 0.0 && x < length {
+                    sample(1.0, 0.0, [1.0 - x / length, x / length, 0.0, 0.0], [(from[0] - to[0]).signum(), 0.0]);
+                }
+                continue;
+            }
+            let way = [to[0] - from[0], to[1] - from[1]];
+            let length = way[0].hypot(way[1]);
+            let Some([begin, end]) = own.crossing(from, way) else { continue };
+            // Seen from the slave the master goes around clockwise: what is on its left is outside.
+            let outward = [-way[1] / length, way[0] / length];
+            for (weight, place) in LINE {
+                let share = begin + place * (end - begin);
+                let slave = own.weights_at([from[0] + share * way[0], from[1] + share * way[1]]);
+                sample(weight * (end - begin) * length, share, slave, outward);
+            }
         }
     }
 
@@ -197,6 +250,26 @@ impl Flat {
             }
         }
         [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
+    }
+
+    /// Which shares of a way are inside, from and to, if any are.
+    fn crossing(&self, from: [f64; 2], way: [f64; 2]) -> Option<[f64; 2]> {
+        let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+        for k in 0..self.count {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
+            let side = [b[0] - a[0], b[1] - a[1]];
+            // Heights over the side at the start, and gained along the way.
+            let height = side[0] * (from[1] - a[1]) - side[1] * (from[0] - a[0]);
+            let gain = side[0] * way[1] - side[1] * way[0];
+            if gain > 0.0 {
+                begin = begin.max(-height / gain);
+            } else if gain < 0.0 {
+                end = end.min(-height / gain);
+            } else if height < 0.0 {
+                return None;
+            }
+        }
+        (begin < end).then_some([begin, end])
     }
 
     /// What another one that goes the other way around has in common with this one, if its area is above `least`
