@@ -1,5 +1,7 @@
 //! Contact constraints: where the gap is, which way it pushes, under which law.
 
+#[cfg(feature = "search")]
+mod affine_rows;
 mod constraint;
 mod contacts;
 mod dofs;
@@ -8,6 +10,8 @@ mod gaps;
 mod groups;
 mod law;
 mod linear_rows;
+#[cfg(feature = "search")]
+mod mortar;
 #[cfg(feature = "search")]
 mod node_to_facet;
 mod nodes_on_obstacle;
@@ -25,6 +29,8 @@ pub(crate) use groups::Groups;
 pub use law::ContactLaw;
 pub(crate) use law::Measure;
 pub use linear_rows::{GapOffset, LinearRows};
+#[cfg(feature = "search")]
+pub use mortar::Mortar;
 #[cfg(feature = "search")]
 pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;

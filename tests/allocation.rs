@@ -18,6 +18,7 @@ use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, spring};
+use contact_dynamics_scenes::stacks::Stack;
 use contact_dynamics_scenes::{Bars, MassKind};
 
 #[test]
@@ -33,6 +34,7 @@ fn steps_do_not_allocate() {
     frames();
     rotors();
     friction();
+    weighted_gaps();
 }
 
 /// A bar on a rough bed that comes to rest, and a block that is thrown along a rough floor: once all contacts have
@@ -67,6 +69,26 @@ fn friction() {
         run.step().unwrap();
     }
     assert_steps_allocate_nothing(&mut run, 300, 8, "friction of a block");
+}
+
+/// A block that bounces on another one, weighted gaps with friction: rows are integrated again all the time.
+fn weighted_gaps() {
+    let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
+    let bodies = [3, 4].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], material));
+    let stack = Stack::new(bodies, 1e-3, |x| x);
+    let mass = stack.solid.lumped_mass::<f64>();
+    let mut system = stack.solid.system().load(move |_, f| {
+        f.iter_mut().zip(&mass).skip(1).step_by(2).for_each(|(f, m)| *f = -10.0 * m);
+    });
+    for node in (0..stack.solid.nodes.len()).filter(|&node| stack.solid.nodes[node][1] == 0.0) {
+        system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
+    }
+    let contact = stack.mortar(true).unwrap().friction(0.3);
+    let mut run = Simulation::builder(system, Composite, 2e-3).constraint(contact).build().unwrap();
+    for _ in 0..60 {
+        run.step().unwrap();
+    }
+    assert_steps_allocate_nothing(&mut run, 300, 5, "weighted gaps");
 }
 
 /// Takes so many steps of a run in which contacts change at least so often, from its start to their end.

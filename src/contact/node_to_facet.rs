@@ -4,10 +4,9 @@ mod candidates;
 mod passage;
 mod rows;
 
-use super::dofs::DofList;
 use super::obstacle::across;
-use super::surface::{Facet, Neighborhood, Point, Shape, Surface, overhang};
-use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_mesh};
+use super::surface::{Facet, Neighborhood, Nodes, Point, Shape, Surface, add_scaled, overhang};
+use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use rows::Rows;
@@ -113,16 +112,8 @@ impl Pass {
 /// ```
 #[derive(Debug)]
 pub struct NodeToFacet<T: Real> {
-    dimension: usize,
-    /// Reference coordinates, by node.
-    coordinates: Vec<Point>,
-    /// Dofs of the displacement in the system, by node; the first `dimension` count.
-    system_dofs: Vec<[usize; 3]>,
-    /// Their places in the list of the constraint, for nodes of the two bodies.
-    dofs: Vec<[usize; 3]>,
-    list: DofList,
-    /// Positions now and when the lists were built, by node.
-    positions: Vec<Point>,
+    nodes: Nodes,
+    /// Positions when the lists were built, by node.
     built_at: Vec<Point>,
     /// How far from a node the lists hold all facets, where they were built.
     listed: f64,
@@ -220,18 +211,13 @@ impl<T: Real> NodeToFacet<T> {
         nodes: &[usize],
         facets: impl IntoIterator<Item = F>,
     ) -> Result<Self> {
-        if D != 2 && D != 3 {
-            return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
-        }
-        check_mesh(coordinates, dofs, nodes)?;
+        let mesh = Nodes::new(coordinates, dofs)?;
+        check_nodes("a contact node (at most)", nodes, coordinates.len())?;
         if nodes.is_empty() {
             let what = "the list of contact nodes";
             return Err(Error::Empty { what, remedy: "give at least one node" });
         }
-        let coordinates: Vec<_> = coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect();
-        let system_dofs: Vec<[usize; 3]> =
-            dofs.iter().map(|dofs| std::array::from_fn(|i| dofs.get(i).copied().unwrap_or(0))).collect();
-        let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &coordinates)?;
+        let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &mesh.coordinates)?;
         let reach = surface.typical();
         let mut sorted = nodes.to_vec();
         sorted.sort_unstable();
@@ -241,15 +227,10 @@ impl<T: Real> NodeToFacet<T> {
         }
         let bodies = [sorted, surface.nodes().to_vec()];
         let mut contact = Self {
-            dimension: D,
-            positions: coordinates.clone(),
             built_at: Vec::new(),
             listed: 0.0,
-            ends: [coordinates.clone(), coordinates.clone()],
-            coordinates,
-            dofs: vec![[0; 3]; system_dofs.len()],
-            system_dofs,
-            list: DofList::default(),
+            ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
+            nodes: mesh,
             surface,
             own_surface: None,
             passes: vec![Pass::new(bodies[0].clone())],
@@ -332,7 +313,8 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// As those of [`one_pass`](Self::one_pass) about facets.
     pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
-        let own = Surface::new(facets.into_iter().map(Into::into).collect(), self.dimension, &self.coordinates)?;
+        let own =
+            Surface::new(facets.into_iter().map(Into::into).collect(), self.nodes.dimension, &self.nodes.coordinates)?;
         let body = &mut self.bodies[0];
         body.clone_from(&self.passes[0].nodes);
         body.extend(own.nodes());
@@ -356,22 +338,11 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Checks that the bodies share no node, and reserves memory for all rows there can be.
     fn prepare(&mut self) -> Result<()> {
-        let [one, other] = &self.bodies;
-        if let Some(node) = one.iter().find(|node| other.binary_search(node).is_ok()) {
-            let part = format!("contact node {node}");
-            return Err(Error::Incompatible { part, reason: "it belongs to both surfaces" });
-        }
-        let Self { list, dofs, system_dofs, bodies, dimension, .. } = self;
-        *list = DofList::default();
-        for &node in bodies.iter().flatten() {
-            for (place, &dof) in dofs[node].iter_mut().zip(&system_dofs[node][..*dimension]) {
-                *place = list.place(dof);
-            }
-        }
+        self.nodes.read_bodies(&self.bodies)?;
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        self.partners = vec![None; if self.passes.len() > 1 { self.coordinates.len() } else { 0 }];
+        self.partners = vec![None; if self.passes.len() > 1 { self.nodes.coordinates.len() } else { 0 }];
         self.built_at.clear();
         Ok(())
     }
@@ -381,7 +352,7 @@ impl<T: Real> NodeToFacet<T> {
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         let entries = |(pass, surface): (&Pass, &Surface)| {
             let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
-            pass.nodes.len() * self.dimension * (1 + vertices)
+            pass.nodes.len() * self.nodes.dimension * (1 + vertices)
         };
         let rows = self.passes.iter().map(|pass| pass.nodes.len()).sum();
         (rows, self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum())
@@ -392,41 +363,24 @@ impl<T: Real> NodeToFacet<T> {
         T::epsilon().value().sqrt()
     }
 
-    /// The entries of a vector of the constraint that belong to a node.
-    fn vector(&self, node: usize, x: &[T]) -> Point {
-        let mut vector = [0.0; 3];
-        for (component, &dof) in vector.iter_mut().zip(&self.dofs[node][..self.dimension]) {
-            *component = x[dof].value();
-        }
-        vector
-    }
-
     /// Position and velocity of a node.
     fn moving(&self, node: usize, u: &[T], v: &[T]) -> [Point; 2] {
-        let mut motion = [self.coordinates[node], [0.0; 3]];
-        for (i, &dof) in self.dofs[node][..self.dimension].iter().enumerate() {
-            motion[0][i] += u[dof].value();
-            motion[1][i] = v[dof].value();
-        }
-        motion
+        let moved = self.nodes.vector(node, u);
+        [add_scaled(self.nodes.coordinates[node], 1.0, moved), self.nodes.vector(node, v)]
     }
-}
-
-fn component<T: Real>(x: &[T], i: usize) -> f64 {
-    x.get(i).map_or(0.0, |x| x.value())
 }
 
 impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     fn dofs(&self) -> &[usize] {
-        self.list.as_slice()
+        self.nodes.dofs()
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { identities, stands, jacobian, .. } = &self.rows;
+        let Rows { identities, stands, affine, .. } = &self.rows;
         for (row, (&(node, pass), stand)) in identities.iter().zip(stands).enumerate() {
-            let position = self.positions[node];
+            let position = self.nodes.positions[node];
             let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
-            let mut contact = contacts.push_row((node, pass), self.law, (jacobian, row));
+            let mut contact = contacts.push_row((node, pass), self.law, (&affine.jacobian, row));
             contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
             if self.friction == 0.0 {
                 continue;
@@ -435,14 +389,14 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
             let vertices = surface.facets()[stand.facet].nodes();
             let [x, y, _] = stand.normal;
-            let tangents = match self.dimension {
+            let tangents = match self.nodes.dimension {
                 2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
                 _ => across(stand.normal),
             };
-            for tangent in tangents.into_iter().take(self.dimension - 1) {
+            for tangent in tangents.into_iter().take(self.nodes.dimension - 1) {
                 let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
                 let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
-                    let dofs = &self.dofs[node][..self.dimension];
+                    let dofs = self.nodes.places(node);
                     dofs.iter().zip(tangent).map(move |(&dof, along)| (dof, T::of(share * along)))
                 });
                 contact.tangent_entries(entries);
@@ -451,7 +405,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
-        check_local(u.len(), self.list.as_slice().len())?;
+        check_local(u.len(), self.nodes.dofs().len())?;
         let (boxes, motions) = self.move_nodes(u)?;
         let speeds = self.speeds(v);
         self.found.clear();
@@ -469,18 +423,18 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             }
         }
         let (rows, found) = (&self.rows, &self.found);
-        let same = rows.identities == found.identities && rows.jacobian == found.jacobian;
+        let same = rows.identities == found.identities && rows.affine.jacobian == found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
         Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        check_local(u.len(), self.list.as_slice().len())?;
+        check_local(u.len(), self.nodes.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
         let Ok((_, motions)) = self.move_nodes(u) else { return Ok(Candidates::Unchanged) };
         self.found.clear();
         self.move_rows(t, &motions, u)?;
-        let same = self.rows.jacobian == self.found.jacobian;
+        let same = self.rows.affine.jacobian == self.found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
         Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
     }
@@ -491,7 +445,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
-            *gap = self.rows.gap(row, u);
+            *gap = self.rows.affine.gap(row, u);
         }
         Ok(())
     }

@@ -1,18 +1,20 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
 mod facet;
+mod nodes;
 mod projection;
 mod search;
 mod shape;
 
 pub use facet::Facet;
+pub(crate) use nodes::Nodes;
 pub(crate) use projection::{Ground, Stand, meets};
 pub(crate) use search::{Bounds, Neighborhood, overhang};
-pub(crate) use shape::{Point, Shape, add_scaled, dot, norm, sub};
+pub(crate) use shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;
 use crate::error::{Error, Result};
-use shape::{Foot, Location, RIM, Rim, unit};
+use shape::{Foot, Location, RIM, Rim};
 
 /// Facets that share sides, with their neighbors.
 #[derive(Debug)]
@@ -197,6 +199,16 @@ impl Surface {
     /// Nodes of the facets, sorted.
     pub(crate) fn nodes(&self) -> &[usize] {
         &self.nodes
+    }
+
+    /// The place of one of its nodes among them.
+    pub(crate) fn place(&self, node: usize) -> usize {
+        self.nodes.partition_point(|&other| other < node)
+    }
+
+    /// The sides of a facet where the surface ends.
+    pub(crate) fn open_sides(&self, facet: usize) -> [bool; 4] {
+        self.rims[facet].sides
     }
 
     /// The closest point of a facet, with the shape of the facet.

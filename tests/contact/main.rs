@@ -5,6 +5,7 @@ mod constraints;
 mod curved;
 mod gap_function;
 mod laws;
+mod mortar;
 mod node_to_facet;
 mod obstacles;
 mod passing_through;

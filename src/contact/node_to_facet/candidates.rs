@@ -9,31 +9,18 @@ use crate::real::Real;
 impl<T: Real> NodeToFacet<T> {
     /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
     pub(super) fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
-        let Self { dimension, coordinates, system_dofs, dofs, positions, built_at, bodies, .. } = self;
-        let (mut boxes, mut motions) = ([Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
-        for ((body, bounds), motion) in bodies.iter().zip(&mut boxes).zip(&mut motions) {
-            for &node in body {
-                let mut x = coordinates[node];
-                for (axis, (x, &dof)) in x.iter_mut().zip(&dofs[node][..*dimension]).enumerate() {
-                    *x += u[dof].value();
-                    if !x.is_finite() {
-                        let what = "the displacement of a contact surface (by dof)";
-                        return Err(Error::NotFinite { what, index: system_dofs[node][axis], value: u[dof].value() });
-                    }
-                }
-                positions[node] = x;
-                bounds.include(x);
-                if let Some(&before) = built_at.get(node) {
-                    motion.include(sub(x, before));
-                }
-            }
-        }
+        let [one, other] = &self.bodies;
+        let boxes = [self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?];
+        let motions = [0, 1].map(|body| {
+            let moved = |&node: &usize| Some(sub(self.nodes.positions[node], *self.built_at.get(node)?));
+            Bounds::of_points(self.bodies[body].iter().filter_map(moved))
+        });
         Ok((boxes, motions))
     }
 
     /// The boxes of the velocities of the two bodies.
     pub(super) fn speeds(&self, v: &[T]) -> [Bounds; 2] {
-        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.vector(node, v))))
+        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))))
     }
 
     /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
@@ -44,9 +31,11 @@ impl<T: Real> NodeToFacet<T> {
         self.listed = range + self.skin.unwrap_or(0.5 * range);
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
-            pass.neighborhood.build(&pass.nodes, surface, &self.positions, self.listed);
+            let positions = &self.nodes.positions;
+            let points = pass.nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
+            pass.neighborhood.build(points, surface, positions, self.listed);
         }
-        self.built_at.clone_from(&self.positions);
+        self.built_at.clone_from(&self.nodes.positions);
         self.rebuilds += 1;
     }
 
@@ -67,7 +56,8 @@ impl<T: Real> NodeToFacet<T> {
         ahead: f64,
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, positions, passes, reach, partners, found, dimension, dofs, .. } = self;
+        let Self { surface, own_surface, nodes, passes, reach, partners, found, .. } = self;
+        let positions = &nodes.positions;
         let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
             return;
         };
@@ -75,11 +65,7 @@ impl<T: Real> NodeToFacet<T> {
             if !near.contains(positions[node]) {
                 continue;
             }
-            let mut velocity = [0.0; 3];
-            for (component, &dof) in velocity.iter_mut().zip(&dofs[node][..*dimension]) {
-                *component = v[dof].value();
-            }
-            let way = ahead * Bounds::of_points([velocity]).farthest(speeds);
+            let way = ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
             let (distance, stand) = ground.clearance(place, *reach + way);
             *clearance = distance;
             let Some(stand) = stand else { continue };
@@ -93,7 +79,7 @@ impl<T: Real> NodeToFacet<T> {
                     _ => {}
                 }
             }
-            found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+            found.push((node, pass), stand, vertices, |node| nodes.places(node), u);
         }
     }
 
@@ -101,7 +87,8 @@ impl<T: Real> NodeToFacet<T> {
     pub(super) fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, positions, passes, rows, found, dimension, dofs, .. } = self;
+        let Self { surface, own_surface, nodes, passes, rows, found, .. } = self;
+        let positions = &nodes.positions;
         for (row, &(node, pass)) in rows.identities.iter().enumerate() {
             let old = rows.stands[row];
             let ground = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding());
@@ -117,12 +104,12 @@ impl<T: Real> NodeToFacet<T> {
             match stand {
                 Some((stand, vertices)) => match old.followed_by(stand, t) {
                     Some(stand) => {
-                        found.push((node, pass), stand, vertices, |node| &dofs[node][..*dimension], u);
+                        found.push((node, pass), stand, vertices, |node| nodes.places(node), u);
                     }
                     None => found.keep(rows, row),
                 },
                 // There is nothing near that it could press on.
-                None if known > 0.0 && rows.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
+                None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
                 None => {
                     let contact = ContactId { constraint: 0, feature: node, candidate: pass };
                     return Err(Error::ContactLost { t, contact });

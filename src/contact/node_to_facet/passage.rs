@@ -40,7 +40,7 @@ impl<T: Real> NodeToFacet<T> {
     }
 
     fn look_along(&self, step: &Stride<'_, T>, ends: &mut [Vec<Point>; 2]) -> Result<()> {
-        let moved = |node: usize| sub(self.vector(node, step.u[1]), self.vector(node, step.u[0]));
+        let moved = |node: usize| sub(self.nodes.vector(node, step.u[1]), self.nodes.vector(node, step.u[0]));
         let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| moved(node))));
         let longest = motions[0].farthest(&motions[1]);
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
@@ -49,7 +49,7 @@ impl<T: Real> NodeToFacet<T> {
         }
         for (positions, u) in ends.iter_mut().zip(step.u) {
             for &node in self.bodies.iter().flatten() {
-                positions[node] = add_scaled(self.coordinates[node], 1.0, self.vector(node, u));
+                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
             }
         }
         let mut rows = self.rows.identities.iter().copied().enumerate().peekable();
@@ -73,7 +73,7 @@ impl<T: Real> NodeToFacet<T> {
                 });
                 let crossing = Crossing { grounds: [start, end], place, node, way, law: self.law };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
-                let velocity = |node: usize| self.vector(node, step.v);
+                let velocity = |node: usize| self.nodes.vector(node, step.v);
                 if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
                     return Err(step.refuse((node, pass), what, way, gap));
                 }

@@ -1,7 +1,7 @@
 //! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
 
 use super::Surface;
-use super::shape::{Point, RIM, norm};
+use super::shape::{Point, RIM, Shape, norm};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use std::ops::ControlFlow;
@@ -27,6 +27,16 @@ impl Bounds {
             bounds.include(x);
             bounds
         })
+    }
+
+    pub(crate) fn of_corners(shape: &Shape) -> Self {
+        let [lower, upper] = shape.bounds();
+        Self { lower, upper }
+    }
+
+    /// The smallest box that holds both.
+    fn with(&self, other: &Self) -> Self {
+        Self::of_points([self.lower, self.upper, other.lower, other.upper])
     }
 
     pub(crate) fn inflated(&self, by: f64) -> Self {
@@ -65,7 +75,7 @@ pub(crate) fn overhang(bounds: &Bounds) -> f64 {
     8.0 * RIM * extent
 }
 
-/// The facets near each node: those whose boxes, widened, held the node when the list was built.
+/// The facets near each of some boxes: those whose own boxes, widened, met it when the lists were built.
 #[derive(Debug, Default)]
 pub(crate) struct Neighborhood {
     starts: Vec<usize>,
@@ -73,7 +83,7 @@ pub(crate) struct Neighborhood {
 }
 
 impl Neighborhood {
-    /// Facets to look at for the k-th node, in ascending order: the result does not depend on the age of the list.
+    /// Facets to look at for the k-th box, in ascending order: the result does not depend on the age of the list.
     pub(crate) fn of(&self, k: usize) -> &[usize] {
         match self.starts.get(k..k + 2) {
             Some(range) => &self.facets[range[0]..range[1]],
@@ -81,12 +91,17 @@ impl Neighborhood {
         }
     }
 
-    /// Lists anew, for each node, the facets whose boxes are within `range` of it.
-    pub(crate) fn build(&mut self, nodes: &[usize], surface: &Surface, positions: &[Point], range: f64) {
-        let all = Bounds::of_points(nodes.iter().map(|&node| positions[node]));
+    /// Lists anew, for each box, the facets whose boxes are within `range` of it.
+    pub(crate) fn build(
+        &mut self,
+        boxes: impl Iterator<Item = Bounds> + Clone,
+        surface: &Surface,
+        positions: &[Point],
+        range: f64,
+    ) {
+        let all = boxes.clone().reduce(|all, bounds| all.with(&bounds)).unwrap_or(Bounds::EMPTY);
         let leaves = surface.facets().iter().enumerate().filter_map(|(index, facet)| {
-            let [lower, upper] = facet.shape(positions).bounds();
-            let bounds = Bounds { lower, upper };
+            let bounds = Bounds::of_corners(&facet.shape(positions));
             let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
             let near = bounds.inflated(range + overhang(&bounds) + rounding);
             let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);
@@ -96,9 +111,9 @@ impl Neighborhood {
         self.starts.clear();
         self.facets.clear();
         self.starts.push(0);
-        for &node in nodes {
+        for bounds in boxes {
             let start = self.facets.len();
-            let found = AABB::from_point(positions[node]);
+            let found = AABB::from_corners(bounds.lower, bounds.upper);
             let _: ControlFlow<()> = tree.locate_in_envelope_intersecting_int(&found, |leaf| {
                 self.facets.push(leaf.data);
                 ControlFlow::Continue(())

@@ -29,6 +29,7 @@ pub mod solids;
 pub mod sparse;
 pub mod springs;
 pub mod squeeze;
+pub mod stacks;
 pub mod tables;
 pub mod timing;
 pub mod truss;

@@ -1,0 +1,17 @@
+//! Surfaces whose meshes do not match: nodes on facets beside weighted gaps.
+//!
+//! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
+
+mod ironing;
+mod patch;
+mod rings;
+
+use contact_dynamics_scenes::output::Output;
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let output = Output::from_command_line("surfaces")?;
+    let tables = [patch::table(output.quick)?, ironing::table(output.quick)?, rings::table(output.quick)?].join("\n");
+    println!("{tables}");
+    output.write("surfaces.md", &tables)
+}

@@ -1,0 +1,58 @@
+//! Patch tests: two bodies under the same pressure from all sides, whose displacements are linear.
+
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::stacks::Stack;
+use std::error::Error;
+use std::fmt::Write;
+
+const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+
+/// Largest errors of the displacements, for meshes that match and that do not.
+pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
+    let mut table = String::from(
+        "Patch test: largest error of the displacements over the largest displacement\n\n\
+         | interface | elements below, above | one pass | two passes | mortar, slave above | slave below |\n\
+         | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let meshes = if quick { &[(3, 2)][..] } else { &[(3, 3), (2, 4), (3, 4), (4, 2), (7, 2)] };
+    for &(below, above) in meshes {
+        let bodies = || [below, above].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL));
+        let flat = Stack::new(bodies(), 0.0, |x| x);
+        row(&mut table, "line", &format!("{below}, {above}"), &flat)?;
+        let curved = Stack::new(bodies(), 0.0, |[x, y]| [x, y + 0.35 * x * (2.0 - y) * y]);
+        row(&mut table, "slanted line", &format!("{below}, {above}"), &curved)?;
+    }
+    let meshes = if quick { &[([2, 2], [1, 1])][..] } else { &[([3, 3], [3, 3]), ([3, 3], [2, 2]), ([2, 3], [4, 1])] };
+    for &(below, above) in meshes {
+        let bodies = || [below, above].map(|[x, y]| Solid::block([1.0; 3], [x, y, 1], MATERIAL));
+        let name = format!("{} × {}, {} × {}", below[0], below[1], above[0], above[1]);
+        row(&mut table, "plane", &name, &Stack::new(bodies(), 0.0, |x| x))?;
+        let slanted = Stack::new(bodies(), 0.0, |[x, y, z]| [x, y, z + 0.25 * (x + 0.5 * y) * (2.0 - z) * z]);
+        row(&mut table, "slanted plane", &name, &slanted)?;
+        // Quadrilaterals that are no parallelograms: across the middle nodes move, sides stay.
+        let skewed = Stack::new(bodies(), 0.0, |[x, y, z]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y, z]);
+        row(&mut table, "plane, skewed quads", &name, &skewed)?;
+    }
+    Ok(table)
+}
+
+fn row<const D: usize>(
+    table: &mut String,
+    interface: &str,
+    cells: &str,
+    stack: &Stack<D>,
+) -> Result<(), Box<dyn Error>> {
+    let nodes = [1, 2].map(|passes| stack.patch(stack.nodes_on_facets(passes)?));
+    let mortar = [true, false].map(|upper| stack.patch(stack.mortar(upper)?));
+    write!(table, "| {interface} | {cells} |")?;
+    for error in nodes.into_iter().chain(mortar) {
+        write!(table, " {} |", small(error?))?;
+    }
+    writeln!(table)?;
+    Ok(())
+}
+
+/// Rounding is not a figure.
+fn small(error: f64) -> String {
+    if error < 1e-11 { "exact".into() } else { format!("{error:.1e}") }
+}

@@ -1,0 +1,329 @@
+//! Contact of two deforming surfaces by weighted gaps: segment to segment.
+
+mod integrals;
+mod overlap;
+mod pairs;
+mod passage;
+mod rows;
+
+use super::surface::{Bounds, Facet, Nodes, Point, Surface, sub};
+use super::{Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
+use crate::error::{Error, Result, positive};
+use crate::real::Real;
+use integrals::Integrals;
+use pairs::Pairs;
+use rows::Rows;
+
+/// Share of the reach above which a row that nothing lies over any more is open.
+const OPEN: f64 = 0.01;
+
+/// Share of the smallest facet that surfaces may have moved against each other since the search where such a row goes on
+/// as it was: what slides off the rim ends its step.
+const BEYOND: f64 = 0.25;
+
+/// Contact of two deforming surfaces whose nodes need not match: gaps weighted over the facets of one surface, the
+/// slave, against those of the other, the master. Segments in two dimensions, triangles and bilinear quadrilaterals in
+/// three.
+///
+/// The gap of a slave node is the mean of the distance between the surfaces, with the node's shape function N as weight,
+/// over the part of the slave surface that the master covers:
+///
+/// g = ∫ N (x_m − x_s)·n dA / ∫ N dA (length; positive outside),
+///
+/// where n is the normal in the middle of the slave facet, and x_m the point where the ray along n from x_s meets the
+/// master (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004; Popp, Gee and Wall, Int. J. Numer. Methods
+/// Eng. 79, 2009, with gaps not divided by the area). The multiplier is the force of the node's share of the pressure,
+/// p ∫ N dA: [`area`](Self::area) has the integral. Facets that are covered in part count with what is covered, so that
+/// no row is small because little of it touches.
+///
+/// Rows of G are derivatives of the gap, from both surfaces, the turning of n and the stretch of the area. Contact
+/// forces conserve linear and angular momentum at the configuration where rows are linearized.
+///
+/// # Which surface is the slave
+///
+/// The finer one, or the one that is deformed more. Pressure on flat surfaces is exact with either choice, whatever the
+/// meshes; on curved ones the errors are of the order of the elements, while nodes on facets
+/// ([`NodeToFacet`](super::NodeToFacet)) pass their force on in lumps. A search costs the intersection of all pairs of
+/// facets that are near each other.
+///
+/// # Linearization
+///
+/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
+/// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are found by differences. What is close
+/// enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
+/// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the search
+/// it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
+/// through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a smaller step
+/// mends). Geometry is computed in `f64` in every run.
+///
+/// # Known failure
+///
+/// - Facets that see each other at more than 60° do not meet: the edges of bodies are not kept apart.
+/// - Of two layers of a master that lie behind each other within the reach both are met.
+/// - On quadrilaterals that are no parallelograms shape functions are integrated by quadrature: the pressure of the
+///   patch test is then not exact to rounding (`docs/contact.md`).
+///
+/// # Identity
+///
+/// (number of the slave node, 0).
+///
+/// ```
+/// use contact_dynamics::ContactConstraint;
+/// use contact_dynamics::contact::{Contacts, Mortar};
+///
+/// // One segment above two, 0.1 apart.
+/// let coordinates = [[2.0, 0.0], [0.75, 0.0], [0.0, 0.0], [0.0, 0.1], [2.0, 0.1]];
+/// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
+/// let mut contact = Mortar::new(&coordinates, &dofs, [[3, 4]], [[0, 1], [1, 2]])?;
+/// contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0)?;
+/// let contacts = Contacts::of(&contact);
+/// assert_eq!((contacts.len(), contacts.name(0)), (2, (3, 0)));
+/// // Half of the segment belongs to each of its nodes.
+/// assert!((contact.area(0) - 1.0_f64).abs() < 1e-15);
+/// let mut gaps = [0.0; 2];
+/// contact.gaps(0.0, &[0.0; 10], &mut gaps)?;
+/// assert!(gaps.iter().all(|gap: &f64| (gap - 0.1).abs() < 1e-15));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Mortar<T: Real> {
+    nodes: Nodes,
+    slave: Surface,
+    master: Surface,
+    /// All nodes of the two.
+    bodies: [Vec<usize>; 2],
+    law: ContactLaw,
+    friction: f64,
+    reach: f64,
+    skin: Option<f64>,
+    pairs: Pairs,
+    /// Positions when the lists of pairs were built, by node.
+    built_at: Vec<Point>,
+    /// Positions at the last search, by body and place of the node there.
+    searched_at: [Vec<Point>; 2],
+    integrals: Integrals,
+    rows: Rows<T>,
+    /// What the search under way finds.
+    found: Rows<T>,
+    /// What looking at a step needs.
+    look: passage::Look,
+}
+
+impl<T: Real> Mortar<T> {
+    /// Contact of the facets of a `slave` surface, whose nodes get the rows, with those of a `master`.
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
+    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
+    /// [`with_law`](Self::with_law) gives another.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the dimension is not 2 or 3, if the lists differ in length, if a facet does not fit, or if
+    /// a node does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
+    /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
+    /// [`Error::Incompatible`] at a branch of a surface, and for nodes that both surfaces have.
+    pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        slave: impl IntoIterator<Item = F>,
+        master: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        let mut nodes = Nodes::new(coordinates, dofs)?;
+        let slave = Surface::new(slave.into_iter().map(Into::into).collect(), D, &nodes.coordinates)?;
+        let master = Surface::new(master.into_iter().map(Into::into).collect(), D, &nodes.coordinates)?;
+        let bodies = [slave.nodes().to_vec(), master.nodes().to_vec()];
+        nodes.read_bodies(&bodies)?;
+        Ok(Self {
+            nodes,
+            reach: slave.typical().max(master.typical()),
+            slave,
+            master,
+            bodies,
+            law: ContactLaw::Rigid,
+            friction: 0.0,
+            skin: None,
+            pairs: Pairs::default(),
+            built_at: Vec::new(),
+            searched_at: [Vec::new(), Vec::new()],
+            integrals: Integrals::default(),
+            rows: Rows::new(),
+            found: Rows::new(),
+            look: passage::Look::default(),
+        })
+    }
+
+    /// The law of all rows.
+    #[must_use]
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// Coulomb's friction with a coefficient μ, from 0. Slip is the mean velocity of the slave against the points of the
+    /// master that it lies on, weighted as the gap is.
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64) -> Self {
+        self.friction = coefficient;
+        self
+    }
+
+    /// How far (length) outside of each other, and inside, facets meet at least; by default the mean size of the facets,
+    /// of the coarser surface. What the velocities bring near within a step is found as well.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn reach(mut self, reach: T) -> Result<Self> {
+        self.reach = positive("the reach of a contact search", reach.value())?;
+        self.pairs.forget();
+        Ok(self)
+    }
+
+    /// How far (length) the surfaces may move relative to each other before lists of pairs are built anew; if not given,
+    /// half of what is searched. It changes the cost, not the result.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn skin(mut self, skin: T) -> Result<Self> {
+        self.skin = Some(positive("the skin of a contact search", skin.value())?);
+        self.pairs.forget();
+        Ok(self)
+    }
+
+    /// ∫ N dA (area; length in two dimensions) over what is covered of the facets around the node of a row: its force
+    /// over this is the pressure.
+    pub fn area(&self, row: usize) -> T {
+        T::of(self.rows.spots[row].area)
+    }
+
+    /// The number of tangents of a row.
+    fn tangents(&self) -> usize {
+        if self.friction == 0.0 { 0 } else { self.nodes.dimension - 1 }
+    }
+
+    /// Moves the nodes to where they are; returns the boxes of the two surfaces.
+    fn move_nodes(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
+        let [one, other] = &self.bodies;
+        Ok([self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?])
+    }
+
+    /// How far the surfaces have moved against each other since the lists of pairs were built.
+    fn moved(&self) -> f64 {
+        if self.built_at.is_empty() {
+            return f64::INFINITY;
+        }
+        let moved = |&node: &usize| sub(self.nodes.positions[node], self.built_at[node]);
+        let [one, other] = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(moved)));
+        one.spread(&other)
+    }
+
+    /// How far they have moved against each other since the last search.
+    fn moved_since_search(&self) -> f64 {
+        let [one, other] = [0, 1].map(|body| {
+            let moved = |(&node, &before): (&usize, &Point)| sub(self.nodes.positions[node], before);
+            Bounds::of_points(self.bodies[body].iter().zip(&self.searched_at[body]).map(moved))
+        });
+        one.farthest(&other)
+    }
+
+    /// Pairs of facets within `range`, of those that the surfaces make now.
+    fn find_pairs(&mut self, range: f64) {
+        let surfaces = [&self.slave, &self.master];
+        if !self.pairs.are_sure_of(range, self.moved()) {
+            self.pairs.build(surfaces, &self.nodes.positions, range + self.skin.unwrap_or(0.5 * range));
+            self.built_at.clone_from(&self.nodes.positions);
+        }
+        self.pairs.take_near(surfaces, &self.nodes.positions, range, self.reach);
+    }
+
+    fn integrate(&mut self) {
+        let Self { integrals, slave, master, nodes, pairs, .. } = self;
+        integrals.integrate(slave, master, &nodes.positions, |facet| pairs.of(facet));
+    }
+}
+
+impl<T: Real> ContactConstraint<T> for Mortar<T> {
+    fn dofs(&self) -> &[usize] {
+        self.nodes.dofs()
+    }
+
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        let Rows { affine, places, spots, tangents } = &self.rows;
+        let count = self.tangents();
+        for (row, (&place, spot)) in places.iter().zip(spots).enumerate() {
+            let size = spot.position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let name = (self.slave.nodes()[place], 0);
+            let mut contact = contacts.push_row(name, self.law, (&affine.jacobian, row));
+            contact.magnitude(T::of(size)).position(spot.position.map(T::of)).normal(spot.normal.map(T::of));
+            if count > 0 {
+                contact.friction(self.friction);
+                (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
+            }
+        }
+    }
+
+    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        check_local(u.len(), self.dofs().len())?;
+        let boxes = self.move_nodes(u)?;
+        let speeds =
+            [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
+        let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+        for (places, body) in self.searched_at.iter_mut().zip(&self.bodies) {
+            places.clear();
+            places.extend(body.iter().map(|&node| self.nodes.positions[node]));
+        }
+        self.found.clear();
+        self.pairs.clear();
+        if boxes[0].inflated(range).intersects(&boxes[1]) {
+            self.find_pairs(range);
+            self.integrate();
+            let rubs = self.tangents() > 0;
+            for place in 0..self.slave.nodes().len() {
+                self.found.push(place, &self.integrals, &self.nodes, rubs, u);
+            }
+        }
+        let same = self.rows.places == self.found.places && self.rows.affine.jacobian == self.found.affine.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(Candidates::changed_if(!same))
+    }
+
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        check_local(u.len(), self.dofs().len())?;
+        // A trial state that is not finite: the gaps say so.
+        if self.rows.places.is_empty() || self.move_nodes(u).is_err() {
+            return Ok(Candidates::Unchanged);
+        }
+        self.integrate();
+        self.found.clear();
+        let (count, moved) = (self.tangents(), self.moved_since_search());
+        let near = moved <= BEYOND * self.slave.finest().min(self.master.finest());
+        let Self { rows, found, integrals, nodes, slave, reach, .. } = self;
+        for (row, &place) in rows.places.iter().enumerate() {
+            if found.push(place, integrals, nodes, count > 0, u) {
+                continue;
+            }
+            // Nothing lies over it any more. What is open stays so, and what has just gone over the rim ends its step.
+            if !near && rows.affine.gap(row, u).value() <= OPEN * *reach {
+                let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
+                return Err(Error::ContactLost { t, contact });
+            }
+            found.keep(rows, row, count);
+        }
+        let same = rows.affine.jacobian == found.affine.jacobian;
+        std::mem::swap(rows, found);
+        Ok(Candidates::changed_if(!same))
+    }
+
+    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.places.len()) {
+            *gap = self.rows.affine.gap(row, u);
+        }
+        Ok(())
+    }
+
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        self.look_at(step)
+    }
+}

@@ -1,0 +1,254 @@
+//! Weighted gaps over the facets of a surface, and their derivatives by the positions of all nodes.
+//!
+//! With points of the slave facet that stay on its material, the normal n of its middle, area J and the master facet's
+//! normal ν where the ray meets it, the gap at a point is g = n·(x_m − x_s), and
+//!
+//! δg = μ·(δx_m − δx_s − g δn), μ = ν/(ν·n), δ∫N g dA = Σ ω N (J δg + g δJ):
+//!
+//! where the ray moves on along the master facet nothing changes to first order but what μ holds. The limits of the
+//! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there; where
+//! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under translations and rotations, term by term: so
+//! forces along the derivative conserve linear and angular momentum to rounding.
+
+use super::overlap::{Base, RimSample, Sample, middle};
+use crate::contact::surface::{Facet, Point, Surface, add_scaled, cross, dot, norm};
+
+/// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
+const LEAST: f64 = 1e-6;
+
+/// What is integrated for a slave node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// ∫N dA over what is covered, and over all facets of the node.
+    pub(super) area: f64,
+    whole: f64,
+    /// ∫N g dA.
+    moment: f64,
+    /// ∫N x dA, and −∫N μ dA.
+    position: Point,
+    normal: Point,
+}
+
+impl Sums {
+    /// Whether enough is covered for a row.
+    pub(super) fn is_covered(&self) -> bool {
+        self.area > LEAST * self.whole
+    }
+
+    /// The mean of the gap with the weights of the node.
+    pub(super) fn gap(&self) -> f64 {
+        self.moment / self.area
+    }
+
+    /// The mean of the covered points.
+    pub(super) fn position(&self) -> Point {
+        self.position.map(|x| x / self.area)
+    }
+
+    /// The mean direction in which the gap opens.
+    pub(super) fn normal(&self) -> Option<Point> {
+        crate::contact::surface::unit(self.normal)
+    }
+}
+
+/// What a row has of a node, before it is divided by the covered area.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    /// Place of the slave node whose row it is, and the node.
+    pub(super) row: usize,
+    pub(super) node: usize,
+    /// The derivatives of ∫N g dA and of ∫N dA by the position of the node.
+    moment: Point,
+    area: Point,
+    /// ∫N_row N_node dA: positive for slave nodes, negative for master nodes.
+    pub(super) share: f64,
+}
+
+impl Entry {
+    /// The derivative of the mean gap.
+    pub(super) fn weight(&self, sums: &Sums) -> Point {
+        add_scaled(self.moment, -sums.gap(), self.area).map(|x| x / sums.area)
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.moment = add_scaled(self.moment, 1.0, other.moment);
+        self.area = add_scaled(self.area, 1.0, other.area);
+        self.share += other.share;
+    }
+}
+
+/// Sums by place of the slave node, and the entries of their rows, ascending by row and node.
+#[derive(Debug, Default)]
+pub(super) struct Integrals {
+    pub(super) sums: Vec<Sums>,
+    entries: Vec<(usize, Entry)>,
+    merged: Vec<Entry>,
+    /// Where the entries of each row begin.
+    starts: Vec<usize>,
+}
+
+/// What a facet adds to the rows of a slave facet's corners, by its own corners.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    moments: [[Point; 4]; 4],
+    areas: [[Point; 4]; 4],
+    shares: [[f64; 4]; 4],
+    /// What the derivative of n is multiplied by, in moments and areas.
+    turns: [[Point; 2]; 4],
+}
+
+impl Block {
+    /// Adds that the rim of a master moves over the slave facet, to this one and to the master's.
+    fn add_rim(&mut self, sample: &RimSample, count: usize, onto: &mut Self) {
+        let RimSample { length, slave, master, gap, outward } = *sample;
+        for a in 0..count {
+            let weight = length * slave[a];
+            for k in 0..4 {
+                let (own, other) = (-weight * slave[k], weight * master[k]);
+                self.moments[a][k] = add_scaled(self.moments[a][k], own * gap, outward);
+                self.areas[a][k] = add_scaled(self.areas[a][k], own, outward);
+                onto.moments[a][k] = add_scaled(onto.moments[a][k], other * gap, outward);
+                onto.areas[a][k] = add_scaled(onto.areas[a][k], other, outward);
+            }
+            let [of_moment, of_area] = &mut self.turns[a];
+            *of_moment = add_scaled(*of_moment, -weight * gap * gap, outward);
+            *of_area = add_scaled(*of_area, -weight * gap, outward);
+        }
+    }
+
+    /// Adds that the normal of the slave facet turns.
+    fn turn(&mut self, base: &Base) {
+        let (count, length) = (base.count(), norm(base.product));
+        // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
+        let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / length);
+        let Self { moments, areas, turns, .. } = self;
+        for (turns, rows) in turns.iter().zip(moments.iter_mut().zip(areas)).take(count) {
+            let [of_moment, of_area] = turns.map(|turn| base.turned(&middle(count), across(turn)));
+            for b in 0..count {
+                rows.0[b] = add_scaled(rows.0[b], 1.0, of_moment[b]);
+                rows.1[b] = add_scaled(rows.1[b], 1.0, of_area[b]);
+            }
+        }
+    }
+}
+
+impl Integrals {
+    /// The entries of a row.
+    pub(super) fn row(&self, place: usize) -> &[Entry] {
+        &self.merged[self.starts[place]..self.starts[place + 1]]
+    }
+
+    /// Integrates over all facets of the slave surface what the master facets listed for each cover.
+    pub(super) fn integrate<'p>(
+        &mut self,
+        slave: &Surface,
+        master: &Surface,
+        positions: &[Point],
+        partners: impl Fn(usize) -> &'p [usize],
+    ) {
+        self.sums.clear();
+        self.sums.resize(slave.nodes().len(), Sums::default());
+        self.entries.clear();
+        for (index, facet) in slave.facets().iter().enumerate() {
+            let Some(base) = Base::new(facet, positions) else { continue };
+            let nodes = facet.nodes();
+            let places: [usize; 4] = facet.nodes.map(|node| slave.place(node));
+            let whole = norm(base.product) * [1.0, 0.5, 4.0][nodes.len() - 2] / nodes.len() as f64;
+            places[..nodes.len()].iter().for_each(|&place| self.sums[place].whole += whole);
+            let mut block = Block::default();
+            let mut touched = false;
+            for &partner in partners(index) {
+                touched |= self.integrate_pair(&base, (master, partner), positions, &places, &mut block);
+            }
+            if touched {
+                block.turn(&base);
+                self.push_all(&places, nodes.len(), facet, &block);
+            }
+        }
+        self.merge();
+    }
+
+    /// Adds what a master facet covers; says whether it covers anything.
+    fn integrate_pair(
+        &mut self,
+        base: &Base,
+        (master, partner): (&Surface, usize),
+        positions: &[Point],
+        places: &[usize; 4],
+        block: &mut Block,
+    ) -> bool {
+        let (count, other) = (base.count(), &master.facets()[partner]);
+        let mut onto = Block::default();
+        let mut touched = false;
+        base.each_sample(other, positions, &mut |sample: &Sample| {
+            touched = true;
+            let Sample { area, slave, master, gap, direction } = *sample;
+            let point = base.shape.point(&slave);
+            // (Of a segment the second tangent is the unit vector out of the plane, and this its length times n.)
+            let [first, second] = base.shape.tangents_at(&slave);
+            let product = cross(first, if count == 2 { [0.0, 0.0, 1.0] } else { second });
+            let omega = area / base.stretch(&slave);
+            let stretched = base.turned(&slave, base.normal);
+            for a in 0..count {
+                let weight = area * slave[a];
+                let sums = &mut self.sums[places[a]];
+                sums.area += weight;
+                sums.moment += weight * gap;
+                sums.position = add_scaled(sums.position, weight, point);
+                sums.normal = add_scaled(sums.normal, -weight, direction);
+                let by_area = omega * slave[a];
+                for b in 0..count {
+                    let moment = &mut block.moments[a][b];
+                    *moment = add_scaled(*moment, -weight * slave[b], direction);
+                    *moment = add_scaled(*moment, by_area * gap, stretched[b]);
+                    block.areas[a][b] = add_scaled(block.areas[a][b], by_area, stretched[b]);
+                    block.shares[a][b] += weight * slave[b];
+                }
+                let [of_moment, of_area] = &mut block.turns[a];
+                *of_moment = add_scaled(*of_moment, -weight * gap, direction);
+                *of_moment = add_scaled(*of_moment, by_area * gap, product);
+                *of_area = add_scaled(*of_area, by_area, product);
+                for (c, &share) in master.iter().enumerate() {
+                    onto.moments[a][c] = add_scaled(onto.moments[a][c], weight * share, direction);
+                    onto.shares[a][c] -= weight * share;
+                }
+            }
+        });
+        if touched {
+            let open = master.open_sides(partner);
+            base.each_rim_sample(other, open, positions, &mut |sample| block.add_rim(sample, count, &mut onto));
+            self.push_all(places, count, other, &onto);
+        }
+        touched
+    }
+
+    /// Makes entries of what rows have of the nodes of a facet.
+    fn push_all(&mut self, places: &[usize; 4], count: usize, facet: &Facet, block: &Block) {
+        for (a, &row) in places.iter().enumerate().take(count) {
+            for (b, &node) in facet.nodes().iter().enumerate() {
+                let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
+                self.entries.push((self.entries.len(), Entry { row, node, moment, area, share }));
+            }
+        }
+    }
+
+    /// Sums entries of a row that belong to one node, in the order in which they were found.
+    fn merge(&mut self) {
+        self.entries.sort_unstable_by_key(|(number, entry)| (entry.row, entry.node, *number));
+        self.merged.clear();
+        self.starts.clear();
+        for (_, entry) in &self.entries {
+            match self.merged.last_mut() {
+                Some(last) if (last.row, last.node) == (entry.row, entry.node) => last.add(entry),
+                _ => self.merged.push(*entry),
+            }
+        }
+        let mut next = 0;
+        for place in 0..=self.sums.len() {
+            while self.merged.get(next).is_some_and(|entry| entry.row < place) {
+                next += 1;
+            }
+            self.starts.push(next);
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Where two facets lie over each other: the part of the one that the other covers, and points to integrate over it.
+//!
+//! Both are projected onto the plane of the slave facet through its middle, along its normal there. Lines between nodes
+//! stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004,
+//! section 4); in two dimensions it is a part of a line.
+
+use crate::contact::surface::{Facet, Point, Shape, add_scaled, cross, dot, sub, unit};
+
+/// A point of the part of a slave facet that a master facet covers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// Its share of the area (length in two dimensions) in the slave facet's plane.
+    pub(super) area: f64,
+    /// Shape functions of the slave facet, and of the master facet where the normal through the point meets it.
+    pub(super) slave: [f64; 4],
+    pub(super) master: [f64; 4],
+    /// The distance from the one to the other along the slave facet's normal: negative where they are in each other.
+    pub(super) gap: f64,
+    /// The master facet's normal ν there over its product with the slave facet's normal n: the gap falls by it if the
+    /// slave's point moves, and grows by it if the master's does.
+    pub(super) direction: Point,
+}
+
+/// A point of a slave facet that lies below a side where the master ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RimSample {
+    /// Its share of the length in the plane (one in two dimensions).
+    pub(super) length: f64,
+    pub(super) slave: [f64; 4],
+    pub(super) master: [f64; 4],
+    pub(super) gap: f64,
+    /// The direction in the plane in which the master ends: a unit vector.
+    pub(super) outward: Point,
+}
+
+/// A slave facet and the plane through its middle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Base {
+    pub(super) shape: Shape,
+    pub(super) normal: Point,
+    /// The product of the tangents there, along the normal (of a segment with the unit vector out of the plane).
+    pub(super) product: Point,
+    axes: [Point; 2],
+    /// Its corners in the plane.
+    corners: [[f64; 2]; 4],
+    count: usize,
+    size: f64,
+}
+
+/// The weights of the middle of a facet.
+pub(super) fn middle(count: usize) -> [f64; 4] {
+    let share = 1.0 / count as f64;
+    std::array::from_fn(|k| if k < count { share } else { 0.0 })
+}
+
+/// Least cosine between the normal of a facet and the opposite of the other one's, if they are to meet: 60 degrees.
+const FACING: f64 = 0.5;
+
+/// Share of a facet that is too small to be a common part.
+const SLIVER: f64 = 1e-12;
+
+impl Base {
+    /// None if the facet has no normal.
+    pub(super) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
+        let (shape, count) = (facet.shape(positions), facet.nodes().len());
+        let [first, second] = shape.tangents_at(&middle(count));
+        let second = if count == 2 { [0.0, 0.0, 1.0] } else { second };
+        let product = cross(first, second);
+        let normal = unit(product)?;
+        let along = unit(first)?;
+        let axes = [along, cross(normal, along)];
+        let mut base = Self { shape, normal, product, axes, corners: [[0.0; 2]; 4], count, size: shape.size() };
+        base.corners = std::array::from_fn(|k| base.in_plane(shape.corner(k)));
+        Some(base)
+    }
+
+    fn in_plane(&self, x: Point) -> [f64; 2] {
+        let r = sub(x, self.shape.corner(0));
+        [dot(r, self.axes[0]), dot(r, self.axes[1])]
+    }
+
+    /// Whether a facet looks toward this one, and is not behind it by more than `depth`.
+    pub(super) fn may_meet(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
+        let shape = facet.shape(positions);
+        let nodes = facet.nodes();
+        let Some(normal) = shape.normal(&middle(nodes.len())) else { return false };
+        let height = |&node: &usize| dot(self.normal, sub(positions[node], self.shape.corner(0)));
+        dot(normal, self.normal) < -FACING && nodes.iter().map(height).fold(f64::NEG_INFINITY, f64::max) > -depth
+    }
+
+    /// Calls `act` with the points of what a master facet covers.
+    pub(super) fn each_sample(&self, facet: &Facet, positions: &[Point], act: &mut impl FnMut(&Sample)) {
+        let (shape, count) = (facet.shape(positions), facet.nodes().len());
+        let corners = std::array::from_fn(|k| self.in_plane(shape.corner(k)));
+        let master = Flat { corners, count };
+        if self.count == 2 {
+            return self.along_a_line(&shape, &master, act);
+        }
+        let own = Flat { corners: self.corners, count: self.count };
+        let Some(common) = own.common(&master, SLIVER * self.size * self.size) else { return };
+        let rule: &[[f64; 4]] = if self.count == 3 && count == 3 { &THREE } else { &SIX };
+        let [first, rest @ ..] = common.corners() else { return };
+        for pair in rest.windows(2) {
+            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
+            let area = 0.5 * (a[0] * b[1] - a[1] * b[0]);
+            for &[weight, _, s, t] in rule {
+                let p = [first[0] + s * a[0] + t * b[0], first[1] + s * a[1] + t * b[1]];
+                self.sample(weight * area, own.weights_at(p), &shape, master.weights_at(p), act);
+            }
+        }
+    }
+
+    fn along_a_line(&self, shape: &Shape, master: &Flat, act: &mut impl FnMut(&Sample)) {
+        let (length, [from, to]) = (self.corners[1][0], [master.corners[0][0], master.corners[1][0]]);
+        let (begin, end) = (from.min(to).max(0.0), from.max(to).min(length));
+        if end - begin <= SLIVER * length {
+            return;
+        }
+        for (weight, place) in LINE {
+            let x = begin + place * (end - begin);
+            let line = |from: f64, to: f64| [(to - x) / (to - from), (x - from) / (to - from), 0.0, 0.0];
+            self.sample(weight * (end - begin), line(0.0, length), shape, line(from, to), act);
+        }
+    }
+
+    fn sample(&self, area: f64, slave: [f64; 4], shape: &Shape, master: [f64; 4], act: &mut impl FnMut(&Sample)) {
+        let Some(normal) = shape.normal(&master) else { return };
+        let cosine = dot(normal, self.normal);
+        let gap = dot(self.normal, sub(shape.point(&master), self.shape.point(&slave)));
+        // (A warped facet may be seen from its side somewhere.)
+        if cosine < 0.0 && gap.is_finite() {
+            act(&Sample { area, slave, master, gap, direction: normal.map(|x| x / cosine) });
+        }
+    }
+
+    /// Calls `act` with points below the sides of a master facet where its surface ends.
+    pub(super) fn each_rim_sample(
+        &self,
+        facet: &Facet,
+        open: [bool; 4],
+        positions: &[Point],
+        act: &mut impl FnMut(&RimSample),
+    ) {
+        let (shape, count) = (facet.shape(positions), facet.nodes().len());
+        let corners: [[f64; 2]; 4] = std::array::from_fn(|k| self.in_plane(shape.corner(k)));
+        let own = Flat { corners: self.corners, count: self.count };
+        for k in (0..count).filter(|&k| open[k]) {
+            let (from, to) = (corners[k], corners[(k + 1) % count]);
+            let mut sample = |length: f64, share: f64, slave: [f64; 4], outward: [f64; 2]| {
+                let master = shape.on_side(k, share);
+                let gap = dot(self.normal, sub(shape.point(&master), self.shape.point(&slave)));
+                let [along, across] = outward;
+                let outward = add_scaled(self.axes[0].map(|x| along * x), across, self.axes[1]);
+                act(&RimSample { length, slave, master, gap, outward });
+            };
+            if self.count == 2 {
+                // The sides of a segment are its ends.
+                let (x, length) = (from[0], self.corners[1][0]);
+                if x > 0.0 && x < length {
+                    sample(1.0, 0.0, [1.0 - x / length, x / length, 0.0, 0.0], [(from[0] - to[0]).signum(), 0.0]);
+                }
+                continue;
+            }
+            let way = [to[0] - from[0], to[1] - from[1]];
+            let length = way[0].hypot(way[1]);
+            let Some([begin, end]) = own.crossing(from, way) else { continue };
+            // Seen from the slave the master goes around clockwise: what is on its left is outside.
+            let outward = [-way[1] / length, way[0] / length];
+            for (weight, place) in LINE {
+                let share = begin + place * (end - begin);
+                let slave = own.weights_at([from[0] + share * way[0], from[1] + share * way[1]]);
+                sample(weight * (end - begin) * length, share, slave, outward);
+            }
+        }
+    }
+
+    /// The slave facet's area for its coordinates, where the shape functions are `weights`.
+    pub(super) fn stretch(&self, weights: &[f64; 4]) -> f64 {
+        let [first, second] = self.shape.tangents_at(weights);
+        match self.count {
+            2 => dot(self.normal, cross(first, [0.0, 0.0, 1.0])),
+            _ => dot(self.normal, cross(first, second)),
+        }
+    }
+
+    /// Number of nodes.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`: the
+    /// vector that each corner's motion is multiplied by.
+    pub(super) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
+        let [first, second] = self.shape.tangents_at(weights);
+        let [by_first, by_second] = match self.count {
+            2 => [cross([0.0, 0.0, 1.0], vector), [0.0; 3]],
+            _ => [cross(second, vector), cross(vector, first)],
+        };
+        let [one, other] = derivatives(self.count, weights);
+        std::array::from_fn(|k| add_scaled(by_first.map(|x| one[k] * x), other[k], by_second))
+    }
+}
+
+/// How the tangents follow from the corners: their coefficients where the shape functions are `weights`.
+fn derivatives(count: usize, weights: &[f64; 4]) -> [[f64; 4]; 2] {
+    match count {
+        2 => [[-1.0, 1.0, 0.0, 0.0], [0.0; 4]],
+        3 => [[-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0]],
+        _ => {
+            let [w0, w1, w2, w3] = *weights;
+            let [upper, right] = [w2 + w3, w1 + w2].map(|share| 0.5 * share);
+            let [lower, left] = [w0 + w1, w0 + w3].map(|share| 0.5 * share);
+            [[-lower, lower, upper, -upper], [-left, -right, right, left]]
+        }
+    }
+}
+
+/// A triangle or a quadrilateral in a plane.
+#[derive(Clone, Copy, Debug)]
+struct Flat {
+    corners: [[f64; 2]; 4],
+    count: usize,
+}
+
+impl Flat {
+    /// The shape functions at a point: of a quadrilateral by Newton's method, which is exact at once for parallelograms.
+    fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
+        const ITERATIONS: usize = 12;
+        let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
+        let r = [p[0] - self.corners[0][0], p[1] - self.corners[0][1]];
+        let solve = |a: [f64; 2], b: [f64; 2], r: [f64; 2]| {
+            let determinant = a[0] * b[1] - a[1] * b[0];
+            [(r[0] * b[1] - r[1] * b[0]) / determinant, (a[0] * r[1] - a[1] * r[0]) / determinant]
+        };
+        if self.count == 3 {
+            let [s, t] = solve(from(1), from(2), r);
+            return [1.0 - s - t, s, t, 0.0];
+        }
+        // Coordinates from 0 to 1: x = x₀ + s a + t b + s t c.
+        let (a, b) = (from(1), from(3));
+        let c: [f64; 2] = std::array::from_fn(|i| from(2)[i] - a[i] - b[i]);
+        let [mut s, mut t] = [0.5; 2];
+        for _ in 0..ITERATIONS {
+            let missing = std::array::from_fn(|i| r[i] - s * a[i] - t * b[i] - s * t * c[i]);
+            let [by_s, by_t] = [std::array::from_fn(|i| a[i] + t * c[i]), std::array::from_fn(|i| b[i] + s * c[i])];
+            let [ds, dt] = solve(by_s, by_t, missing);
+            (s, t) = (s + ds, t + dt);
+            if ds.abs().max(dt.abs()) <= 4.0 * f64::EPSILON {
+                break;
+            }
+        }
+        [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
+    }
+
+    /// Which shares of a way are inside, from and to, if any are.
+    fn crossing(&self, from: [f64; 2], way: [f64; 2]) -> Option<[f64; 2]> {
+        let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+        for k in 0..self.count {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
+            let side = [b[0] - a[0], b[1] - a[1]];
+            // Heights over the side at the start, and gained along the way.
+            let height = side[0] * (from[1] - a[1]) - side[1] * (from[0] - a[0]);
+            let gain = side[0] * way[1] - side[1] * way[0];
+            if gain > 0.0 {
+                begin = begin.max(-height / gain);
+            } else if gain < 0.0 {
+                end = end.min(-height / gain);
+            } else if height < 0.0 {
+                return None;
+            }
+        }
+        (begin < end).then_some([begin, end])
+    }
+
+    /// What another one that goes the other way around has in common with this one, if its area is above `least`
+    /// (Sutherland and Hodgman, Commun. ACM 17, 1974).
+    fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
+        let mut polygon = Polygon::default();
+        other.corners[..other.count].iter().rev().for_each(|&corner| polygon.push(corner));
+        for k in 0..self.count {
+            polygon = polygon.cut(self.corners[k], self.corners[(k + 1) % self.count]);
+        }
+        (polygon.area() > least).then_some(polygon)
+    }
+}
+
+/// A convex polygon: a quadrilateral cut by four lines.
+#[derive(Clone, Copy, Debug, Default)]
+struct Polygon {
+    corners: [[f64; 2]; 8],
+    count: usize,
+}
+
+impl Polygon {
+    fn push(&mut self, corner: [f64; 2]) {
+        // (A quadrilateral that is not convex may have more corners in common: the last ones are left out.)
+        if let Some(place) = self.corners.get_mut(self.count) {
+            *place = corner;
+            self.count += 1;
+        }
+    }
+
+    fn corners(&self) -> &[[f64; 2]] {
+        &self.corners[..self.count]
+    }
+
+    fn area(&self) -> f64 {
+        let corners = self.corners();
+        let Some(&first) = corners.first() else { return 0.0 };
+        let triangle = |pair: &[[f64; 2]]| {
+            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
+            0.5 * (a[0] * b[1] - a[1] * b[0])
+        };
+        corners.windows(2).map(triangle).sum()
+    }
+
+    /// What is to the left of a line.
+    fn cut(&self, from: [f64; 2], to: [f64; 2]) -> Self {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let left = |x: [f64; 2]| along[0] * (x[1] - from[1]) - along[1] * (x[0] - from[0]);
+        let mut kept = Self::default();
+        let Some(&last) = self.corners().last() else { return kept };
+        let (mut before, mut height_before) = (last, left(last));
+        for &corner in self.corners() {
+            let height = left(corner);
+            if (height > 0.0) != (height_before > 0.0) {
+                let share = height_before / (height_before - height);
+                kept.push(std::array::from_fn(|i| before[i] + share * (corner[i] - before[i])));
+            }
+            if height > 0.0 {
+                kept.push(corner);
+            }
+            (before, height_before) = (corner, height);
+        }
+        kept
+    }
+}
+
+/// Gauss' rule of three points on a line of length one (degree 5): weight and place.
+const LINE: [(f64, f64); 3] =
+    [(5.0 / 18.0, 0.112_701_665_379_258_31), (8.0 / 18.0, 0.5), (5.0 / 18.0, 0.887_298_334_620_741_7)];
+
+/// Rules on a triangle of area one: weight, and the three weights of the corners (Dunavant, Int. J. Numer. Methods Eng.
+/// 21, 1985). Of degree 2, enough for products of two linear functions, and of degree 4, for bilinear ones.
+const THREE: [[f64; 4]; 3] = [
+    [1.0 / 3.0, 2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 3.0, 1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+const SIX: [[f64; 4]; 6] = [
+    [0.223_381_589_678_011_46, 0.108_103_018_168_070_23, 0.445_948_490_915_964_9, 0.445_948_490_915_964_9],
+    [0.223_381_589_678_011_46, 0.445_948_490_915_964_9, 0.108_103_018_168_070_23, 0.445_948_490_915_964_9],
+    [0.223_381_589_678_011_46, 0.445_948_490_915_964_9, 0.445_948_490_915_964_9, 0.108_103_018_168_070_23],
+    [0.109_951_743_655_321_87, 0.816_847_572_980_458_5, 0.091_576_213_509_770_74, 0.091_576_213_509_770_74],
+    [0.109_951_743_655_321_87, 0.091_576_213_509_770_74, 0.816_847_572_980_458_5, 0.091_576_213_509_770_74],
+    [0.109_951_743_655_321_87, 0.091_576_213_509_770_74, 0.091_576_213_509_770_74, 0.816_847_572_980_458_5],
+];

@@ -1,0 +1,69 @@
+//! Which facets of two surfaces may meet: lists kept over many steps, and those of them that are near now.
+
+use super::overlap::Base;
+use crate::contact::surface::{Bounds, Neighborhood, Point, Surface};
+
+/// For each slave facet the master facets near it.
+#[derive(Debug, Default)]
+pub(super) struct Pairs {
+    lists: Neighborhood,
+    /// How far from a facet the lists hold all others, where they were built; none before.
+    listed: Option<f64>,
+    starts: Vec<usize>,
+    near: Vec<usize>,
+}
+
+impl Pairs {
+    /// Forgets the lists.
+    pub(super) fn forget(&mut self) {
+        self.listed = None;
+        self.clear();
+    }
+
+    /// No pairs.
+    pub(super) fn clear(&mut self) {
+        self.near.clear();
+        self.starts.clear();
+    }
+
+    /// Whether the lists hold all facets within `range`, if the surfaces have moved by so much against each other since
+    /// they were built.
+    pub(super) fn are_sure_of(&self, range: f64, moved: f64) -> bool {
+        self.listed.is_some_and(|listed| range + moved <= listed)
+    }
+
+    /// Lists anew what is within `range`.
+    pub(super) fn build(&mut self, [slave, master]: [&Surface; 2], positions: &[Point], range: f64) {
+        let boxes = slave.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
+        self.lists.build(boxes, master, positions, range);
+        self.listed = Some(range);
+    }
+
+    /// Takes from the lists the pairs that face each other within `range`, and are not in each other by more than
+    /// `depth`. (The result does not depend on the age of the lists.)
+    pub(super) fn take_near(&mut self, surfaces: [&Surface; 2], positions: &[Point], range: f64, depth: f64) {
+        let [slave, master] = surfaces;
+        self.clear();
+        self.starts.push(0);
+        for (index, facet) in slave.facets().iter().enumerate() {
+            let listed = self.lists.of(index);
+            if let Some(base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
+                let around = Bounds::of_corners(&base.shape).inflated(range);
+                self.near.extend(listed.iter().copied().filter(|&partner| {
+                    let partner = &master.facets()[partner];
+                    around.intersects(&Bounds::of_corners(&partner.shape(positions)))
+                        && base.may_meet(partner, positions, depth)
+                }));
+            }
+            self.starts.push(self.near.len());
+        }
+    }
+
+    /// The master facets near a slave facet, ascending.
+    pub(super) fn of(&self, facet: usize) -> &[usize] {
+        match self.starts.get(facet..facet + 2) {
+            Some(range) => &self.near[range[0]..range[1]],
+            None => &[],
+        }
+    }
+}

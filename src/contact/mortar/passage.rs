@@ -1,0 +1,94 @@
+//! What surfaces have gone through in a step: weighted gaps along the way.
+
+use super::Mortar;
+use super::integrals::Integrals;
+use super::pairs::Pairs;
+use crate::contact::surface::{Bounds, Point, add_scaled, sub};
+use crate::contact::{LARGEST_MISS, Stride};
+use crate::error::Result;
+use crate::real::Real;
+
+/// Share of the smallest facet that the surfaces may move against each other without being looked at, and that they move
+/// between two looks.
+const FINE: f64 = 0.125;
+
+/// The most looks a step. What moves farther is refused where its way leads through the other surface's box.
+const LOOKS: u32 = 512;
+
+/// Memory for looking at a step.
+#[derive(Debug, Default)]
+pub(super) struct Look {
+    ends: [Vec<Point>; 2],
+    positions: Vec<Point>,
+    pairs: Pairs,
+    integrals: Integrals,
+    /// Whether the gap of each slave node was open, or unknown, at the start.
+    outside: Vec<bool>,
+}
+
+impl<T: Real> Mortar<T> {
+    /// Refuses a step in which the surfaces have gone into each other on their way, or have been stopped apart.
+    pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        let moved = |node: &usize| sub(self.nodes.vector(*node, step.u[1]), self.nodes.vector(*node, step.u[0]));
+        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(moved)));
+        let (way, finest) = (motions[0].farthest(&motions[1]), self.slave.finest().min(self.master.finest()));
+        if way <= FINE * finest {
+            return Ok(());
+        }
+        let mut look = std::mem::take(&mut self.look);
+        let result = self.look_along(step, way, FINE * finest, &mut look);
+        self.look = look;
+        result
+    }
+
+    fn look_along(&self, step: &Stride<'_, T>, way: f64, fine: f64, look: &mut Look) -> Result<()> {
+        let Look { ends, positions, pairs, integrals, outside } = look;
+        for (positions, u) in ends.iter_mut().zip(step.u) {
+            positions.clone_from(&self.nodes.coordinates);
+            for &node in self.bodies.iter().flatten() {
+                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
+            }
+        }
+        let swept = [0, 1].map(|body| {
+            let places = self.bodies[body].iter().flat_map(|&node| [ends[0][node], ends[1][node]]);
+            Bounds::of_points(places)
+        });
+        if !swept[0].inflated(self.reach).intersects(&swept[1]) {
+            return Ok(());
+        }
+        let name = |place: usize| (self.slave.nodes()[place], 0);
+        let Some(looks) = (1..=LOOKS).find(|&looks| f64::from(looks) * fine >= way) else {
+            return Err(step.refuse(name(0), "is too fast for its facets to be followed", way, f64::INFINITY));
+        };
+        let surfaces = [&self.slave, &self.master];
+        positions.clone_from(&ends[0]);
+        pairs.build(surfaces, positions, self.reach + way);
+        outside.clear();
+        outside.resize(self.slave.nodes().len(), true);
+        let limit = -LARGEST_MISS * way;
+        for look in 0..=looks {
+            let share = f64::from(look) / f64::from(looks);
+            for &node in self.bodies.iter().flatten() {
+                positions[node] = add_scaled(ends[0][node], share, sub(ends[1][node], ends[0][node]));
+            }
+            pairs.take_near(surfaces, positions, self.reach, self.reach);
+            integrals.integrate(&self.slave, &self.master, positions, |facet| pairs.of(facet));
+            for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
+                if look == 0 {
+                    // What is inside already comes out as it may.
+                    outside[place] = sums.gap() >= limit;
+                } else if outside[place] && sums.gap() < limit && !self.law.is_compliant() {
+                    return Err(step.refuse(name(place), "went into the other surface", way, sums.gap()));
+                }
+            }
+        }
+        for (row, &place) in self.rows.places.iter().enumerate() {
+            let sums = &integrals.sums[place];
+            let stopped = !step.closed[0][row] && step.closed[1][row];
+            if stopped && sums.is_covered() && sums.gap() > -limit {
+                return Err(step.refuse(name(place), "was stopped away from the surface", way, sums.gap()));
+            }
+        }
+        Ok(())
+    }
+}

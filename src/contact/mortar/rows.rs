@@ -1,0 +1,85 @@
+//! The rows of weighted gaps: entries of G, tangents, and where contacts are.
+
+use super::integrals::{Entry, Integrals};
+use crate::contact::ContactJacobian;
+use crate::contact::affine_rows::AffineRows;
+use crate::contact::obstacle::across;
+use crate::contact::surface::{Nodes, Point};
+use crate::real::Real;
+
+/// The rows of a search, where they are linearized.
+#[derive(Debug)]
+pub(super) struct Rows<T> {
+    pub(super) affine: AffineRows<T>,
+    /// The slave node of each row, by its place among the nodes of its surface.
+    pub(super) places: Vec<usize>,
+    pub(super) spots: Vec<Spot>,
+    /// `dimension` − 1 rows each, if there is friction.
+    pub(super) tangents: ContactJacobian<T>,
+}
+
+/// Where a contact is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub(super) position: Point,
+    pub(super) normal: Point,
+    /// The covered area that belongs to the node.
+    pub(super) area: f64,
+}
+
+impl<T: Real> Rows<T> {
+    pub(super) fn new() -> Self {
+        Self {
+            affine: AffineRows::with_capacity(0, 0),
+            places: Vec::new(),
+            spots: Vec::new(),
+            tangents: ContactJacobian::default(),
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.affine.clear();
+        self.places.clear();
+        self.spots.clear();
+        self.tangents.clear();
+    }
+
+    /// Appends the row of a slave node, if it is covered; says whether it is.
+    pub(super) fn push(&mut self, place: usize, integrals: &Integrals, nodes: &Nodes, rubs: bool, u: &[T]) -> bool {
+        let sums = &integrals.sums[place];
+        let Some(normal) = sums.normal().filter(|_| sums.is_covered()) else { return false };
+        let entries = integrals.row(place);
+        let weights = entries.iter().flat_map(|entry| on_axes(nodes, entry, entry.weight(sums)));
+        self.affine.push(sums.gap(), weights, u);
+        self.places.push(place);
+        self.spots.push(Spot { position: sums.position(), normal, area: sums.area });
+        if rubs {
+            let [x, y, _] = normal;
+            let directions = match nodes.dimension {
+                2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
+                _ => across(normal),
+            };
+            for direction in directions.into_iter().take(nodes.dimension - 1) {
+                let slip = |entry: &Entry| direction.map(|x| entry.share / sums.area * x);
+                let along = entries.iter().flat_map(|entry| on_axes(nodes, entry, slip(entry)));
+                self.tangents.push_entries(along.map(|(place, weight)| (place, T::of(weight))));
+            }
+        }
+        true
+    }
+
+    /// Appends a row as another list has it.
+    pub(super) fn keep(&mut self, other: &Self, row: usize, tangents: usize) {
+        self.affine.keep(&other.affine, row);
+        self.places.push(other.places[row]);
+        self.spots.push(other.spots[row]);
+        for tangent in row * tangents..(row + 1) * tangents {
+            self.tangents.push_row(&other.tangents, tangent);
+        }
+    }
+}
+
+/// The components of a node's weight, with the places of its dofs.
+fn on_axes<'n>(nodes: &'n Nodes, entry: &Entry, weight: Point) -> impl Iterator<Item = (usize, f64)> + use<'n> {
+    nodes.places(entry.node).iter().copied().zip(weight)
+}

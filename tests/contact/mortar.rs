@@ -1,0 +1,364 @@
+//! Weighted gaps: patch tests, derivatives, momentum, impacts, what is covered in part, what is refused.
+
+use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};
+use contact_dynamics::{Composite, Error, PersistencyCorrection, Real, Simulation, StepControl, verify};
+use contact_dynamics_scenes::random::xorshift;
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::stacks::Stack;
+
+const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
+
+/// With a reach of less than the bodies.
+fn mortar<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
+    stack.mortar(upper).unwrap().reach(0.3).unwrap()
+}
+
+fn blocks(lower: [usize; 3], upper: [usize; 3]) -> [Solid<3>; 2] {
+    [lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL))
+}
+
+fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
+    [lower, upper].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL))
+}
+
+#[test]
+fn the_patch_test_in_two_dimensions() {
+    for (lower, upper) in [(3, 3), (3, 4), (7, 2), (1, 5)] {
+        for slope in [0.0, 0.35] {
+            let stack = Stack::new(plates(lower, upper), 0.0, |[x, y]| [x, y + slope * x * (2.0 - y) * y]);
+            for from_above in [true, false] {
+                let error = stack.patch(mortar(&stack, from_above)).unwrap();
+                assert!(error < 1e-12, "{lower} on {upper}, slope {slope}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_patch_test_in_three_dimensions() {
+    for (lower, upper) in [([3, 3, 1], [2, 2, 1]), ([2, 3, 1], [4, 1, 1])] {
+        for slope in [0.0, 0.25] {
+            let stack =
+                Stack::new(blocks(lower, upper), 0.0, |[x, y, z]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z]);
+            for from_above in [true, false] {
+                let error = stack.patch(mortar(&stack, from_above)).unwrap();
+                assert!(error < 1e-12, "{lower:?} on {upper:?}, slope {slope}: {error:e}");
+            }
+        }
+    }
+}
+
+/// All displacements of a constraint, at random within `size`.
+fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
+    let mut random = xorshift(seed);
+    (0..dofs).map(|_| size * (2.0 * random() - 1.0)).collect()
+}
+
+#[test]
+fn rows_are_the_derivatives_of_gaps() {
+    for seed in 1..6 {
+        // The slave on the inside of the master, and beyond its rim.
+        for shift in [0.0, 0.35] {
+            let [below, above] = plates(5, 3);
+            let above = above.mapped(|[x, y]| [0.1 + shift + 0.8 * x, y]);
+            let stack = Stack::new([below, above], 0.1, |x| x);
+            let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
+            let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            // (One may be beyond.)
+            assert!(error.rows >= 3 && error.rows_lost == 0 && error.jacobian < 1e-8, "{error:?}");
+
+            let [below, above] = blocks([4, 3, 1], [2, 2, 1]);
+            let above = above.mapped(|[x, y, z]| [0.15 + shift + 0.7 * x, 0.15 + 0.5 * shift + 0.7 * y, z]);
+            let stack = Stack::new([below, above], 0.1, |x| x);
+            let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
+            let error = verify::gap_jacobian(&mut mortar(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature.)
+            assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-3, "{error:?}");
+        }
+    }
+}
+
+/// G times the velocities of a rigid motion.
+fn along_rigid_motion<const D: usize>(contacts: &Contacts<f64>, dofs: &[usize], motion: &[f64]) -> f64 {
+    let rate = |row: usize| contacts.row(row).map(|(place, weight)| weight * motion[dofs[place]]).sum::<f64>().abs();
+    (0..contacts.len()).map(rate).fold(0.0, f64::max)
+}
+
+#[test]
+fn rows_do_no_work_on_rigid_motions() {
+    let [below, above] = blocks([4, 3, 1], [3, 3, 1]);
+    // In part beside each other.
+    let stack = Stack::new([below, above.moved([0.3, 0.2, 0.0])], 0.1, |x| x);
+    let mut contact = mortar(&stack, true);
+    let dofs = contact.dofs().to_vec();
+    let u = shaken(stack.solid.dofs(), 0.03, 3);
+    let local: Vec<f64> = dofs.iter().map(|&dof| u[dof]).collect();
+    contact.search(0.0, &local, &vec![0.0; local.len()], 0.0).unwrap();
+    let contacts = Contacts::of(&contact);
+    assert_eq!(contacts.len(), 16);
+    for axis in 0..3 {
+        let translation = stack.solid.uniform::<f64>(std::array::from_fn(|i| f64::from(u8::from(i == axis))));
+        assert!(along_rigid_motion::<3>(&contacts, &dofs, &translation) < 1e-13);
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let rotation = stack.solid.nodes.iter().enumerate().flat_map(|(node, x)| {
+            let at: [f64; 3] = std::array::from_fn(|i| x[i] + u[3 * node + i]);
+            let mut velocity = [0.0; 3];
+            (velocity[j], velocity[k]) = (-at[k], at[j]);
+            velocity
+        });
+        assert!(along_rigid_motion::<3>(&contacts, &dofs, &rotation.collect::<Vec<_>>()) < 1e-13);
+    }
+}
+
+#[test]
+fn slip_is_that_of_the_surfaces() {
+    let [below, above] = blocks([4, 3, 1], [3, 3, 1]);
+    let stack = Stack::new([below, above.moved([0.3, 0.2, 0.0])], 0.0, |x| x);
+    let mut contact = mortar(&stack, true).friction(0.2);
+    let dofs = contact.dofs().to_vec();
+    contact.search(0.0, &vec![0.0; dofs.len()], &vec![0.0; dofs.len()], 0.0).unwrap();
+    let contacts = Contacts::of(&contact);
+    // The upper block slides, then both move together.
+    for (velocity, moves, slip) in [([0.3, -0.4, 7.0], 3 * stack.split, 0.5), ([0.3, -0.4, 7.0], 0, 0.0)] {
+        let v = |dof: usize| if dof >= moves { velocity[dof % 3] } else { 0.0 };
+        for row in 0..contacts.len() {
+            let along = |tangent: &Vec<(usize, f64)>| tangent.iter().map(|&(k, w)| w * v(dofs[k])).sum::<f64>();
+            let found: f64 = contacts.tangents(row).iter().map(|tangent| along(tangent).powi(2)).sum::<f64>().sqrt();
+            assert!((found - slip).abs() < 1e-13, "{found} {slip}");
+        }
+    }
+    assert_eq!((contacts.len(), contacts.friction(3)), (16, 0.2));
+}
+
+#[test]
+fn impacts_of_blocks_keep_momentum_and_gain_no_energy() {
+    let h = 0.25 / MATERIAL.wave_speed();
+    for (lower, upper, friction) in
+        [([3, 3, 3], [4, 4, 3], 0.0), ([4, 4, 3], [3, 3, 3], 0.0), ([3, 3, 3], [4, 4, 3], 0.3)]
+    {
+        let stack = Stack::new(blocks(lower, upper), 0.003, |x| x);
+        let solid = &stack.solid;
+        let speed = [0.02, 0.01, -0.1];
+        let v: Vec<f64> =
+            (0..solid.dofs()).map(|dof| if dof >= 3 * stack.split { speed[dof % 3] } else { 0.0 }).collect();
+        let mut run = Simulation::builder(solid.system(), Composite, h)
+            .velocity(v)
+            .constraint(mortar(&stack, true).friction(friction))
+            .corrector(PersistencyCorrection::with_history_projection())
+            .build()
+            .unwrap();
+        let direction =
+            |axis: usize| -> Vec<f64> { (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == axis))).collect() };
+        let momentum = |run: &Simulation<'_, f64>| [0, 1, 2].map(|axis| run.momentum(&direction(axis)).unwrap());
+        let (start, energy) = (momentum(&run), run.energy().total());
+        let (mut before, mut most, mut parted) = (energy, 0, false);
+        while run.time() < 1.5 {
+            run.step().unwrap();
+            for (now, start) in momentum(&run).iter().zip(start) {
+                assert!((now - start).abs() < 1e-12, "{now} {start}");
+            }
+            let total = run.energy().total();
+            assert!(total < before + 2e-3 * energy, "t = {}: {:e}", run.time(), (total - before) / energy);
+            before = total;
+            let contacts = run.state().contacts();
+            let pressed = contacts.raw_forces().iter().filter(|f| **f > 0.0).count();
+            most = most.max(pressed);
+            parted = most > 0 && pressed == 0;
+            assert!(contacts.gaps().iter().all(|gap| *gap > -1e-6), "{:?}", contacts.gaps());
+        }
+        assert!(most >= 9 && parted, "{most} pressed");
+        assert!(before > 0.7 * energy, "{}", before / energy);
+    }
+}
+
+#[test]
+fn what_is_covered_in_part_has_gaps_of_full_size() {
+    // A corner of the upper block hangs over the lower one by a sliver.
+    for overhang in [0.5, 0.9, 0.9995, 0.999_99] {
+        let [below, above] = plates(4, 1);
+        let stack = Stack::new([below, above.moved([overhang, 0.0])], 0.05, |x| x);
+        let mut contact = mortar(&stack, true);
+        let still = vec![0.0; contact.dofs().len()];
+        contact.search(0.0, &still, &still, 0.0).unwrap();
+        let mut gaps = vec![0.0; Contacts::of(&contact).len()];
+        contact.gaps(0.0, &still, &mut gaps).unwrap();
+        // (The node at the far end of the segment has no row for a sliver at the near end.)
+        assert_eq!(gaps.len(), if overhang < 0.99 { 2 } else { 1 });
+        assert!(gaps.iter().all(|gap| (gap - 0.05).abs() < 1e-12), "{gaps:?}");
+        let covered: f64 = (0..gaps.len()).map(|row| contact.area(row)).sum();
+        assert!((covered / (1.0 - overhang) - 1.0).abs() < 1e-3, "{covered}");
+    }
+}
+
+#[test]
+fn a_block_slides_off_the_edge_of_another() {
+    let material = Material { young: 1e4, ..MATERIAL };
+    let below = Solid::rectangle([1.0; 2], [4, 2], material);
+    let above = Solid::rectangle([0.6, 1.0], [3, 3], material).moved([0.3, 0.0]);
+    for upper in [true, false] {
+        let stack = Stack::new([below.clone(), above.clone()], 0.0, |x| x);
+        let mass = stack.solid.lumped_mass::<f64>();
+        let heavy = mass.clone();
+        let mut system = stack.solid.system::<f64>().load(move |_, f| {
+            f.iter_mut().zip(&mass).skip(1).step_by(2).for_each(|(f, m)| *f = -m);
+        });
+        for node in (0..stack.split).filter(|&node| stack.solid.nodes[node][1] < 0.75) {
+            system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
+        }
+        let v = (0..stack.solid.dofs()).map(|dof| if dof >= 2 * stack.split && dof % 2 == 0 { 1.0 } else { 0.0 });
+        let mut run = Simulation::builder(system, Composite, 2e-3)
+            .velocity(v.collect())
+            .constraint(mortar(&stack, upper))
+            .step_control(StepControl::halving(1e-5).unwrap())
+            .build()
+            .unwrap();
+        let last = 2 * (stack.solid.nodes.len() - 1);
+        let (energy, weight) = (run.energy().total(), 0.6);
+        let mut forces = Vec::new();
+        while run.time() < 0.9 {
+            run.step().unwrap();
+            let sunk =
+                run.state().displacement().iter().zip(&heavy).skip(1).step_by(2).map(|(u, m)| m * u).sum::<f64>();
+            let total = run.energy().total() + sunk;
+            assert!(total < energy + 1e-4 * weight, "t = {}: {total} {energy}", run.time());
+            forces.push(run.state().contacts().forces().iter().sum::<f64>());
+        }
+        // First it is borne, then it tips and falls.
+        let mean = forces[..100].iter().sum::<f64>() / 100.0;
+        assert!((mean / weight - 1.0).abs() < 0.1 && forces[forces.len() - 1] == 0.0, "{mean}");
+        assert!(run.state().displacement()[last] > 0.7, "{}", run.state().displacement()[last]);
+    }
+}
+
+#[test]
+fn a_step_into_the_other_surface_is_refused_and_mended() {
+    let build = |speed: f64| {
+        let [below, above] = plates(3, 4);
+        // It is clear of the floor by more than its size, and turned.
+        let stack = Stack::new([below, above.rotated(0.1)], 2.0, |x| x);
+        let v = (0..stack.solid.dofs()).map(|dof| if dof >= 2 * stack.split && dof % 2 == 1 { -speed } else { 0.0 });
+        let facets = |lower: bool| {
+            let inside = |facet: &[usize]| facet.iter().all(|&n| (n < stack.split) == lower);
+            stack.solid.boundary().iter().filter(|facet| inside(facet)).map(|facet| Stack::<2>::facet(facet)).collect()
+        };
+        let (slave, master): (Vec<_>, Vec<_>) = (facets(false), facets(true));
+        let contact = Mortar::new(&stack.solid.nodes, &stack.solid.node_dofs(), slave, master).unwrap();
+        Simulation::builder(stack.solid.system::<f64>(), Composite, 0.05).velocity(v.collect()).constraint(contact)
+    };
+    let mut run = build(100.0).build().unwrap();
+    let failed = (0..10).find_map(|_| run.step().err());
+    assert!(matches!(failed, Some(Error::PassedThrough { .. } | Error::ContactLost { .. })), "{failed:?}");
+    let control = StepControl::halving(1e-4).unwrap();
+    let mut run = build(5.0).step_control(control).build().unwrap();
+    run.run_until(1.0, &mut ()).unwrap();
+    // It came back.
+    let up: f64 = run.state().velocity().iter().skip(1).step_by(2).sum();
+    assert!(up > -1e3, "{up}");
+}
+
+/// Name, gap, and (dof, weight) pairs of a row.
+type Found = ((usize, usize), f64, Vec<(usize, f64)>);
+
+/// All rows after a search.
+fn found(contact: &mut Mortar<f64>, u: &[f64]) -> Vec<Found> {
+    let dofs = contact.dofs().to_vec();
+    let local: Vec<f64> = dofs.iter().map(|&dof| u[dof]).collect();
+    contact.search(0.0, &local, &vec![0.0; local.len()], 0.0).unwrap();
+    let contacts = Contacts::of(&*contact);
+    let mut gaps = vec![0.0; contacts.len()];
+    contact.gaps(0.0, &local, &mut gaps).unwrap();
+    let row = |row: usize| {
+        let mut row: Vec<_> = contacts.row(row).map(|(place, weight)| (dofs[place], weight)).collect();
+        row.sort_unstable_by_key(|&(dof, _)| dof);
+        row
+    };
+    gaps.iter().enumerate().map(|(k, &gap)| (contacts.name(k), gap, row(k))).collect()
+}
+
+#[test]
+fn rows_depend_neither_on_units_nor_on_the_order_of_facets() {
+    let bodies = || {
+        let [below, above] = blocks([3, 2, 1], [2, 2, 1]);
+        [below, above.moved([0.2, 0.1, 0.0])]
+    };
+    let stack = Stack::new(bodies(), 0.1, |x| x);
+    let u = shaken(stack.solid.dofs(), 0.03, 5);
+    let rows = found(&mut mortar(&stack, true), &u);
+    assert!(rows.len() == 9 && rows.iter().all(|(_, gap, _)| (gap - 0.1).abs() < 0.06));
+
+    // In a unit that is 2⁻²⁰ as long: the same bits.
+    let unit = f64::from(1 << 20);
+    let scaled = Stack::new(bodies(), 0.1, |x| x.map(|x| unit * x));
+    let larger: Vec<f64> = u.iter().map(|u| unit * u).collect();
+    let in_units = found(&mut scaled.mortar(true).unwrap().reach(0.3 * unit).unwrap(), &larger);
+    for ((name, gap, row), (other, large, same)) in rows.iter().zip(&in_units) {
+        assert_eq!((name, (unit * gap).to_bits(), row), (other, large.to_bits(), same));
+    }
+
+    let [mut lower, mut upper] = stack.surfaces();
+    lower.reverse();
+    upper.rotate_left(2);
+    let Solid { nodes, .. } = &stack.solid;
+    let mut turned = Mortar::new(nodes, &stack.solid.node_dofs(), upper, lower).unwrap().reach(0.3).unwrap();
+    for ((name, gap, row), (other, again, same)) in rows.iter().zip(found(&mut turned, &u)) {
+        assert!(*name == other && (gap - again).abs() < 1e-15 && row.len() == same.len(), "{name:?}");
+        assert!(row.iter().zip(same).all(|((dof, x), (other, y))| *dof == other && (x - y).abs() < 1e-14));
+    }
+}
+
+#[test]
+fn lists_of_pairs_do_not_change_a_result() {
+    // Back and forth over the other body, searching from lists that are old and from new ones.
+    let [below, above] = plates(6, 4);
+    let stack = Stack::new([below, above], 0.02, |x| x);
+    let mut kept = mortar(&stack, true).skin(0.4).unwrap();
+    for step in 0..40 {
+        let along = 0.5 * (0.3 * f64::from(step)).sin();
+        let shift = |dof: usize| if dof >= 2 * stack.split && dof.is_multiple_of(2) { along } else { 0.0 };
+        let u: Vec<f64> = (0..stack.solid.dofs()).map(shift).collect();
+        assert_eq!(found(&mut kept, &u), found(&mut mortar(&stack, true), &u), "{step}");
+    }
+}
+
+/// Displacements after an impact, in either precision.
+fn impact<T: Real>(stack: &Stack<2>) -> Vec<f64> {
+    let Solid { nodes, .. } = &stack.solid;
+    let nodes: Vec<[T; 2]> = nodes.iter().map(|x| x.map(T::of)).collect();
+    let [lower, upper] = stack.surfaces();
+    let contact = Mortar::new(&nodes, &stack.solid.node_dofs(), upper, lower).unwrap();
+    let speed = |dof: usize| if dof >= 2 * stack.split && dof % 2 == 1 { -0.5 } else { 0.0 };
+    let mut run = Simulation::builder(stack.solid.system::<T>(), Composite, 0.005)
+        .velocity((0..stack.solid.dofs()).map(|dof| T::of(speed(dof))).collect())
+        .constraint(contact)
+        .build()
+        .unwrap();
+    run.run_until(0.2, &mut ()).unwrap();
+    assert!(run.state().contacts().forces().iter().any(|force| *force > T::zero()));
+    run.state().displacement().iter().map(|u| u.value()).collect()
+}
+
+#[test]
+fn two_precisions_agree() {
+    let [below, above] = plates(3, 4);
+    let stack = Stack::new([below, above], 0.01, |x| x);
+    let (double, single) = (impact::<f64>(&stack), impact::<f32>(&stack));
+    let scale = double.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    for (one, other) in double.iter().zip(&single) {
+        assert!((one - other).abs() < 1e-4 * scale, "{one} {other}");
+    }
+}
+
+#[test]
+fn what_cannot_be_a_surface_is_refused() {
+    let coordinates = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    let build = |slave: &[[usize; 2]], master: &[[usize; 2]]| {
+        Mortar::new(&coordinates, &dofs, slave.iter().copied(), master.iter().copied()).unwrap_err()
+    };
+    assert!(matches!(build(&[], &[[1, 0]]), Error::Empty { .. }));
+    assert!(matches!(build(&[[0, 1]], &[[1, 2]]), Error::Incompatible { .. }));
+    assert!(matches!(build(&[[0, 0]], &[[2, 3]]), Error::InvertedFacet { .. }));
+    assert!(matches!(build(&[[0, 4]], &[[2, 3]]), Error::Dimension { .. }));
+    let contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[1, 0]]).unwrap();
+    assert!(matches!(contact.reach(-1.0), Err(Error::Parameter { .. })));
+}

@@ -1,0 +1,132 @@
+//! Two bodies upon each other whose meshes need not match, and the patch test on them.
+
+use crate::solids::Solid;
+use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet};
+use contact_dynamics::{Newmark, Result, Simulation, System};
+
+/// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
+pub struct Stack<const D: usize> {
+    pub solid: Solid<D>,
+    /// Number of nodes of the lower body.
+    pub split: usize,
+    pub facets: [Vec<Vec<usize>>; 2],
+}
+
+impl<const D: usize> Stack<D> {
+    /// Bodies of height 1, the upper one from `1 + gap` on; then all is mapped.
+    pub fn new([below, above]: [Solid<D>; 2], gap: f64, map: impl Fn([f64; D]) -> [f64; D]) -> Self {
+        let split = below.nodes.len();
+        let lift = std::array::from_fn(|axis| if axis + 1 == D { 1.0 + gap } else { 0.0 });
+        let solid = below.with(above.moved(lift));
+        let at = |height: f64, lower: bool| {
+            let inside = |&n: &usize| (n < split) == lower && (solid.nodes[n][D - 1] - height).abs() < 1e-9;
+            solid.boundary().into_iter().filter(|facet| facet.iter().all(inside)).collect()
+        };
+        let facets = [at(1.0, true), at(1.0 + gap, false)];
+        Self { solid: solid.mapped(map), split, facets }
+    }
+
+    /// The facets of the lower body and of the upper one, as segments or quadrilaterals.
+    pub fn surfaces(&self) -> [Vec<Facet>; 2] {
+        self.facets.each_ref().map(|facets| facets.iter().map(|facet| Self::facet(facet)).collect())
+    }
+
+    /// A segment or a quadrilateral by its nodes.
+    pub fn facet(nodes: &[usize]) -> Facet {
+        match *nodes {
+            [a, b] => Facet::from([a, b]),
+            [a, b, c, d] => Facet::from([a, b, c, d]),
+            _ => panic!("neither a segment nor a quadrilateral: {nodes:?}"),
+        }
+    }
+
+    /// Weighted gaps, the upper body being the slave, or the lower one.
+    pub fn mortar(&self, upper: bool) -> Result<Mortar<f64>> {
+        let [lower, above] = self.surfaces();
+        let (slave, master) = if upper { (above, lower) } else { (lower, above) };
+        Mortar::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
+    }
+
+    /// The nodes of the upper body on the facets of the lower one, and the other way round if there are two passes.
+    pub fn nodes_on_facets(&self, passes: usize) -> Result<NodeToFacet<f64>> {
+        let [lower, above] = self.surfaces();
+        let Solid { nodes, .. } = &self.solid;
+        if passes > 1 {
+            return NodeToFacet::new(nodes, &self.solid.node_dofs(), above, lower);
+        }
+        let mut slaves: Vec<usize> = self.facets[1].iter().flatten().copied().collect();
+        slaves.sort_unstable();
+        slaves.dedup();
+        NodeToFacet::one_pass(nodes, &self.solid.node_dofs(), &slaves, lower)
+    }
+
+    /// ∫ N n dA of the nodes of a facet, n outward.
+    fn facet_forces(&self, facet: &[usize]) -> Vec<[f64; 3]> {
+        let point = |k: usize| -> [f64; 3] {
+            std::array::from_fn(|i| self.solid.nodes[facet[k]].get(i).copied().unwrap_or(0.0))
+        };
+        let minus = |x: [f64; 3], y: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] - y[i]) };
+        if D == 2 {
+            let [x, y, _] = minus(point(1), point(0));
+            return vec![[0.5 * y, -0.5 * x, 0.0]; 2];
+        }
+        // (Of a bilinear quadrilateral products of shape functions and areas are of the third degree.)
+        let gauss = 1.0 / 3.0_f64.sqrt();
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let mut forces = vec![[0.0; 3]; 4];
+        for [xi, eta] in corners.map(|corner| corner.map(|x| gauss * x)) {
+            let between = |share: f64, from: [[f64; 3]; 2], to: [[f64; 3]; 2]| -> [f64; 3] {
+                let [first, second] = [minus(from[1], from[0]), minus(to[1], to[0])];
+                std::array::from_fn(|i| 0.25 * ((1.0 - share) * first[i] + (1.0 + share) * second[i]))
+            };
+            let along = between(eta, [point(0), point(1)], [point(3), point(2)]);
+            let across = between(xi, [point(0), point(3)], [point(1), point(2)]);
+            for (force, [a, b]) in forces.iter_mut().zip(corners) {
+                let share = 0.25 * (1.0 + a * xi) * (1.0 + b * eta);
+                for (i, force) in force.iter_mut().enumerate() {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    *force += share * (along[j] * across[k] - along[k] * across[j]);
+                }
+            }
+        }
+        forces
+    }
+
+    /// Both bodies under the same pressure from all sides, held on the planes through the origin: largest deviation of
+    /// the displacements from u = −ε x, relative to the largest of these.
+    pub fn patch(&self, contact: impl ContactConstraint<f64> + 'static) -> Result<f64> {
+        let Self { solid, .. } = self;
+        let material = solid.material;
+        let strain = 0.01;
+        let [first, second] = material.lame();
+        let pressure = strain * if D == 2 { 2.0 * (first + second) } else { 3.0 * first + 2.0 * second };
+        let exact: Vec<f64> = solid.nodes.iter().flatten().map(|x| -strain * x).collect();
+        // (A wave crosses a body in a tenth of this unit of time.)
+        let time = material.wave_speed() / 10.0;
+        // What the stress needs at all sides, less what contact gives.
+        let mut load = vec![0.0; solid.dofs()];
+        solid.system::<f64>().force(0.0, &exact, &vec![0.0; solid.dofs()], &mut load)?;
+        load.iter_mut().for_each(|load| *load = -*load);
+        for facet in self.facets.iter().flatten() {
+            for (&node, force) in facet.iter().zip(self.facet_forces(facet)) {
+                for (axis, force) in force.into_iter().enumerate().take(D) {
+                    load[D * node + axis] += pressure * force;
+                }
+            }
+        }
+        let mut system = solid.system::<f64>().load(move |t, f| {
+            f.iter_mut().zip(&load).for_each(|(f, load)| *f = load * (time * t / 10.0).min(1.0));
+        });
+        for (node, place) in solid.nodes.iter().enumerate() {
+            for axis in (0..D).filter(|&axis| place[axis].abs() < 1e-9) {
+                system = system.fix(D * node + axis)?;
+            }
+        }
+        // A strongly damped scheme: the static solution after a while.
+        let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0)?, 0.1 / time).constraint(contact).build()?;
+        run.run_until(90.0 / time, &mut ())?;
+        let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();
+        Ok(run.state().displacement().iter().zip(&exact).map(deviation).fold(0.0, f64::max) / scale)
+    }
+}
