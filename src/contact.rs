@@ -34,7 +34,7 @@ pub use mortar::Mortar;
 #[cfg(feature = "search")]
 pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
-pub use obstacle::{Cylinder, Obstacle, Passage, Plane, Side, Sphere};
+pub use obstacle::{Capsule, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
 #[cfg(feature = "search")]

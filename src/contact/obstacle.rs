@@ -1,5 +1,11 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
+mod capsule;
+mod cuboid;
+
+pub use capsule::Capsule;
+pub use cuboid::Cuboid;
+
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
