@@ -41,10 +41,10 @@ const BEYOND: f64 = 0.25;
 ///
 /// # Which surface is the slave
 ///
-/// The finer one, or the one that is deformed more. Pressure on flat surfaces is exact with either choice, whatever the
-/// meshes; on curved ones the errors are of the order of the elements, while nodes on facets
-/// ([`NodeToFacet`](super::NodeToFacet)) pass their force on in lumps. A search costs the intersection of all pairs of
-/// facets that are near each other.
+/// Pressure on flat surfaces is exact with either choice, whatever the meshes. Where a small surface slides over a large
+/// one the small one should be the slave, even if its facets are the larger ones: the contact moves with its nodes, and
+/// forces vary less (`docs/contact.md`, ironing). A search costs the intersection of all pairs of facets that are near
+/// each other.
 ///
 /// # Linearization
 ///
@@ -297,8 +297,11 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         }
         self.integrate();
         self.found.clear();
-        let (count, moved) = (self.tangents(), self.moved_since_search());
-        let near = moved <= BEYOND * self.slave.finest().min(self.master.finest());
+        let count = self.tangents();
+        // (Asked only where a row has lost its surroundings.)
+        let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
+        let near = self.rows.places.iter().all(is_covered)
+            || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
         let Self { rows, found, integrals, nodes, slave, reach, .. } = self;
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, nodes, count > 0, u) {

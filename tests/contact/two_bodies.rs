@@ -1,6 +1,6 @@
 //! Two deformable bodies in contact through node to facet: patch test, impacts of blocks and rings, one pass and two.
 
-use contact_dynamics::contact::{ContactLaw, NodeToFacet};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodeToFacet};
 use contact_dynamics::{
     Composite, Corrector, EnergyMomentum, Newmark, PersistencyCorrection, Simulation, StepControl, TimeIntegrator,
     verify,
@@ -10,6 +10,7 @@ use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::stacks::Stack;
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
 
@@ -32,38 +33,19 @@ fn segments(facets: &[Vec<usize>]) -> Vec<[usize; 2]> {
 }
 
 /// A block of height 1 on one of height 1, `cells` elements along the sides of each; the second one from z = 1 + gap.
-struct Stack {
-    solid: Solid<3>,
-    /// Number of nodes of the lower block.
-    split: usize,
-    gap: f64,
+fn blocks(lower: [usize; 3], upper: [usize; 3], gap: f64) -> Stack<3> {
+    Stack::new([lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL)), gap, |x| x)
 }
 
-impl Stack {
-    fn new(lower: [usize; 3], upper: [usize; 3], gap: f64) -> Self {
-        let below = Solid::block([1.0; 3], lower, MATERIAL);
-        let split = below.nodes.len();
-        let solid = below.with(Solid::block([1.0; 3], upper, MATERIAL).moved([0.0, 0.0, 1.0 + gap]));
-        Self { solid, split, gap }
-    }
-
-    /// Nodes of the upper block on facets of the lower one.
-    fn contact(&self, passes: usize) -> NodeToFacet<f64> {
-        let Self { solid, split, gap } = self;
-        let (below, _) = side(solid, |n, p| n < *split && p[2] > 1.0 - 1e-9);
-        let (above, nodes) = side(solid, |n, p| n >= *split && p[2] < 1.0 + gap + 1e-9);
-        let contact = match passes {
-            1 => NodeToFacet::one_pass(&solid.nodes, &solid.node_dofs(), &nodes, quads(&below)),
-            _ => NodeToFacet::new(&solid.nodes, &solid.node_dofs(), quads(&above), quads(&below)),
-        };
-        contact.unwrap().reach(0.3).unwrap()
-    }
+/// Nodes of the upper block on facets of the lower one.
+fn nodes_on_facets(stack: &Stack<3>, passes: usize) -> NodeToFacet<f64> {
+    stack.nodes_on_facets(passes).unwrap().reach(0.3).unwrap()
 }
 
 /// Two blocks under uniform pressure, supported so that the exact solution is uniaxial: largest deviation of the
 /// displacements from it, relative to the largest of them.
 fn patch(lower: [usize; 3], upper: [usize; 3], passes: usize) -> f64 {
-    let stack = Stack::new(lower, upper, 0.0);
+    let stack = blocks(lower, upper, 0.0);
     let (solid, pressure) = (&stack.solid, 1.0);
     let mut load = vec![0.0; solid.dofs()];
     for facet in solid.boundary().iter().filter(|f| f.iter().all(|&n| solid.nodes[n][2] > 2.0 - 1e-9)) {
@@ -83,7 +65,7 @@ fn patch(lower: [usize; 3], upper: [usize; 3], passes: usize) -> f64 {
     }
     // A strongly damped scheme: the static solution after a while.
     let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0).unwrap(), 0.1)
-        .constraint(stack.contact(passes))
+        .constraint(nodes_on_facets(&stack, passes))
         .build()
         .unwrap();
     run.run_until(50.0, &mut ()).unwrap();
@@ -115,47 +97,45 @@ fn the_patch_test_and_where_one_pass_fails_it() {
 
 #[test]
 fn impacts_of_blocks_keep_momentum_with_one_pass_and_with_two() {
-    let h = 0.25 / MATERIAL.wave_speed();
     for (lower, upper, passes) in [([3, 3, 3], [3, 3, 3], 1), ([3, 3, 3], [4, 4, 3], 1), ([3, 3, 3], [4, 4, 3], 2)] {
-        let stack = Stack::new(lower, upper, 0.003);
-        let solid = &stack.solid;
-        // The upper block falls and slides.
-        let speed = [0.02, 0.01, -0.1];
-        let v: Vec<f64> =
-            (0..solid.dofs()).map(|dof| if dof >= 3 * stack.split { speed[dof % 3] } else { 0.0 }).collect();
-        let mut run = Simulation::builder(solid.system(), Composite, h)
-            .velocity(v)
-            .constraint(stack.contact(passes))
-            .corrector(PersistencyCorrection::with_history_projection())
-            .build()
-            .unwrap();
-        let direction =
-            |axis: usize| -> Vec<f64> { (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == axis))).collect() };
-        let momentum = |run: &Simulation<'_, f64>| [0, 1, 2].map(|axis| run.momentum(&direction(axis)).unwrap());
-        let (start, energy) = (momentum(&run), run.energy().total());
-        let (mut before, mut most, mut parted) = (energy, 0, false);
-        while run.time() < 1.5 {
-            run.step().unwrap();
-            for (now, start) in momentum(&run).iter().zip(start) {
-                assert!((now - start).abs() < 1e-12, "{passes} passes: {now} {start}");
-            }
-            let total = run.energy().total();
-            assert!(
-                total < before + 2e-3 * energy,
-                "{passes} passes, t = {}: {:e}",
-                run.time(),
-                (total - before) / energy
-            );
-            before = total;
-            let contacts = run.state().contacts();
-            let pressed = contacts.raw_forces().iter().filter(|f| **f > 0.0).count();
-            most = most.max(pressed);
-            parted = most > 0 && pressed == 0;
-            assert!(contacts.gaps().iter().all(|gap| *gap > -1e-6), "{:?}", contacts.gaps());
-        }
-        assert!(most >= 9 && parted, "{passes} passes: {most} pressed");
-        assert!(before > 0.7 * energy, "{}", before / energy);
+        let stack = blocks(lower, upper, 0.003);
+        check_impact(&stack, nodes_on_facets(&stack, passes), &format!("{passes} passes"));
     }
+}
+
+/// The upper block falls on the lower one and slides: momentum is kept, no step gains energy, no gap is negative, and
+/// the blocks part.
+pub(super) fn check_impact(stack: &Stack<3>, contact: impl ContactConstraint<f64> + 'static, what: &str) {
+    let solid = &stack.solid;
+    let speed = [0.02, 0.01, -0.1];
+    let v: Vec<f64> = (0..solid.dofs()).map(|dof| if dof >= 3 * stack.split { speed[dof % 3] } else { 0.0 }).collect();
+    let mut run = Simulation::builder(solid.system(), Composite, 0.25 / MATERIAL.wave_speed())
+        .velocity(v)
+        .constraint(contact)
+        .corrector(PersistencyCorrection::with_history_projection())
+        .build()
+        .unwrap();
+    let direction =
+        |axis: usize| -> Vec<f64> { (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == axis))).collect() };
+    let momentum = |run: &Simulation<'_, f64>| [0, 1, 2].map(|axis| run.momentum(&direction(axis)).unwrap());
+    let (start, energy) = (momentum(&run), run.energy().total());
+    let (mut before, mut most, mut parted) = (energy, 0, false);
+    while run.time() < 1.5 {
+        run.step().unwrap();
+        for (now, start) in momentum(&run).iter().zip(start) {
+            assert!((now - start).abs() < 1e-12, "{what}: {now} {start}");
+        }
+        let total = run.energy().total();
+        assert!(total < before + 2e-3 * energy, "{what}, t = {}: {:e}", run.time(), (total - before) / energy);
+        before = total;
+        let contacts = run.state().contacts();
+        let pressed = contacts.raw_forces().iter().filter(|f| **f > 0.0).count();
+        most = most.max(pressed);
+        parted = most > 0 && pressed == 0;
+        assert!(contacts.gaps().iter().all(|gap| *gap > -1e-6), "{what}: {:?}", contacts.gaps());
+    }
+    assert!(most >= 9 && parted, "{what}: {most} pressed");
+    assert!(before > 0.7 * energy, "{what}: {}", before / energy);
 }
 
 /// Two rings side by side that fly at each other: outer radius 40, inner 30, their surfaces 0.5 apart if `offset`, the
@@ -304,12 +284,12 @@ fn rings_collide_without_gaining_energy() {
 
 #[test]
 fn facets_pass_the_check_that_hosts_run_on_their_own_constraints() {
-    let stack = Stack::new([3, 3, 1], [4, 4, 1], 0.02);
+    let stack = blocks([3, 3, 1], [4, 4, 1], 0.02);
     // Both surfaces warped.
     let solid = &stack.solid;
     let u: Vec<f64> = (0..solid.dofs()).map(|dof| 0.01 * (dof as f64 * 1.7).sin()).collect();
     let v: Vec<f64> = (0..solid.dofs()).map(|dof| 0.3 * (dof as f64 * 2.3).cos()).collect();
-    let error = verify::gap_jacobian(&mut stack.contact(1), 0.0, &u, &v, 1e-6).unwrap();
+    let error = verify::gap_jacobian(&mut nodes_on_facets(&stack, 1), 0.0, &u, &v, 1e-6).unwrap();
     assert!(error.rows >= 9 && error.jacobian < 1e-6, "{error:?}");
     assert!(error.acceleration < 1e-3, "{error:?}");
 }
