@@ -20,6 +20,8 @@ mod rows;
 #[cfg(feature = "search")]
 mod surface;
 mod tangents;
+#[cfg(feature = "search")]
+mod tie;
 
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub use contacts::{Contact, Contacts};
@@ -38,8 +40,10 @@ pub use obstacle::{Capsule, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sp
 pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
 #[cfg(feature = "search")]
-pub use surface::Facet;
+pub use surface::{Facet, Surface};
 pub(crate) use tangents::Tangents;
+#[cfg(feature = "search")]
+pub use tie::Tie;
 
 pub use crate::contact_id::ContactId;
 use crate::error::{Error, Result};
@@ -52,13 +56,19 @@ fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D
     if dofs.len() != count {
         return Err(Error::Dimension { what: "the list of dofs by node", expected: count, found: dofs.len() });
     }
+    check_coordinates(coordinates)?;
+    check_nodes("a contact node (at most)", nodes, count)
+}
+
+/// Refuses coordinates that are not numbers.
+fn check_coordinates<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<()> {
     for (index, x) in coordinates.iter().enumerate() {
         if let Some(x) = x.iter().find(|x| !x.is_finite()) {
             let what = "the list of coordinates (by node)";
             return Err(Error::NotFinite { what, index, value: x.value() });
         }
     }
-    check_nodes("a contact node (at most)", nodes, count)
+    Ok(())
 }
 
 /// Refuses a vector that has not one entry a dof of its constraint.

@@ -1,7 +1,6 @@
 //! Contact of two deforming surfaces by weighted gaps: segment to segment.
 
 mod integrals;
-mod overlap;
 mod pairs;
 mod passage;
 mod rows;
@@ -130,8 +129,8 @@ impl<T: Real> Mortar<T> {
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
         let mut nodes = Nodes::new(coordinates, dofs)?;
-        let slave = Surface::new(slave.into_iter().map(Into::into).collect(), D, &nodes.coordinates)?;
-        let master = Surface::new(master.into_iter().map(Into::into).collect(), D, &nodes.coordinates)?;
+        let slave = Surface::of_facets(slave, D, &nodes.coordinates)?;
+        let master = Surface::of_facets(master, D, &nodes.coordinates)?;
         let bodies = [slave.nodes().to_vec(), master.nodes().to_vec()];
         nodes.read_bodies(&bodies)?;
         Ok(Self {

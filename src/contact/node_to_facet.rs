@@ -217,7 +217,7 @@ impl<T: Real> NodeToFacet<T> {
             let what = "the list of contact nodes";
             return Err(Error::Empty { what, remedy: "give at least one node" });
         }
-        let surface = Surface::new(facets.into_iter().map(Into::into).collect(), D, &mesh.coordinates)?;
+        let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
         let reach = surface.typical();
         let mut sorted = nodes.to_vec();
         sorted.sort_unstable();
@@ -313,8 +313,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// As those of [`one_pass`](Self::one_pass) about facets.
     pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
-        let own =
-            Surface::new(facets.into_iter().map(Into::into).collect(), self.nodes.dimension, &self.nodes.coordinates)?;
+        let own = Surface::of_facets(facets, self.nodes.dimension, &self.nodes.coordinates)?;
         let body = &mut self.bodies[0];
         body.clone_from(&self.passes[0].nodes);
         body.extend(own.nodes());

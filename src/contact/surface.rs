@@ -2,23 +2,52 @@
 
 mod facet;
 mod nodes;
+mod outer;
+mod output;
+mod overlap;
 mod projection;
 mod search;
 mod shape;
 
 pub use facet::Facet;
-pub(crate) use nodes::Nodes;
+pub(crate) use nodes::{Nodes, points};
+pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand, meets};
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;
 use crate::error::{Error, Result};
+use crate::real::Real;
 use shape::{Foot, Location, RIM, Rim};
 
-/// Facets that share sides, with their neighbors.
-#[derive(Debug)]
-pub(crate) struct Surface {
+/// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.
+///
+/// Made of facets ([`new`](Self::new)) or as the outer sides of a mesh of cells ([`of_cells`](Self::of_cells)); both
+/// check it: sides, orientation, areas. A constraint takes `&surface` wherever it takes facets, so that one surface
+/// serves all, and its output.
+///
+/// ```
+/// use contact_dynamics::contact::{Mortar, Surface};
+///
+/// // Two unit squares, the second one 0.1 above the first.
+/// let coordinates = [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0., 1.1], [1., 1.1], [1., 2.1], [0., 2.1]];
+/// let dofs: Vec<[usize; 2]> = (0..8).map(|node| [2 * node, 2 * node + 1]).collect();
+/// let lower = Surface::of_cells(&coordinates, [[0, 1, 2, 3]])?;
+/// let upper = Surface::of_cells(&coordinates, [[4, 5, 6, 7]])?;
+/// let contact = Mortar::new(&coordinates, &dofs, &upper, &lower)?;
+///
+/// // Of a force of 3 on the node (1, 1) of the lower square, downward: half of both sides that meet there is its own.
+/// let mut forces = [[0.0; 2]; 8];
+/// forces[2] = [0.0, -3.0];
+/// let pressures = lower.pressures(&coordinates, &forces)?;
+/// let corner = lower.nodes().iter().position(|&node| node == 2).ok_or("a node of the surface")?;
+/// assert!((pressures[corner] - 3.0_f64).abs() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Surface {
+    dimension: usize,
     facets: Vec<Facet>,
     rims: Vec<Rim>,
     /// The facet across each side, and which of its sides that is.
@@ -38,8 +67,29 @@ fn refuse(facet: usize, reason: &'static str) -> Error {
 }
 
 impl Surface {
-    /// Finds the neighbors, and refuses facets that are degenerate, turned against each other or that branch.
-    pub(crate) fn new(facets: Vec<Facet>, dimension: usize, coordinates: &[Point]) -> Result<Self> {
+    /// The surface of these facets, given by the indices of their nodes in `coordinates`, which are those of all nodes
+    /// of a mesh in two or three dimensions. Normals point out of the body ([`Facet`]).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the dimension is not 2 or 3, if a facet does not fit, or if a node does not exist;
+    /// [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
+    /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
+    /// [`Error::Incompatible`] where more than two facets share a side, and on surfaces of one side (Möbius).
+    pub fn new<T: Real, F: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        facets: impl IntoIterator<Item = F>,
+    ) -> Result<Self> {
+        Self::of_facets(facets, D, &points(coordinates)?)
+    }
+
+    /// As [`new`](Self::new), with points in space.
+    pub(crate) fn of_facets<F: Into<Facet>>(
+        facets: impl IntoIterator<Item = F>,
+        dimension: usize,
+        coordinates: &[Point],
+    ) -> Result<Self> {
+        let facets: Vec<Facet> = facets.into_iter().map(Into::into).collect();
         if facets.is_empty() {
             let what = "the list of facets of a contact surface";
             return Err(Error::Empty { what, remedy: "give at least one facet" });
@@ -71,6 +121,7 @@ impl Surface {
         let mut nodes: Vec<_> = around.iter().map(|&(node, ..)| node).collect();
         nodes.dedup();
         let mut surface = Self {
+            dimension,
             rims: vec![Rim { sides: [true; 4], vertices: [false; 4], beyond: RIM }; facets.len()],
             neighbors: vec![[None; 4]; facets.len()],
             facets,
@@ -79,13 +130,14 @@ impl Surface {
             finest,
             typical,
         };
-        surface.connect(dimension)?;
+        surface.connect()?;
         surface.find_rim();
         Ok(surface)
     }
 
     /// Finds the neighbor across each side.
-    fn connect(&mut self, dimension: usize) -> Result<()> {
+    fn connect(&mut self) -> Result<()> {
+        let dimension = self.dimension;
         // (smaller node, larger node, facet, side, whether the side runs from the smaller to the larger node)
         let mut sides = Vec::new();
         for (index, facet) in self.facets.iter().enumerate() {
@@ -182,7 +234,8 @@ impl Surface {
         }
     }
 
-    pub(crate) fn facets(&self) -> &[Facet] {
+    /// Its facets, in the order given, or of the cells.
+    pub fn facets(&self) -> &[Facet] {
         &self.facets
     }
 
@@ -196,8 +249,8 @@ impl Surface {
         self.typical
     }
 
-    /// Nodes of the facets, sorted.
-    pub(crate) fn nodes(&self) -> &[usize] {
+    /// The nodes of its facets, ascending.
+    pub fn nodes(&self) -> &[usize] {
         &self.nodes
     }
 
@@ -310,5 +363,14 @@ impl Surface {
         }
         let side = if dot(mean, arm) < 0.0 { -1.0 } else { 1.0 };
         Some((unit(arm)?.map(|x| side * x), side * foot.distance))
+    }
+}
+
+impl<'s> IntoIterator for &'s Surface {
+    type Item = Facet;
+    type IntoIter = std::iter::Copied<std::slice::Iter<'s, Facet>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.facets.iter().copied()
     }
 }

@@ -11,4 +11,6 @@ mod obstacles;
 mod passing_through;
 mod pounding;
 mod rate_laws;
+mod surfaces;
+mod ties;
 mod two_bodies;

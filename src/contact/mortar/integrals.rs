@@ -10,8 +10,9 @@
 //! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under translations and rotations, term by term: so
 //! forces along the derivative conserve linear and angular momentum to rounding.
 
-use super::overlap::{Base, RimSample, Sample, middle};
-use crate::contact::surface::{Facet, Point, Surface, add_scaled, cross, dot, norm};
+use crate::contact::surface::{
+    Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm,
+};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
 const LEAST: f64 = 1e-6;

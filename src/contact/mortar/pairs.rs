@@ -1,7 +1,6 @@
 //! Which facets of two surfaces may meet: lists kept over many steps, and those of them that are near now.
 
-use super::overlap::Base;
-use crate::contact::surface::{Bounds, Neighborhood, Point, Surface};
+use crate::contact::surface::{Base, Bounds, Neighborhood, Point, Surface};
 
 /// For each slave facet the master facets near it.
 #[derive(Debug, Default)]

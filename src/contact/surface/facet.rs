@@ -37,7 +37,37 @@ impl From<[usize; 4]> for Facet {
     }
 }
 
+/// Facets of higher order are taken as several of first order, with the same nodes.
+///
+/// ```
+/// use contact_dynamics::contact::Facet;
+/// let parts = Facet::of_quadratic_segment([0, 2, 1]); // from node 0 to node 2, node 1 in the middle
+/// assert_eq!(parts.map(|part| [part.nodes()[0], part.nodes()[1]]), [[0, 1], [1, 2]]);
+/// ```
 impl Facet {
+    /// The halves of a segment of three nodes: its ends, and the node between them.
+    pub fn of_quadratic_segment([a, b, middle]: [usize; 3]) -> [Self; 2] {
+        [Self::from([a, middle]), Self::from([middle, b])]
+    }
+
+    /// The parts of a triangle of six nodes: its corners, and the nodes on its sides, the first between the first two
+    /// corners.
+    pub fn of_quadratic_triangle([a, b, c, ab, bc, ca]: [usize; 6]) -> [Self; 4] {
+        [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].map(Self::from)
+    }
+
+    /// The parts of a quadrilateral of eight nodes: its corners, and the nodes on its sides, the first between the
+    /// first two corners. They are four triangles and a quadrilateral.
+    pub fn of_quadratic_quadrilateral([a, b, c, d, ab, bc, cd, da]: [usize; 8]) -> [Self; 5] {
+        let [w, x, y, z] = [[a, ab, da], [b, bc, ab], [c, cd, bc], [d, da, cd]].map(Self::from);
+        [w, x, y, z, Self::from([ab, bc, cd, da])]
+    }
+
+    /// The parts of a quadrilateral of nine nodes: as of eight, and the node in the middle.
+    pub fn of_biquadratic_quadrilateral([a, b, c, d, ab, bc, cd, da, middle]: [usize; 9]) -> [Self; 4] {
+        [[a, ab, middle, da], [b, bc, middle, ab], [c, cd, middle, bc], [d, da, middle, cd]].map(Self::from)
+    }
+
     /// The nodes in the order given.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes[..self.count]

@@ -2,10 +2,20 @@
 
 use super::search::Bounds;
 use super::shape::Point;
-use crate::contact::check_mesh;
 use crate::contact::dofs::DofList;
+use crate::contact::{check_coordinates, check_mesh};
 use crate::error::{Error, Result};
 use crate::real::Real;
+
+/// Coordinates in two or three dimensions as points in space; refuses others, and what is not a number.
+pub(crate) fn points<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<Vec<Point>> {
+    if D != 2 && D != 3 {
+        return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
+    }
+    check_coordinates(coordinates)?;
+    let component = |x: &[T; D], i: usize| x.get(i).map_or(0.0, |x| x.value());
+    Ok(coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect())
+}
 
 /// The nodes of a mesh, some of which two surfaces read.
 #[derive(Debug)]
@@ -25,12 +35,8 @@ pub(crate) struct Nodes {
 impl Nodes {
     /// All nodes of a mesh in two or three dimensions.
     pub(crate) fn new<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D]]) -> Result<Self> {
-        if D != 2 && D != 3 {
-            return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
-        }
         check_mesh(coordinates, dofs, &[])?;
-        let component = |x: &[T; D], i: usize| x.get(i).map_or(0.0, |x| x.value());
-        let coordinates: Vec<Point> = coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect();
+        let coordinates = points(coordinates)?;
         Ok(Self {
             dimension: D,
             system_dofs: dofs.iter().map(|d| std::array::from_fn(|i| d.get(i).copied().unwrap_or(0))).collect(),

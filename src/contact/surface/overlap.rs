@@ -4,42 +4,43 @@
 //! stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004,
 //! section 4); in two dimensions it is a part of a line.
 
-use crate::contact::surface::{Facet, Point, Shape, add_scaled, cross, dot, sub, unit};
+use super::Facet;
+use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 /// A point of the part of a slave facet that a master facet covers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
+pub(crate) struct Sample {
     /// Its share of the area (length in two dimensions) in the slave facet's plane.
-    pub(super) area: f64,
+    pub(crate) area: f64,
     /// Shape functions of the slave facet, and of the master facet where the normal through the point meets it.
-    pub(super) slave: [f64; 4],
-    pub(super) master: [f64; 4],
+    pub(crate) slave: [f64; 4],
+    pub(crate) master: [f64; 4],
     /// The distance from the one to the other along the slave facet's normal: negative where they are in each other.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
     /// The master facet's normal ν there over its product with the slave facet's normal n: the gap falls by it if the
     /// slave's point moves, and grows by it if the master's does.
-    pub(super) direction: Point,
+    pub(crate) direction: Point,
 }
 
 /// A point of a slave facet that lies below a side where the master ends.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RimSample {
+pub(crate) struct RimSample {
     /// Its share of the length in the plane (one in two dimensions).
-    pub(super) length: f64,
-    pub(super) slave: [f64; 4],
-    pub(super) master: [f64; 4],
-    pub(super) gap: f64,
+    pub(crate) length: f64,
+    pub(crate) slave: [f64; 4],
+    pub(crate) master: [f64; 4],
+    pub(crate) gap: f64,
     /// The direction in the plane in which the master ends: a unit vector.
-    pub(super) outward: Point,
+    pub(crate) outward: Point,
 }
 
 /// A slave facet and the plane through its middle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Base {
-    pub(super) shape: Shape,
-    pub(super) normal: Point,
+pub(crate) struct Base {
+    pub(crate) shape: Shape,
+    pub(crate) normal: Point,
     /// The product of the tangents there, along the normal (of a segment with the unit vector out of the plane).
-    pub(super) product: Point,
+    pub(crate) product: Point,
     axes: [Point; 2],
     /// Its corners in the plane.
     corners: [[f64; 2]; 4],
@@ -48,7 +49,7 @@ pub(super) struct Base {
 }
 
 /// The weights of the middle of a facet.
-pub(super) fn middle(count: usize) -> [f64; 4] {
+pub(crate) fn middle(count: usize) -> [f64; 4] {
     let share = 1.0 / count as f64;
     std::array::from_fn(|k| if k < count { share } else { 0.0 })
 }
@@ -61,7 +62,7 @@ const SLIVER: f64 = 1e-12;
 
 impl Base {
     /// None if the facet has no normal.
-    pub(super) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
+    pub(crate) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
         let (shape, count) = (facet.shape(positions), facet.nodes().len());
         let [first, second] = shape.tangents_at(&middle(count));
         let second = if count == 2 { [0.0, 0.0, 1.0] } else { second };
@@ -80,7 +81,7 @@ impl Base {
     }
 
     /// Whether a facet looks toward this one, and is not behind it by more than `depth`.
-    pub(super) fn may_meet(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
+    pub(crate) fn may_meet(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
         let shape = facet.shape(positions);
         let nodes = facet.nodes();
         let Some(normal) = shape.normal(&middle(nodes.len())) else { return false };
@@ -89,7 +90,7 @@ impl Base {
     }
 
     /// Calls `act` with the points of what a master facet covers.
-    pub(super) fn each_sample(&self, facet: &Facet, positions: &[Point], act: &mut impl FnMut(&Sample)) {
+    pub(crate) fn each_sample(&self, facet: &Facet, positions: &[Point], act: &mut impl FnMut(&Sample)) {
         let (shape, count) = (facet.shape(positions), facet.nodes().len());
         let corners = std::array::from_fn(|k| self.in_plane(shape.corner(k)));
         let master = Flat { corners, count };
@@ -134,7 +135,7 @@ impl Base {
     }
 
     /// Calls `act` with points below the sides of a master facet where its surface ends.
-    pub(super) fn each_rim_sample(
+    pub(crate) fn each_rim_sample(
         &self,
         facet: &Facet,
         open: [bool; 4],
@@ -175,7 +176,7 @@ impl Base {
     }
 
     /// The slave facet's area for its coordinates, where the shape functions are `weights`.
-    pub(super) fn stretch(&self, weights: &[f64; 4]) -> f64 {
+    pub(crate) fn stretch(&self, weights: &[f64; 4]) -> f64 {
         let [first, second] = self.shape.tangents_at(weights);
         match self.count {
             2 => dot(self.normal, cross(first, [0.0, 0.0, 1.0])),
@@ -183,14 +184,32 @@ impl Base {
         }
     }
 
+    /// An orthonormal frame that turns with the facet: along its first tangent in the middle, across it, and n.
+    pub(crate) fn frame(&self) -> [Point; 3] {
+        [self.axes[0], self.axes[1], self.normal]
+    }
+
+    /// How the corners turn [`frame`](Self::frame): for a vector q, those that their motions are multiplied by in the
+    /// sum θ · q, θ the small rotation of the frame.
+    ///
+    /// n × δn is the part of θ across n, and along n it is e₂ · δe₁ with e₁ and e₂ the first two vectors.
+    pub(crate) fn rotated(&self, q: Point) -> [Point; 4] {
+        let weights = middle(self.count);
+        let [first, _] = self.shape.tangents_at(&weights);
+        let tilted = self.turned(&weights, cross(q, self.normal).map(|x| x / norm(self.product)));
+        let spin = dot(self.normal, q) / norm(first);
+        let [by_corner, _] = derivatives(self.count, &weights);
+        std::array::from_fn(|k| add_scaled(tilted[k], spin * by_corner[k], self.axes[1]))
+    }
+
     /// Number of nodes.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.count
     }
 
     /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`: the
     /// vector that each corner's motion is multiplied by.
-    pub(super) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
+    pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
         let [first, second] = self.shape.tangents_at(weights);
         let [by_first, by_second] = match self.count {
             2 => [cross([0.0, 0.0, 1.0], vector), [0.0; 3]],
