@@ -5,13 +5,15 @@
 mod ironing;
 mod patch;
 mod rings;
+mod ties;
 
 use contact_dynamics_scenes::output::Output;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("surfaces")?;
-    let tables = [patch::table(output.quick)?, ironing::table(output.quick)?, rings::table(output.quick)?].join("\n");
+    let quick = output.quick;
+    let tables = [patch::table(quick)?, ties::table(quick)?, ironing::table(quick)?, rings::table(quick)?].join("\n");
     println!("{tables}");
     output.write("surfaces.md", &tables)
 }

@@ -1,7 +1,7 @@
 //! Two bodies upon each other whose meshes need not match, and the patch test on them.
 
 use crate::solids::Solid;
-use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet};
+use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet, Tie};
 use contact_dynamics::{Newmark, Result, Simulation, System};
 
 /// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
@@ -45,6 +45,13 @@ impl<const D: usize> Stack<D> {
         let [lower, above] = self.surfaces();
         let (slave, master) = if upper { (above, lower) } else { (lower, above) };
         Mortar::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
+    }
+
+    /// The bodies tied to each other, the upper one being the slave, or the lower one.
+    pub fn tie(&self, upper: bool) -> Result<Tie<f64>> {
+        let [lower, above] = self.surfaces();
+        let (slave, master) = if upper { (above, lower) } else { (lower, above) };
+        Tie::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
     }
 
     /// The nodes of the upper body on the facets of the lower one, and the other way round if there are two passes.

@@ -1,0 +1,238 @@
+//! Surfaces of two bodies that stay together, whose meshes need not match.
+
+mod joint;
+
+use super::affine_rows::AffineRows;
+use super::surface::{Facet, Nodes, Point, Surface, unit};
+use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Variation, check_local};
+use crate::error::{Error, Result, positive};
+use crate::real::Real;
+use joint::Joint;
+
+/// Two surfaces that are tied to each other where they meet in the reference configuration; their nodes need not match.
+/// Segments in two dimensions, triangles and bilinear quadrilaterals in three.
+///
+/// Each node of the one surface, the slave, that the other, the master, covers has an equality row for each axis k: the
+/// jump of the displacement in the mean, with the node's shape function N as weight, over what is covered of the
+/// reference surface,
+///
+/// g_k = ∫ N (u_m − u_s)_k dA / ∫ N dA = 0 (length),
+///
+/// with u_m at the point of the master that lies over the point of the slave along its facet's normal (mesh tying by
+/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Any linear displacement passes
+/// exactly, whatever the meshes. The force of a row acts along k, positive on the master and negative on the slave, and
+/// ∫ N dA is the node's [`area`](Self::area).
+///
+/// # Surfaces that do not fit
+///
+/// Where facets of both surfaces lie upon each other rows are linear in u, and the same for ever. Where they do not, on
+/// curved surfaces with different meshes for instance, x_m − x_s is not zero at the start. It stays what it was, in axes
+/// that turn with each slave facet: g = Σ Rᵀ ∫ N (x_m − x_s) dA / ∫ N dA minus its initial value, R the rotation of the
+/// facet since. So bodies turn freely by any angle and forces conserve angular momentum; with fixed axes such a gap
+/// would resist turning (Puso 2004 moves the nodes instead). These rows [follow](ContactConstraint::follow) the motion.
+///
+/// # Which surface is the slave
+///
+/// The finer one costs more rows, the coarser one is softer at the interface. Nodes of the slave should not be held or
+/// tied by other constraints: rows are then redundant, which costs time and leaves forces that are not unique.
+///
+/// # Known failure
+///
+/// - Over quadrilaterals that are no parallelograms integrals are those of a quadrature (1e-7 in the patch test).
+/// - Rates of rows that turn are found by differences.
+/// - Facets that see each other at more than 60° are not tied.
+///
+/// # Identity
+///
+/// (number of the slave node, axis).
+///
+/// ```
+/// use contact_dynamics::ContactConstraint;
+/// use contact_dynamics::contact::{Contacts, Tie};
+///
+/// // One segment upon two.
+/// let coordinates = [[2.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [2.0, 0.0]];
+/// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
+/// let mut tie = Tie::new(&coordinates, &dofs, [[3, 4]], [[0, 1], [1, 2]])?;
+/// assert_eq!(tie.nodes(), [3, 4]);
+/// // Both stretched by the same: no gap. (Dofs in the order in which the tie reads them: the slave's come first.)
+/// assert_eq!(tie.dofs(), [6, 7, 8, 9, 0, 1, 2, 3, 4, 5]);
+/// let stretched = [0.0, 0.0, 0.2, 0.0, 0.2, 0.0, 0.1, 0.0, 0.0, 0.0];
+/// let mut gaps = [1.0; 4];
+/// tie.search(0.0, &stretched, &[0.0; 10], 0.0)?;
+/// tie.gaps(0.0, &stretched, &mut gaps)?;
+/// assert!(gaps.iter().all(|gap: &f64| gap.abs() < 1e-15));
+/// assert_eq!(Contacts::of(&tie).name(3), (4, 1));
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Tie<T: Real> {
+    nodes: Nodes,
+    slave: Surface,
+    master: Surface,
+    reach: f64,
+    joint: Joint,
+    /// The nodes of the joint: of the slave, of the master.
+    bodies: [Vec<usize>; 2],
+    rows: AffineRows<T>,
+    /// Those before.
+    before: AffineRows<T>,
+    /// For each row the direction in which its gap opens.
+    directions: Vec<Point>,
+}
+
+impl<T: Real> Tie<T> {
+    /// Ties the facets of a `slave` surface, whose nodes get the rows, to those of a `master`, where they are within the
+    /// [`reach`](Self::reach) of each other.
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
+    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces share no node. Displacements at the start of a run satisfy the rows, as zero does.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Mortar::new`](super::Mortar::new). That nothing is within reach is an error of the first search
+    /// ([`Error::Empty`]).
+    pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        slave: impl IntoIterator<Item = F>,
+        master: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        /// Share of the mean facet of the coarser surface: more than a curved surface is off its facets that turn by 45°
+        /// from one to the next.
+        const REACH: f64 = 0.1;
+        let mut nodes = Nodes::new(coordinates, dofs)?;
+        let slave = Surface::of_facets(slave, D, &nodes.coordinates)?;
+        let master = Surface::of_facets(master, D, &nodes.coordinates)?;
+        nodes.read_bodies(&[slave.nodes().to_vec(), master.nodes().to_vec()])?;
+        let mut tie = Self {
+            nodes,
+            reach: REACH * slave.typical().max(master.typical()),
+            slave,
+            master,
+            joint: Joint::default(),
+            bodies: [Vec::new(), Vec::new()],
+            rows: AffineRows::with_capacity(0, 0),
+            before: AffineRows::with_capacity(0, 0),
+            directions: Vec::new(),
+        };
+        tie.join()?;
+        Ok(tie)
+    }
+
+    /// How far (length) surfaces may be from each other, or in each other, along the normal of the slave's facets to be
+    /// tied: by default a tenth of the mean size of the facets, of the coarser surface.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn reach(mut self, reach: T) -> Result<Self> {
+        self.reach = positive("the reach of a tie", reach.value())?;
+        self.join()?;
+        Ok(self)
+    }
+
+    /// The nodes of the slave that are tied, ascending: each has a row an axis.
+    pub fn nodes(&self) -> &[usize] {
+        &self.joint.tied
+    }
+
+    /// ∫ N dA (area; length in two dimensions) in the reference configuration over what is covered of the facets around
+    /// a tied node, by its place among [`nodes`](Self::nodes): the forces of its rows over this are the traction.
+    pub fn area(&self, place: usize) -> T {
+        T::of(self.joint.areas[place])
+    }
+
+    /// Finds what meets, and the rows where nothing has moved.
+    fn join(&mut self) -> Result<()> {
+        self.joint = Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach);
+        self.bodies = [&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface));
+        self.nodes.read_bodies(&self.bodies)?;
+        self.linearize(&vec![T::zero(); self.nodes.dofs().len()]);
+        Ok(())
+    }
+
+    /// Makes the rows with the nodes where they are, at displacements u.
+    fn linearize(&mut self, u: &[T]) {
+        let Self { nodes, joint, rows, directions, .. } = self;
+        joint.turn(&nodes.positions);
+        rows.clear();
+        directions.clear();
+        for place in 0..joint.tied.len() {
+            for axis in 0..nodes.dimension {
+                let on_axes = |(node, weight): (usize, Point)| nodes.places(node).iter().copied().zip(weight);
+                rows.push(joint.gap(place, axis), joint.row(place, axis).flat_map(on_axes), u);
+                directions.push(joint.direction(place, axis));
+            }
+        }
+    }
+}
+
+impl<T: Real> ContactConstraint<T> for Tie<T> {
+    fn dofs(&self) -> &[usize] {
+        self.nodes.dofs()
+    }
+
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        let dimension = self.nodes.dimension;
+        for (row, &direction) in self.directions.iter().enumerate() {
+            let node = self.joint.tied[row / dimension];
+            let position = self.nodes.positions[node];
+            let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let mut contact =
+                contacts.push_row((node, row % dimension), ContactLaw::Equality, (&self.rows.jacobian, row));
+            contact.position(position.map(T::of));
+            if self.joint.turns {
+                contact.magnitude(T::of(size));
+            }
+            if let Some(direction) = unit(direction) {
+                contact.normal(direction.map(T::of));
+            }
+        }
+    }
+
+    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.directions.len()) {
+            *gap = self.rows.gap(row, u);
+        }
+        Ok(())
+    }
+
+    fn rates(&mut self, _t: f64, _u: &[T], _v: &[T], _rates: &mut [GapRates<T>]) -> Result<Rates> {
+        Ok(if self.joint.turns { Rates::Differences } else { Rates::Zero })
+    }
+
+    fn search(&mut self, t: f64, u: &[T], _v: &[T], _ahead: f64) -> Result<Candidates> {
+        if self.joint.tied.is_empty() {
+            let remedy = "bring the surfaces within the reach of the tie, face to face, or give a larger one";
+            return Err(Error::Empty { what: "the list of tied nodes", remedy });
+        }
+        self.follow(t, u)
+    }
+
+    fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
+        check_local(u.len(), self.dofs().len())?;
+        if !self.joint.turns {
+            return Ok(Candidates::Unchanged);
+        }
+        for body in &self.bodies {
+            // A trial state that is not finite: the gaps say so.
+            if self.nodes.move_to(body, u).is_err() {
+                return Ok(Candidates::Unchanged);
+            }
+        }
+        std::mem::swap(&mut self.rows, &mut self.before);
+        self.linearize(u);
+        Ok(Candidates::changed_if(self.rows.jacobian != self.before.jacobian))
+    }
+
+    /// Nothing comes between what is tied.
+    fn inspects(&self) -> bool {
+        false
+    }
+
+    fn variation(&self) -> Variation {
+        if self.joint.turns { Variation::Follows } else { Variation::Never }
+    }
+}

@@ -1,0 +1,262 @@
+//! What is tied to what: integrals of shape functions over the part of a surface that another one covers, found once,
+//! and the rows that they make in axes that turn with the facets.
+
+use crate::contact::surface::{
+    Base, Bounds, Facet, Neighborhood, Point, Sample, Surface, add_scaled, cross, dot, norm, sub,
+};
+use std::ops::Range;
+
+/// Share of what a node's shape function would cover that must be covered for a row.
+const LEAST: f64 = 1e-6;
+
+/// Share of a facet within which surfaces lie upon each other: rows are then the same for ever.
+const FITS: f64 = 1e-8;
+
+/// The tied nodes and what their rows are made of.
+#[derive(Debug, Default)]
+pub(super) struct Joint {
+    /// Nodes of the slave with rows, ascending, and ∫ N dA over what is covered.
+    pub(super) tied: Vec<usize>,
+    pub(super) areas: Vec<f64>,
+    /// Whether surfaces do not fit, so that axes must turn.
+    pub(super) turns: bool,
+    pieces: Vec<Piece>,
+    terms: Vec<Term>,
+    /// The nodes that the rows of each tied node act on, ascending.
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    /// The gaps at the start by tied node, in axes of space.
+    initial: Vec<Point>,
+    /// For each of `columns` what the rows of the three axes have of it.
+    weights: Vec<[Point; 3]>,
+    gaps: Vec<Point>,
+    /// By tied node the mean directions of the axes.
+    directions: Vec<[Point; 3]>,
+}
+
+/// A slave facet that is covered, in part at least.
+#[derive(Debug)]
+struct Piece {
+    facet: Facet,
+    /// Its frame in the reference configuration.
+    frame: [Point; 3],
+    terms: Range<usize>,
+    /// For each corner with rows its place among the tied, and where its rows have the corners.
+    rows: [Option<(usize, [usize; 4])>; 4],
+}
+
+/// ∫ N_a N_node dA over a facet, divided by ∫ N_a dA: positive for nodes of the master.
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    /// Corner a of the facet.
+    corner: usize,
+    node: usize,
+    /// Where the rows of a have the node.
+    slot: usize,
+    weight: f64,
+}
+
+/// What is found over a slave facet: (corner, node, ∫ N_corner N_node dA with the sign of a term).
+struct Covered {
+    facet: Facet,
+    frame: [Point; 3],
+    parts: Vec<(usize, usize, f64)>,
+}
+
+impl Joint {
+    /// Finds what of the slave is covered by facets of the master within `reach` along the normal.
+    pub(super) fn new(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> Self {
+        let (covered, areas) = cover(slave, master, positions, reach);
+        let whole = slave.areas_at(positions);
+        let is_tied = |&place: &usize| areas[place] > LEAST * whole[place];
+        let places: Vec<usize> = (0..areas.len()).filter(is_tied).collect();
+        let mut joint = Self {
+            tied: places.iter().map(|&place| slave.nodes()[place]).collect(),
+            areas: places.iter().map(|&place| areas[place]).collect(),
+            ..Self::default()
+        };
+        joint.list_columns(&covered);
+        joint.take(&covered, positions);
+        joint
+    }
+
+    /// The place of a node among the tied.
+    fn place(&self, node: usize) -> Option<usize> {
+        self.tied.binary_search(&node).ok()
+    }
+
+    /// Where the rows of a tied node have a node.
+    fn slot(&self, place: usize, node: usize) -> usize {
+        let range = self.starts[place]..self.starts[place + 1];
+        range.start + self.columns[range].partition_point(|&other| other < node)
+    }
+
+    fn list_columns(&mut self, covered: &[Covered]) {
+        let mut columns: Vec<(usize, usize)> = Vec::new();
+        for Covered { facet, parts, .. } in covered {
+            for &(corner, node, _) in parts {
+                columns.extend(self.place(facet.nodes()[corner]).map(|place| (place, node)));
+            }
+        }
+        columns.sort_unstable();
+        columns.dedup();
+        self.starts = (0..=self.tied.len()).map(|place| columns.partition_point(|x| x.0 < place)).collect();
+        self.columns = columns.into_iter().map(|(_, node)| node).collect();
+    }
+
+    /// Takes what rows are made of, and the gaps at the start.
+    fn take(&mut self, covered: &[Covered], positions: &[Point]) {
+        for Covered { facet, frame, parts } in covered {
+            let mut rows = [None; 4];
+            for (row, &node) in rows.iter_mut().zip(facet.nodes()) {
+                let place = self.place(node);
+                *row = place.map(|place| (place, facet.nodes.map(|corner| self.slot(place, corner))));
+            }
+            let start = self.terms.len();
+            for &(corner, node, integral) in parts {
+                if let Some((place, _)) = rows[corner] {
+                    let (slot, weight) = (self.slot(place, node), integral / self.areas[place]);
+                    self.terms.push(Term { corner, node, slot, weight });
+                }
+            }
+            self.pieces.push(Piece { facet: *facet, frame: *frame, terms: start..self.terms.len(), rows });
+        }
+        let tied = self.tied.len();
+        (self.initial, self.gaps) = (vec![[0.0; 3]; tied], vec![[0.0; 3]; tied]);
+        self.directions = vec![[[0.0; 3]; 3]; tied];
+        self.weights = vec![[[0.0; 3]; 3]; self.columns.len()];
+        for piece in &self.pieces {
+            let size = piece.facet.shape(positions).size();
+            for (apart, row) in self.apart(piece, positions).into_iter().zip(piece.rows) {
+                if let Some((place, _)) = row {
+                    self.turns |= norm(apart) > FITS * size;
+                    self.initial[place] = add_scaled(self.initial[place], 1.0, apart);
+                }
+            }
+        }
+    }
+
+    /// Σ weight · x of the terms of each corner: how far the master is from the slave. (Weights sum to zero.)
+    fn apart(&self, piece: &Piece, positions: &[Point]) -> [Point; 4] {
+        let origin = positions[piece.facet.nodes[0]];
+        let mut apart = [[0.0; 3]; 4];
+        for term in &self.terms[piece.terms.clone()] {
+            apart[term.corner] = add_scaled(apart[term.corner], term.weight, sub(positions[term.node], origin));
+        }
+        apart
+    }
+
+    /// Makes the rows for nodes at these positions.
+    pub(super) fn turn(&mut self, positions: &[Point]) {
+        self.weights.fill([[0.0; 3]; 3]);
+        self.directions.fill([[0.0; 3]; 3]);
+        self.gaps.fill([0.0; 3]);
+        for piece in &self.pieces {
+            let base = Base::new(&piece.facet, positions).filter(|_| self.turns);
+            let axes = match (&base, self.turns) {
+                (Some(base), _) => turned(&piece.frame, &base.frame()),
+                (None, false) => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                // A facet that has lost its area: gaps that are no numbers are refused.
+                (None, true) => [[f64::NAN; 3]; 3],
+            };
+            let apart = self.apart(piece, positions);
+            for term in &self.terms[piece.terms.clone()] {
+                let Some((place, corners)) = piece.rows[term.corner] else { continue };
+                let is_master = !corners[..piece.facet.count].contains(&term.slot);
+                for (k, axis) in axes.iter().enumerate() {
+                    let weight = &mut self.weights[term.slot][k];
+                    *weight = add_scaled(*weight, term.weight, *axis);
+                    if is_master {
+                        let direction = &mut self.directions[place][k];
+                        *direction = add_scaled(*direction, term.weight, *axis);
+                    }
+                }
+            }
+            for (apart, row) in apart.into_iter().zip(piece.rows) {
+                let (Some((place, corners)), true) = (row, self.turns) else { continue };
+                for (k, &axis) in axes.iter().enumerate() {
+                    self.gaps[place][k] += dot(apart, axis);
+                    let Some(base) = &base else { continue };
+                    let by_corner = base.rotated(cross(axis, apart));
+                    for (&slot, by) in corners[..piece.facet.count].iter().zip(by_corner) {
+                        self.weights[slot][k] = add_scaled(self.weights[slot][k], 1.0, by);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The gap of a tied node along an axis where the rows were made.
+    pub(super) fn gap(&self, place: usize, axis: usize) -> f64 {
+        if self.turns { self.gaps[place][axis] - self.initial[place][axis] } else { 0.0 }
+    }
+
+    /// Its row: nodes, and what their displacements are multiplied by.
+    pub(super) fn row(&self, place: usize, axis: usize) -> impl Iterator<Item = (usize, Point)> + '_ {
+        let range = self.starts[place]..self.starts[place + 1];
+        range.map(move |slot| (self.columns[slot], self.weights[slot][axis]))
+    }
+
+    /// The direction in which its gap opens.
+    pub(super) fn direction(&self, place: usize, axis: usize) -> Point {
+        self.directions[place][axis]
+    }
+
+    /// The nodes of a surface that the rows act on, ascending.
+    pub(super) fn nodes_of(&self, surface: &Surface) -> Vec<usize> {
+        let mut nodes: Vec<usize> = self.columns.clone();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes.retain(|node| surface.nodes().binary_search(node).is_ok());
+        nodes
+    }
+}
+
+/// Where the axes of space are that have turned as a frame has.
+fn turned(from: &[Point; 3], to: &[Point; 3]) -> [Point; 3] {
+    let axis = |k: usize| from.iter().zip(to).fold([0.0; 3], |sum, (from, &to)| add_scaled(sum, from[k], to));
+    [axis(0), axis(1), axis(2)]
+}
+
+/// What of each slave facet is covered, and ∫ N dA over it by place of the slave's nodes.
+fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> (Vec<Covered>, Vec<f64>) {
+    let mut lists = Neighborhood::default();
+    let boxes = slave.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
+    lists.build(boxes, master, positions, reach);
+    let mut areas = vec![0.0; slave.nodes().len()];
+    let mut all = Vec::new();
+    for (index, facet) in slave.facets().iter().enumerate() {
+        let Some(base) = Base::new(facet, positions) else { continue };
+        let (count, mut own, mut parts) = (facet.count, [[0.0; 4]; 4], Vec::new());
+        for &partner in lists.of(index) {
+            let other = &master.facets()[partner];
+            if !base.may_meet(other, positions, reach) {
+                continue;
+            }
+            let mut onto = [[0.0; 4]; 4];
+            let mut touched = false;
+            base.each_sample(other, positions, &mut |sample: &Sample| {
+                if sample.gap.abs() > reach {
+                    return;
+                }
+                touched = true;
+                for a in 0..count {
+                    let weight = sample.area * sample.slave[a];
+                    areas[slave.place(facet.nodes[a])] += weight;
+                    (0..count).for_each(|b| own[a][b] -= weight * sample.slave[b]);
+                    (0..other.count).for_each(|c| onto[a][c] += weight * sample.master[c]);
+                }
+            });
+            if touched {
+                let entries = |a: usize| (0..other.count).map(move |c| (a, c));
+                parts.extend((0..count).flat_map(entries).map(|(a, c)| (a, other.nodes[c], onto[a][c])));
+            }
+        }
+        if !parts.is_empty() {
+            let entries = |a: usize| (0..count).map(move |b| (a, b));
+            parts.extend((0..count).flat_map(entries).map(|(a, b)| (a, facet.nodes[b], own[a][b])));
+            all.push(Covered { facet: *facet, frame: base.frame(), parts });
+        }
+    }
+    (all, areas)
+}
