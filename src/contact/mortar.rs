@@ -3,15 +3,17 @@
 mod integrals;
 mod pairs;
 mod passage;
+mod ramp;
 mod rows;
 
 use super::surface::{Bounds, Facet, Nodes, Point, Surface, sub};
 use super::{Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
-use integrals::Integrals;
+use integrals::{Integrals, Offsets};
 use pairs::Pairs;
-use rows::Rows;
+use ramp::Ramp;
+use rows::{Made, Rows};
 
 /// Share of the reach above which a row that nothing lies over any more is open.
 const OPEN: f64 = 0.01;
@@ -94,6 +96,9 @@ pub struct Mortar<T: Real> {
     law: ContactLaw,
     friction: f64,
     reach: f64,
+    /// How far surfaces lie outside of their facets, by node; empty if they do not.
+    offsets: Vec<f64>,
+    ramp: Ramp,
     skin: Option<f64>,
     pairs: Pairs,
     /// Positions when the lists of pairs were built, by node.
@@ -141,6 +146,8 @@ impl<T: Real> Mortar<T> {
             bodies,
             law: ContactLaw::Rigid,
             friction: 0.0,
+            offsets: Vec::new(),
+            ramp: Ramp::default(),
             skin: None,
             pairs: Pairs::default(),
             built_at: Vec::new(),
@@ -165,6 +172,59 @@ impl<T: Real> Mortar<T> {
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
+    }
+
+    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the thickness of
+    /// a shell whose facets are its middle surface, the thickness of a coating; negative if they lie inside. Between
+    /// nodes the shape functions interpolate. The gap is n·(x_m − x_s) less the offsets of both.
+    ///
+    /// Forces act on the facets: that a friction force acts at a distance from the middle surface is left out.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::Mortar;
+    ///
+    /// // The middle surfaces of two sheets, 0.1 apart, of which each is 0.06 thick.
+    /// let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.1], [1.0, 0.1]];
+    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    /// let mut contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])?.offsets(&[0.03; 4])?;
+    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
+    /// let mut gaps = [0.0; 2];
+    /// contact.gaps(0.0, &[0.0; 8], &mut gaps)?;
+    /// assert!(gaps.iter().all(|gap: &f64| (gap - 0.04).abs() < 1e-15));
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
+        let (expected, found) = (self.nodes.coordinates.len(), offsets.len());
+        if found != expected {
+            return Err(Error::Dimension { what: "the list of offsets by node", expected, found });
+        }
+        self.offsets = offsets.iter().map(|offset| offset.value()).collect();
+        if let Some((index, &value)) = self.offsets.iter().enumerate().find(|(_, offset)| !offset.is_finite()) {
+            return Err(Error::NotFinite { what: "the list of offsets (by node)", index, value });
+        }
+        self.pairs.forget();
+        Ok(self)
+    }
+
+    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
+    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration (a polynomial
+    /// of the fifth degree).
+    ///
+    /// A press fit whose bodies are meshed as they are before, one overlapping the other by d, begins with offsets whose
+    /// sum is −d and factors from 1 to 0; one whose bodies are meshed as if they just fitted ends with a sum of d, by
+    /// factors from 0 to 1.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+        self.ramp = Ramp::new(times, factors)?;
+        Ok(self)
     }
 
     /// How far (length) outside of each other, and inside, facets meet at least; by default the mean size of the facets,
@@ -227,19 +287,40 @@ impl<T: Real> Mortar<T> {
         one.farthest(&other)
     }
 
-    /// Pairs of facets within `range`, of those that the surfaces make now.
-    fn find_pairs(&mut self, range: f64) {
+    /// Bounds of the sum of the offsets of both surfaces at t, below and above zero.
+    fn thickest(&self, t: f64) -> [f64; 2] {
+        if self.offsets.is_empty() {
+            return [0.0; 2];
+        }
+        let factor = self.ramp.at(t);
+        let of = |body: &Vec<usize>| {
+            let sizes = body.iter().map(|&node| factor * self.offsets[node]);
+            sizes.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        };
+        let [one, other] = self.bodies.each_ref().map(of);
+        [(one[0] + other[0]).min(0.0), (one[1] + other[1]).max(0.0)]
+    }
+
+    /// How deep surfaces may be in each other at t and be found.
+    fn depth(&self, t: f64) -> f64 {
+        self.reach - self.thickest(t)[0]
+    }
+
+    /// Pairs of facets within `range`, of those that the surfaces make now, at t.
+    fn find_pairs(&mut self, t: f64, range: f64) {
+        let depth = self.depth(t);
         let surfaces = [&self.slave, &self.master];
         if !self.pairs.are_sure_of(range, self.moved()) {
             self.pairs.build(surfaces, &self.nodes.positions, range + self.skin.unwrap_or(0.5 * range));
             self.built_at.clone_from(&self.nodes.positions);
         }
-        self.pairs.take_near(surfaces, &self.nodes.positions, range, self.reach);
+        self.pairs.take_near(surfaces, &self.nodes.positions, range, depth);
     }
 
-    fn integrate(&mut self) {
-        let Self { integrals, slave, master, nodes, pairs, .. } = self;
-        integrals.integrate(slave, master, &nodes.positions, |facet| pairs.of(facet));
+    fn integrate(&mut self, t: f64) {
+        let Self { integrals, slave, master, nodes, pairs, offsets, ramp, .. } = self;
+        let offsets = Offsets { by_node: offsets, factor: ramp.at(t) };
+        integrals.integrate(slave, master, &nodes.positions, offsets, |facet| pairs.of(facet));
     }
 }
 
@@ -263,12 +344,13 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         }
     }
 
-    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         let boxes = self.move_nodes(u)?;
         let speeds =
             [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
-        let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+        let thickness = self.thickest(t)[1].max(self.thickest(t + ahead)[1]);
+        let range = self.reach + thickness + ahead * speeds[0].farthest(&speeds[1]);
         for (places, body) in self.searched_at.iter_mut().zip(&self.bodies) {
             places.clear();
             places.extend(body.iter().map(|&node| self.nodes.positions[node]));
@@ -276,11 +358,11 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         self.found.clear();
         self.pairs.clear();
         if boxes[0].inflated(range).intersects(&boxes[1]) {
-            self.find_pairs(range);
-            self.integrate();
-            let rubs = self.tangents() > 0;
+            self.find_pairs(t, range);
+            self.integrate(t);
+            let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.ramp.at(t), u };
             for place in 0..self.slave.nodes().len() {
-                self.found.push(place, &self.integrals, &self.nodes, rubs, u);
+                self.found.push(place, &self.integrals, &made);
             }
         }
         let same = self.rows.places == self.found.places && self.rows.affine.jacobian == self.found.affine.jacobian;
@@ -294,20 +376,23 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         if self.rows.places.is_empty() || self.move_nodes(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
-        self.integrate();
+        self.integrate(t);
         self.found.clear();
         let count = self.tangents();
         // (Asked only where a row has lost its surroundings.)
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
         let near = self.rows.places.iter().all(is_covered)
             || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
-        let Self { rows, found, integrals, nodes, slave, reach, .. } = self;
+        let Self { rows, found, integrals, nodes, slave, reach, ramp, .. } = self;
+        let made = Made { rubs: count > 0, nodes, factor: ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {
-            if found.push(place, integrals, nodes, count > 0, u) {
+            if found.push(place, integrals, &made) {
                 continue;
             }
             // Nothing lies over it any more. What is open stays so, and what has just gone over the rim ends its step.
-            if !near && rows.affine.gap(row, u).value() <= OPEN * *reach {
+            let spot = &rows.spots[row];
+            let gap = rows.affine.gap(row, u).value() - (made.factor - spot.factor) * spot.offset;
+            if !near && gap <= OPEN * *reach {
                 let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
                 return Err(Error::ContactLost { t, contact });
             }
@@ -318,9 +403,10 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         Ok(Candidates::changed_if(!same))
     }
 
-    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.places.len()) {
-            *gap = self.rows.affine.gap(row, u);
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        let factor = self.ramp.at(t);
+        for (row, (gap, spot)) in gaps.iter_mut().zip(&self.rows.spots).enumerate() {
+            *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);
         }
         Ok(())
     }

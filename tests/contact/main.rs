@@ -8,6 +8,7 @@ mod laws;
 mod mortar;
 mod node_to_facet;
 mod obstacles;
+mod offsets;
 mod passing_through;
 mod pounding;
 mod rate_laws;

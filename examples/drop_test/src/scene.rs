@@ -137,7 +137,7 @@ impl Scene {
     }
 }
 
-fn facet(nodes: &[usize]) -> Facet {
+pub fn facet(nodes: &[usize]) -> Facet {
     match *nodes {
         [i, j, k, l] => Facet::from([i, j, k, l]),
         _ => Facet::from([nodes[0], nodes[1], nodes[2]]),

@@ -1,7 +1,9 @@
 //! A series for ParaView: a .vtu file for each picture, and the .pvd file that lists them with their times.
 
 use crate::Result;
-use crate::mesh::{Mesh, Shape, area_at, dot};
+use crate::mesh::{Mesh, Shape};
+use crate::scene;
+use contact_dynamics::contact::Surface;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use vtkio::model::{
@@ -54,7 +56,7 @@ impl Series {
 
     /// Writes a picture.
     pub fn add(&mut self, time: f64, mesh: &Mesh, surface: &[Vec<usize>], picture: &Picture<'_>) -> Result<()> {
-        let pressure = pressure(mesh, surface, picture);
+        let pressure = pressure(mesh, surface, picture)?;
         let piece = UnstructuredGridPiece {
             points: self.points.clone().into(),
             cells: self.cells.clone(),
@@ -111,23 +113,17 @@ fn narrow(values: &[f64]) -> Vec<f32> {
     values.iter().map(|&x| x as f32).collect()
 }
 
-/// Pressure (Pa) at each node: the force against its outward normal over its share of the facets around it, both where
-/// the surface is now.
-fn pressure(mesh: &Mesh, surface: &[Vec<usize>], picture: &Picture<'_>) -> Vec<f64> {
-    let mut areas = vec![[0.0; 3]; mesh.nodes.len()];
-    let place = |node: usize| std::array::from_fn(|i| mesh.nodes[node][i] + picture.displacement[3 * node + i]);
-    for facet in surface {
-        let area = area_at(facet, place);
-        for &node in facet {
-            areas[node] = [0, 1, 2].map(|i| areas[node][i] + area[i] / facet.len() as f64);
-        }
+/// Pressure (Pa) at each node of the mesh, where the surface is now.
+fn pressure(mesh: &Mesh, surface: &[Vec<usize>], picture: &Picture<'_>) -> Result<Vec<f64>> {
+    let vectors = |x: &[f64]| x.chunks(3).map(|x| [x[0], x[1], x[2]]).collect::<Vec<_>>();
+    let mut positions = vectors(picture.displacement);
+    positions.iter_mut().zip(&mesh.nodes).for_each(|(u, x)| *u = [0, 1, 2].map(|i| x[i] + u[i]));
+    let surface = Surface::new(&mesh.nodes, surface.iter().map(|facet| scene::facet(facet)))?;
+    let mut pressures = vec![0.0; mesh.nodes.len()];
+    for (&node, pressure) in surface.nodes().iter().zip(surface.pressures(&positions, &vectors(picture.force))?) {
+        pressures[node] = pressure;
     }
-    let at = |(node, area): (usize, &[f64; 3])| {
-        let square = dot(area, area);
-        let force = std::array::from_fn(|i| picture.force[3 * node + i]);
-        if square > 0.0 { -dot(&force, area) / square } else { 0.0 }
-    };
-    areas.iter().enumerate().map(at).collect()
+    Ok(pressures)
 }
 
 #[cfg(test)]

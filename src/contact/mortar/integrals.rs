@@ -9,6 +9,9 @@
 //! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there; where
 //! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under translations and rotations, term by term: so
 //! forces along the derivative conserve linear and angular momentum to rounding.
+//!
+//! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
+//! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
 use crate::contact::surface::{
     Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm,
@@ -16,6 +19,20 @@ use crate::contact::surface::{
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
 const LEAST: f64 = 1e-6;
+
+/// How far surfaces lie outside of their facets: by node, times a factor. A list of none is zero.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Offsets<'a> {
+    pub(super) by_node: &'a [f64],
+    pub(super) factor: f64,
+}
+
+impl Offsets<'_> {
+    /// At the corners of a facet, without the factor.
+    fn of(&self, facet: &Facet) -> [f64; 4] {
+        facet.nodes.map(|node| self.by_node.get(node).copied().unwrap_or(0.0))
+    }
+}
 
 /// What is integrated for a slave node.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,6 +42,8 @@ pub(super) struct Sums {
     whole: f64,
     /// ∫N g dA.
     moment: f64,
+    /// ∫N o dA with the offsets of both surfaces.
+    offset: f64,
     /// ∫N x dA, and −∫N μ dA.
     position: Point,
     normal: Point,
@@ -39,6 +58,11 @@ impl Sums {
     /// The mean of the gap with the weights of the node.
     pub(super) fn gap(&self) -> f64 {
         self.moment / self.area
+    }
+
+    /// The mean of the offsets of both surfaces, where they have their full size.
+    pub(super) fn offset(&self) -> f64 {
+        self.offset / self.area
     }
 
     /// The mean of the covered points.
@@ -100,8 +124,9 @@ struct Block {
 
 impl Block {
     /// Adds that the rim of a master moves over the slave facet, to this one and to the master's.
-    fn add_rim(&mut self, sample: &RimSample, count: usize, onto: &mut Self) {
-        let RimSample { length, slave, master, gap, outward } = *sample;
+    fn add_rim(&mut self, sample: &RimSample, offset: f64, count: usize, onto: &mut Self) {
+        let RimSample { length, slave, master, gap: distance, outward } = *sample;
+        let gap = distance - offset;
         for a in 0..count {
             let weight = length * slave[a];
             for k in 0..4 {
@@ -112,8 +137,8 @@ impl Block {
                 onto.areas[a][k] = add_scaled(onto.areas[a][k], other, outward);
             }
             let [of_moment, of_area] = &mut self.turns[a];
-            *of_moment = add_scaled(*of_moment, -weight * gap * gap, outward);
-            *of_area = add_scaled(*of_area, -weight * gap, outward);
+            *of_moment = add_scaled(*of_moment, -weight * gap * distance, outward);
+            *of_area = add_scaled(*of_area, -weight * distance, outward);
         }
     }
 
@@ -145,6 +170,7 @@ impl Integrals {
         slave: &Surface,
         master: &Surface,
         positions: &[Point],
+        offsets: Offsets<'_>,
         partners: impl Fn(usize) -> &'p [usize],
     ) {
         self.sums.clear();
@@ -159,7 +185,8 @@ impl Integrals {
             let mut block = Block::default();
             let mut touched = false;
             for &partner in partners(index) {
-                touched |= self.integrate_pair(&base, (master, partner), positions, &places, &mut block);
+                let other = (&master.facets()[partner], master.open_sides(partner));
+                touched |= self.integrate_pair((&base, facet), other, (positions, offsets), &places, &mut block);
             }
             if touched {
                 block.turn(&base);
@@ -172,18 +199,29 @@ impl Integrals {
     /// Adds what a master facet covers; says whether it covers anything.
     fn integrate_pair(
         &mut self,
-        base: &Base,
-        (master, partner): (&Surface, usize),
-        positions: &[Point],
+        (base, facet): (&Base, &Facet),
+        (other, open): (&Facet, [bool; 4]),
+        (positions, offsets): (&[Point], Offsets<'_>),
         places: &[usize; 4],
         block: &mut Block,
     ) -> bool {
-        let (count, other) = (base.count(), &master.facets()[partner]);
+        let count = base.count();
+        let [own, others] = [facet, other].map(|facet| offsets.of(facet));
+        let product_of = |weights: &[f64; 4], values: &[f64; 4]| -> f64 {
+            weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
+        };
+        let offset_at = |slave: &[f64; 4], master: &[f64; 4]| product_of(slave, &own) + product_of(master, &others);
         let mut onto = Block::default();
         let mut touched = false;
         base.each_sample(other, positions, &mut |sample: &Sample| {
             touched = true;
-            let Sample { area, slave, master, gap, direction } = *sample;
+            let Sample { area, slave, master, gap: distance, direction: normal } = *sample;
+            let (mut gap, mut direction, mut offset) = (distance, normal, 0.0);
+            if !offsets.by_node.is_empty() {
+                offset = offset_at(&slave, &master);
+                gap -= offsets.factor * offset;
+                direction = add_scaled(normal, offsets.factor, base.slope(other, positions, &master, &others));
+            }
             let point = base.shape.point(&slave);
             // (Of a segment the second tangent is the unit vector out of the plane, and this its length times n.)
             let [first, second] = base.shape.tangents_at(&slave);
@@ -195,8 +233,9 @@ impl Integrals {
                 let sums = &mut self.sums[places[a]];
                 sums.area += weight;
                 sums.moment += weight * gap;
+                sums.offset += weight * offset;
                 sums.position = add_scaled(sums.position, weight, point);
-                sums.normal = add_scaled(sums.normal, -weight, direction);
+                sums.normal = add_scaled(sums.normal, -weight, normal);
                 let by_area = omega * slave[a];
                 for b in 0..count {
                     let moment = &mut block.moments[a][b];
@@ -206,7 +245,7 @@ impl Integrals {
                     block.shares[a][b] += weight * slave[b];
                 }
                 let [of_moment, of_area] = &mut block.turns[a];
-                *of_moment = add_scaled(*of_moment, -weight * gap, direction);
+                *of_moment = add_scaled(*of_moment, -weight * distance, direction);
                 *of_moment = add_scaled(*of_moment, by_area * gap, product);
                 *of_area = add_scaled(*of_area, by_area, product);
                 for (c, &share) in master.iter().enumerate() {
@@ -216,8 +255,10 @@ impl Integrals {
             }
         });
         if touched {
-            let open = master.open_sides(partner);
-            base.each_rim_sample(other, open, positions, &mut |sample| block.add_rim(sample, count, &mut onto));
+            base.each_rim_sample(other, open, positions, &mut |sample: &RimSample| {
+                let offset = offsets.factor * offset_at(&sample.slave, &sample.master);
+                block.add_rim(sample, offset, count, &mut onto);
+            });
             self.push_all(places, count, other, &onto);
         }
         touched

@@ -1,7 +1,7 @@
 //! What surfaces have gone through in a step: weighted gaps along the way.
 
 use super::Mortar;
-use super::integrals::Integrals;
+use super::integrals::{Integrals, Offsets};
 use super::pairs::Pairs;
 use crate::contact::surface::{Bounds, Point, add_scaled, sub};
 use crate::contact::{LARGEST_MISS, Stride};
@@ -53,7 +53,9 @@ impl<T: Real> Mortar<T> {
             let places = self.bodies[body].iter().flat_map(|&node| [ends[0][node], ends[1][node]]);
             Bounds::of_points(places)
         });
-        if !swept[0].inflated(self.reach).intersects(&swept[1]) {
+        let [early, late] = step.t.map(|t| self.thickest(t)[1]);
+        let (reach, depth) = (self.reach + early.max(late), self.depth(step.t[0]).max(self.depth(step.t[1])));
+        if !swept[0].inflated(reach).intersects(&swept[1]) {
             return Ok(());
         }
         let name = |place: usize| (self.slave.nodes()[place], 0);
@@ -62,7 +64,7 @@ impl<T: Real> Mortar<T> {
         };
         let surfaces = [&self.slave, &self.master];
         positions.clone_from(&ends[0]);
-        pairs.build(surfaces, positions, self.reach + way);
+        pairs.build(surfaces, positions, reach + way);
         outside.clear();
         outside.resize(self.slave.nodes().len(), true);
         let limit = -LARGEST_MISS * way;
@@ -71,8 +73,10 @@ impl<T: Real> Mortar<T> {
             for &node in self.bodies.iter().flatten() {
                 positions[node] = add_scaled(ends[0][node], share, sub(ends[1][node], ends[0][node]));
             }
-            pairs.take_near(surfaces, positions, self.reach, self.reach);
-            integrals.integrate(&self.slave, &self.master, positions, |facet| pairs.of(facet));
+            pairs.take_near(surfaces, positions, reach, depth);
+            let factor = self.ramp.at(step.t[0] + share * (step.t[1] - step.t[0]));
+            let offsets = Offsets { by_node: &self.offsets, factor };
+            integrals.integrate(&self.slave, &self.master, positions, offsets, |facet| pairs.of(facet));
             for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
                 if look == 0 {
                     // What is inside already comes out as it may.

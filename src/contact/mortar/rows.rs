@@ -18,6 +18,14 @@ pub(super) struct Rows<T> {
     pub(super) tangents: ContactJacobian<T>,
 }
 
+/// What rows are made with: the nodes, whether there is friction, the factor of offsets, and the displacements.
+pub(super) struct Made<'a, T> {
+    pub(super) nodes: &'a Nodes,
+    pub(super) rubs: bool,
+    pub(super) factor: f64,
+    pub(super) u: &'a [T],
+}
+
 /// Where a contact is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spot {
@@ -25,6 +33,9 @@ pub(super) struct Spot {
     pub(super) normal: Point,
     /// The covered area that belongs to the node.
     pub(super) area: f64,
+    /// The mean offset of the two surfaces in full size, and the factor that the gap was made with.
+    pub(super) offset: f64,
+    pub(super) factor: f64,
 }
 
 impl<T: Real> Rows<T> {
@@ -45,14 +56,16 @@ impl<T: Real> Rows<T> {
     }
 
     /// Appends the row of a slave node, if it is covered; says whether it is.
-    pub(super) fn push(&mut self, place: usize, integrals: &Integrals, nodes: &Nodes, rubs: bool, u: &[T]) -> bool {
+    pub(super) fn push(&mut self, place: usize, integrals: &Integrals, made: &Made<'_, T>) -> bool {
+        let Made { nodes, rubs, factor, u } = *made;
         let sums = &integrals.sums[place];
         let Some(normal) = sums.normal().filter(|_| sums.is_covered()) else { return false };
         let entries = integrals.row(place);
         let weights = entries.iter().flat_map(|entry| on_axes(nodes, entry, entry.weight(sums)));
         self.affine.push(sums.gap(), weights, u);
         self.places.push(place);
-        self.spots.push(Spot { position: sums.position(), normal, area: sums.area });
+        let (position, offset) = (sums.position(), sums.offset());
+        self.spots.push(Spot { position, normal, area: sums.area, offset, factor });
         if rubs {
             let [x, y, _] = normal;
             let directions = match nodes.dimension {

@@ -202,6 +202,21 @@ impl Base {
         std::array::from_fn(|k| add_scaled(tilted[k], spin * by_corner[k], self.axes[1]))
     }
 
+    /// How a function with these values at the corners of a master facet grows where the rays of this facet meet it, if
+    /// the point below moves: along the facet, for the foot of the ray moves with it.
+    ///
+    /// With d the vectors across n whose products with the tangents are 0 and 1, dξ = d · dx for the foot's coordinate ξ.
+    pub(crate) fn slope(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], values: &[f64; 4]) -> Point {
+        let count = facet.nodes().len();
+        let [first, second] = facet.shape(positions).tangents_at(weights);
+        let second = if count == 2 { [0.0, 0.0, 1.0] } else { second };
+        let across = [cross(second, self.normal), cross(self.normal, first)];
+        let area = dot(first, across[0]);
+        let change = derivatives(count, weights).map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
+        let [along, beside]: [f64; 2] = change;
+        add_scaled(across[0].map(|x| along / area * x), beside / area, across[1])
+    }
+
     /// Number of nodes.
     pub(crate) fn count(&self) -> usize {
         self.count

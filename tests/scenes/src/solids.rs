@@ -1,8 +1,8 @@
 //! Elastic bodies in two and three dimensions: meshes of quad4 (plane strain) and hex8 elements, and their assembly.
 
+use contact_dynamics::contact::Surface;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{LinearSystem, Real};
-use std::collections::HashMap;
 
 /// A linear elastic material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -269,22 +269,8 @@ impl<const D: usize> Solid<D> {
     /// Sides of elements that belong to one element only, oriented outward: counterclockwise seen from outside in three
     /// dimensions, with the body on the left in two.
     pub fn boundary(&self) -> Vec<Vec<usize>> {
-        let sides: &[&[usize]] = match D {
-            2 => &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
-            _ => &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]],
-        };
-        let key = |side: &[usize]| {
-            let mut key = side.to_vec();
-            key.sort_unstable();
-            key
-        };
-        let all =
-            || self.elements.iter().flat_map(|e| sides.iter().map(|s| s.iter().map(|&k| e[k]).collect::<Vec<_>>()));
-        let mut count = HashMap::new();
-        for side in all() {
-            *count.entry(key(&side)).or_insert(0) += 1;
-        }
-        all().filter(|side| count[&key(side)] == 1).collect()
+        let surface = Surface::of_cells(&self.nodes, &self.elements).expect("a mesh of sound elements");
+        surface.facets().iter().map(|facet| facet.nodes().to_vec()).collect()
     }
 
     /// The nodes of [`boundary`](Self::boundary), ascending.

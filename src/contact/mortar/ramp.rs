@@ -1,0 +1,42 @@
+//! A factor that goes smoothly from one value to another.
+
+use crate::error::{Error, Result};
+
+/// A factor by time: one value until the first time, another from the second on, smooth in between.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ramp {
+    times: [f64; 2],
+    factors: [f64; 2],
+}
+
+impl Default for Ramp {
+    /// One at all times.
+    fn default() -> Self {
+        Self { times: [0.0, 1.0], factors: [1.0; 2] }
+    }
+}
+
+impl Ramp {
+    /// Refuses what is not finite, and an end that is not after the beginning.
+    pub(super) fn new(times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+        let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
+        if let Some(&time) = times.iter().find(|time| !time.is_finite()) {
+            return refuse("a time of a ramp", time, "finite");
+        }
+        if let Some(&factor) = factors.iter().find(|factor| !factor.is_finite()) {
+            return refuse("a factor of a ramp", factor, "finite");
+        }
+        if times[1] <= times[0] {
+            return refuse("the end of a ramp less its beginning", times[1] - times[0], "positive");
+        }
+        Ok(Self { times, factors })
+    }
+
+    /// The factor at t.
+    pub(super) fn at(&self, t: f64) -> f64 {
+        let [from, to] = self.factors;
+        let s = ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0);
+        // Its first two derivatives are zero at both ends.
+        from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+    }
+}
