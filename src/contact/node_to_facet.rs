@@ -5,7 +5,7 @@ mod passage;
 mod rows;
 
 use super::obstacle::across;
-use super::surface::{Facet, Neighborhood, Nodes, Point, Shape, Surface, add_scaled, overhang};
+use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Shape, Surface, add_scaled, overhang};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -123,6 +123,9 @@ pub struct NodeToFacet<T: Real> {
     surface: Surface,
     /// Facets that the nodes belong to, if known.
     own_surface: Option<Surface>,
+    /// What nodes do not meet of a surface against itself, and by how many rings it was found.
+    kin: Option<Kin>,
+    rings: usize,
     /// All nodes of the two bodies: the one of the nodes, the one of the facets.
     bodies: [Vec<usize>; 2],
     passes: Vec<Pass>,
@@ -131,7 +134,7 @@ pub struct NodeToFacet<T: Real> {
     reach: f64,
     skin: Option<f64>,
     rebuilds: usize,
-    /// The node that a node of the first pass stands on exactly.
+    /// The node that a node of the first pass stands on exactly, where that one may stand on it.
     partners: Vec<Option<usize>>,
     rows: Rows<T>,
     /// What the search under way finds.
@@ -218,21 +221,30 @@ impl<T: Real> NodeToFacet<T> {
             return Err(Error::Empty { what, remedy: "give at least one node" });
         }
         let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
-        let reach = surface.typical();
         let mut sorted = nodes.to_vec();
         sorted.sort_unstable();
         if let Some([node, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
             let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it is listed twice" });
         }
-        let bodies = [sorted, surface.nodes().to_vec()];
-        let mut contact = Self {
+        let mut contact = Self::between(mesh, sorted, surface);
+        contact.prepare()?;
+        Ok(contact)
+    }
+
+    /// Of nodes (ascending) with a surface, before its memory is reserved.
+    fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface) -> Self {
+        let reach = surface.typical();
+        let bodies = [nodes, surface.nodes().to_vec()];
+        Self {
             built_at: Vec::new(),
             listed: 0.0,
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
             nodes: mesh,
             surface,
             own_surface: None,
+            kin: None,
+            rings: 0,
             passes: vec![Pass::new(bodies[0].clone())],
             bodies,
             law: ContactLaw::Rigid,
@@ -243,9 +255,70 @@ impl<T: Real> NodeToFacet<T> {
             partners: Vec::new(),
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
-        };
+        }
+    }
+
+    /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. For bodies that
+    /// fold, and for several bodies whose surfaces are given as one.
+    ///
+    /// Of the facets a node does not meet those within one [ring](Self::rings), those that do not face it (normals within
+    /// 102° of each other), and those behind it by more than half of the material there: how thick that is is found in
+    /// the reference configuration, as far as the [`reach`](Self::reach). So nothing may be inside of itself there.
+    /// Of two nodes that stand on each other the one with the smaller number has a row. A search reaches as far as any two nodes of the surface
+    /// move against each other within the step: a body that spins fast looks farther than it must.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::{Contacts, NodeToFacet, Surface};
+    ///
+    /// // Two columns of two elements on a beam: their inner sides face each other, 0.5 apart.
+    /// let coordinates: Vec<[f64; 2]> = (0..4).flat_map(|j| [0.0, 1.0, 1.5, 2.5].map(|x| [x, f64::from(j)])).collect();
+    /// let dofs: Vec<[usize; 2]> = (0..16).map(|node| [2 * node, 2 * node + 1]).collect();
+    /// let cells = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [4, 5, 9, 8], [6, 7, 11, 10], [8, 9, 13, 12], [10, 11, 15, 14]];
+    /// let surface = Surface::of_cells(&coordinates, cells)?;
+    /// let mut contact = NodeToFacet::of_itself(&coordinates, &dofs, &surface)?;
+    /// contact.search(0.0, &vec![0.0; contact.dofs().len()], &vec![0.0; contact.dofs().len()], 0.0)?;
+    /// let contacts = Contacts::of(&contact);
+    /// // (The nodes at the foot have the facets on the other side within their ring.)
+    /// let mut nodes: Vec<usize> = (0..contacts.len()).map(|row| contacts.name(row).0).collect();
+    /// nodes.sort();
+    /// assert_eq!(nodes, [9, 10, 13, 14]);
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`one_pass`](Self::one_pass) about coordinates, dofs and facets.
+    pub fn of_itself<F: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        facets: impl IntoIterator<Item = F>,
+    ) -> Result<Self> {
+        let mesh = Nodes::new(coordinates, dofs)?;
+        let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
+        let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone());
+        contact.own_surface = Some(surface);
+        contact.rings = 1;
+        contact.find_kin();
         contact.prepare()?;
         Ok(contact)
+    }
+
+    /// How many rings of facets around a node it does not meet, of [its own surface](Self::of_itself): 0 are the facets
+    /// that have the node, 1 those that share a node with one of them, and so on. By default 1. It has no meaning for two
+    /// surfaces.
+    #[must_use]
+    pub fn rings(mut self, rings: usize) -> Self {
+        self.rings = rings;
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        self
+    }
+
+    fn find_kin(&mut self) {
+        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, self.reach));
+        self.built_at.clear();
     }
 
     /// The law of all rows.
@@ -289,6 +362,9 @@ impl<T: Real> NodeToFacet<T> {
     pub fn reach(mut self, reach: T) -> Result<Self> {
         self.reach = positive("the reach of a contact search", reach.value())?;
         self.built_at.clear();
+        if self.kin.is_some() {
+            self.find_kin();
+        }
         Ok(self)
     }
 
@@ -337,11 +413,15 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Checks that the bodies share no node, and reserves memory for all rows there can be.
     fn prepare(&mut self) -> Result<()> {
-        self.nodes.read_bodies(&self.bodies)?;
+        match self.kin {
+            None => self.nodes.read_bodies(&self.bodies)?,
+            Some(_) => self.nodes.read(self.bodies[0].iter().copied()),
+        }
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        self.partners = vec![None; if self.passes.len() > 1 { self.nodes.coordinates.len() } else { 0 }];
+        let meet = self.passes.len() > 1 || self.kin.is_some();
+        self.partners = vec![None; if meet { self.nodes.coordinates.len() } else { 0 }];
         self.built_at.clear();
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
 mod facet;
+mod kin;
 mod nodes;
 mod outer;
 mod output;
@@ -10,9 +11,10 @@ mod search;
 mod shape;
 
 pub use facet::Facet;
+pub(crate) use kin::Kin;
 pub(crate) use nodes::{Nodes, points};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
-pub(crate) use projection::{Ground, Stand, meets};
+pub(crate) use projection::{Ground, Stand};
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
@@ -291,11 +293,21 @@ impl Surface {
         unit(add_scaled(own, 1.0, across)).or(Some(own))
     }
 
+    /// The facets around a node, with the vertex that it is of each.
+    fn corners_around(&self, node: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let start = self.around.partition_point(|&(other, ..)| other < node);
+        let around = self.around[start..].iter().take_while(move |&&(other, ..)| other == node);
+        around.map(|&(_, facet, k)| (facet, k))
+    }
+
+    /// The facets around a node.
+    pub(crate) fn facets_around(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        self.corners_around(node).map(|(facet, _)| facet)
+    }
+
     /// Mean of the normals of the facets around a node, weighted by their angles there; none if the node has no facet.
     pub(crate) fn node_normal(&self, node: usize, positions: &[Point]) -> Option<Point> {
-        let start = self.around.partition_point(|&(other, ..)| other < node);
-        let around = self.around[start..].iter().take_while(|&&(other, ..)| other == node);
-        let sum = around.fold([0.0; 3], |sum, &(_, facet, k)| {
+        let sum = self.corners_around(node).fold([0.0; 3], |sum, (facet, k)| {
             let shape = self.facets[facet].shape(positions);
             let mut weights = [0.0; 4];
             weights[k] = 1.0;

@@ -4,6 +4,7 @@ mod bipenalty;
 mod constraints;
 mod curved;
 mod gap_function;
+mod itself;
 mod laws;
 mod mortar;
 mod node_to_facet;

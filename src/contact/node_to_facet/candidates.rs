@@ -2,7 +2,7 @@
 
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Point, Surface, sub};
+use crate::contact::surface::{Bounds, Ground, Kin, Point, Surface, sub};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -56,11 +56,10 @@ impl<T: Real> NodeToFacet<T> {
         ahead: f64,
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, nodes, passes, reach, partners, found, .. } = self;
+        let Self { surface, own_surface, kin, nodes, passes, reach, partners, found, .. } = self;
         let positions = &nodes.positions;
-        let Some(ground) = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding()) else {
-            return;
-        };
+        let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+        let Some(ground) = ground(pass, passes, surfaces, positions, Self::rounding()) else { return };
         for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
             if !near.contains(positions[node]) {
                 continue;
@@ -73,9 +72,12 @@ impl<T: Real> NodeToFacet<T> {
             if !partners.is_empty() {
                 let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
                 let on = on.map(|(&vertex, _)| vertex);
+                let first = on.filter(|&vertex| partners[vertex] == Some(node));
                 match pass {
+                    // (Of a surface against itself.)
+                    0 if first.is_some_and(|vertex| vertex < node) => continue,
                     0 => partners[node] = on,
-                    _ if on.is_some_and(|vertex| partners[vertex] == Some(node)) => continue,
+                    _ if first.is_some() => continue,
                     _ => {}
                 }
             }
@@ -87,11 +89,12 @@ impl<T: Real> NodeToFacet<T> {
     pub(super) fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, nodes, passes, rows, found, .. } = self;
+        let Self { surface, own_surface, kin, nodes, passes, rows, found, .. } = self;
         let positions = &nodes.positions;
         for (row, &(node, pass)) in rows.identities.iter().enumerate() {
             let old = rows.stands[row];
-            let ground = ground(pass, passes, surface, own_surface.as_ref(), positions, Self::rounding());
+            let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+            let ground = ground(pass, passes, surfaces, positions, Self::rounding());
             // The list of the node has all facets as near as this.
             let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
                 Bounds::of_points([sub(positions[node], before)]).spread(&motions[1 - pass])
@@ -124,12 +127,11 @@ impl<T: Real> NodeToFacet<T> {
 fn ground<'a>(
     pass: usize,
     passes: &'a [Pass],
-    surface: &'a Surface,
-    own_surface: Option<&'a Surface>,
+    (surface, own_surface, kin): (&'a Surface, Option<&'a Surface>, Option<&'a Kin>),
     positions: &'a [Point],
     rounding: f64,
 ) -> Option<Ground<'a>> {
     let Pass { nodes, neighborhood, .. } = &passes[pass];
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, positions, rounding })
+    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, kin, positions, rounding })
 }

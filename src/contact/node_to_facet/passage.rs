@@ -1,7 +1,7 @@
 //! What nodes have passed through in a step: their ways against facets that move.
 
 use super::NodeToFacet;
-use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, meets, norm, sub};
+use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, norm, sub};
 use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;
@@ -68,6 +68,7 @@ impl<T: Real> NodeToFacet<T> {
                     neighborhood,
                     surface,
                     own,
+                    kin: self.kin.as_ref(),
                     positions,
                     rounding: Self::rounding(),
                 });
@@ -171,7 +172,7 @@ impl Crossing<'_> {
             let segment = facet.nodes().len() == 2;
             triangles.iter().any(|triangle| {
                 let corners = corners.map(|corners| triangle.map(|k| corners[k]));
-                pierces(ends, corners, segment, length, |normal| meets(normal, own_normal))
+                pierces(ends, corners, segment, length, |normal| start.meets(normal, own_normal))
             })
         })
     }

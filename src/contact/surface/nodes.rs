@@ -54,14 +54,19 @@ impl Nodes {
             let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it belongs to both surfaces" });
         }
+        self.read(bodies.iter().flatten().copied());
+        Ok(())
+    }
+
+    /// Takes the dofs of some nodes into the list of the constraint.
+    pub(crate) fn read(&mut self, nodes: impl Iterator<Item = usize>) {
         let Self { list, places, system_dofs, dimension, .. } = self;
         *list = DofList::default();
-        for &node in bodies.iter().flatten() {
+        for node in nodes {
             for (place, &dof) in places[node].iter_mut().zip(&system_dofs[node][..*dimension]) {
                 *place = list.place(dof);
             }
         }
-        Ok(())
     }
 
     /// The dofs of the constraint.

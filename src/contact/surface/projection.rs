@@ -1,8 +1,9 @@
 //! Where a node stands on a surface: what searching and following share, and how the gap accelerates along a motion.
 
 use super::Surface;
+use super::kin::{FACING, Kin};
 use super::search::{Bounds, Neighborhood, overhang};
-use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
+use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
 
 /// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
 /// look to the same side.
@@ -10,6 +11,9 @@ const SAME_SIDE: f64 = 0.5;
 
 /// The same for the facet that a node stands on already, within a step.
 const SAME_SIDE_OF_LAST: f64 = 0.75;
+
+/// The same for a facet of its own surface.
+const FACING_OF_LAST: f64 = 0.25;
 
 /// How far, in shares of the facet, the surface goes on beyond its rim for a node that leaves it within a step.
 const RIM_OF_LAST: f64 = 0.25;
@@ -50,6 +54,8 @@ pub(crate) struct Ground<'a> {
     pub(crate) surface: &'a Surface,
     /// The surface of the nodes, if known.
     pub(crate) own: Option<&'a Surface>,
+    /// What nodes do not meet of it, if it is the same surface.
+    pub(crate) kin: Option<&'a Kin>,
     pub(crate) positions: &'a [Point],
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
     pub(crate) rounding: f64,
@@ -58,9 +64,30 @@ pub(crate) struct Ground<'a> {
 impl Ground<'_> {
     /// Facets to look at for the node at a place of the list.
     pub(crate) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
+        let kin = self.kin;
         let list = self.neighborhood.map(|lists| lists.of(place));
         let count = list.map_or(self.surface.facets().len(), <[usize]>::len);
-        (0..count).map(move |k| list.map_or(k, |list| list[k]))
+        let apart = move |&facet: &usize| kin.is_none_or(|kin| !kin.keeps_apart(place, facet));
+        (0..count).map(move |k| list.map_or(k, |list| list[k])).filter(apart)
+    }
+
+    /// Whether a node with this normal, if it has one, meets the front of a facet with that one.
+    pub(crate) fn meets(&self, normal: Point, own_normal: Option<Point>) -> bool {
+        own_normal.is_none_or(|own| dot(own, normal) <= self.limit())
+    }
+
+    /// The cosine between the normals of a node and of a facet up to which they meet.
+    fn limit(&self) -> f64 {
+        if self.kin.is_some() { FACING } else { SAME_SIDE }
+    }
+
+    /// Whether a facet is behind a node of its own surface by more than there can be of it inside.
+    fn is_beyond(&self, place: usize, (shape, foot): &(Shape, Foot)) -> bool {
+        self.kin.is_some_and(|kin| {
+            let p = self.positions[self.nodes[place]];
+            let is_behind = shape.normal(&foot.weights).is_some_and(|normal| dot(normal, sub(p, foot.point)) < 0.0);
+            is_behind && foot.distance > kin.depth(place)
+        })
     }
 
     /// The closest facet within `reach` of the node at a place of the list; none beyond the rim.
@@ -94,7 +121,7 @@ impl Ground<'_> {
             if foot.distance > reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
                 continue;
             }
-            if faces(&projected, own_normal, SAME_SIDE) {
+            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, &projected) {
                 best = Some((index, projected));
             }
         }
@@ -106,7 +133,8 @@ impl Ground<'_> {
     pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
-        let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), SAME_SIDE_OF_LAST);
+        let limit = if self.kin.is_some() { FACING_OF_LAST } else { SAME_SIDE_OF_LAST };
+        let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), limit);
         stays.then(|| self.on(place, facet, &projected)).flatten()
     }
 
@@ -123,11 +151,6 @@ impl Ground<'_> {
         let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
         Some(Stand { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] })
     }
-}
-
-/// Whether a node with this normal, if it has one, meets the front of a facet with that one.
-pub(crate) fn meets(normal: Point, own_normal: Option<Point>) -> bool {
-    own_normal.is_none_or(|own| dot(own, normal) <= SAME_SIDE)
 }
 
 /// Whether a facet is turned against the normal of a node, if that is known.

@@ -1,0 +1,76 @@
+//! What nodes of a surface do not meet of their own surface: the facets around them, and the far side of the material.
+
+use super::Surface;
+use super::search::{Bounds, Neighborhood};
+use super::shape::{Point, dot, sub};
+
+/// Cosine of the angle between the normals of a node and a facet of its own surface up to which they face each other
+/// (102°): across a convex edge of a right angle they do not.
+pub(crate) const FACING: f64 = -0.2;
+
+/// Share of the thickness of the material behind a node that another part of the surface may be inside of it.
+const DEPTH: f64 = 0.5;
+
+/// By place of the node among those of the surface.
+#[derive(Debug)]
+pub(crate) struct Kin {
+    starts: Vec<usize>,
+    /// The facets within some rings around each node, ascending.
+    facets: Vec<usize>,
+    /// How deep a facet that is met may be behind each node.
+    depths: Vec<f64>,
+}
+
+impl Kin {
+    /// Finds the facets within `rings` of each node (none: those that have it), and how thick the material is behind it,
+    /// as far as `reach`.
+    pub(crate) fn new(surface: &Surface, rings: usize, positions: &[Point], reach: f64) -> Self {
+        let mut kin = Self { starts: vec![0], facets: Vec::new(), depths: Vec::new() };
+        let mut own: Vec<usize> = Vec::new();
+        for &node in surface.nodes() {
+            own.clear();
+            own.extend(surface.facets_around(node));
+            for _ in 0..rings {
+                let nodes = own.iter().flat_map(|&facet| surface.facets()[facet].nodes());
+                let mut wider: Vec<usize> = nodes.flat_map(|&node| surface.facets_around(node)).collect();
+                wider.sort_unstable();
+                wider.dedup();
+                own = wider;
+            }
+            own.sort_unstable();
+            kin.facets.extend(&own);
+            kin.starts.push(kin.facets.len());
+        }
+        kin.depths = kin.depths(surface, positions, reach);
+        kin
+    }
+
+    /// Whether a node never meets a facet.
+    pub(crate) fn keeps_apart(&self, place: usize, facet: usize) -> bool {
+        self.facets[self.starts[place]..self.starts[place + 1]].binary_search(&facet).is_ok()
+    }
+
+    /// How deep behind a node a facet may be.
+    pub(crate) fn depth(&self, place: usize) -> f64 {
+        self.depths[place]
+    }
+
+    /// Behind a node that faces a facet there is material, as nothing is inside of itself in the reference configuration:
+    /// a share of the least distance.
+    fn depths(&self, surface: &Surface, positions: &[Point], reach: f64) -> Vec<f64> {
+        let mut lists = Neighborhood::default();
+        let points = surface.nodes().iter().map(|&node| Bounds::of_points([positions[node]]));
+        lists.build(points, surface, positions, reach);
+        let depth = |(place, &node): (usize, &usize)| {
+            let Some(own) = surface.node_normal(node, positions) else { return reach };
+            let behind = lists.of(place).iter().filter(|&&facet| !self.keeps_apart(place, facet)).filter_map(|&facet| {
+                let (shape, foot) = surface.project(facet, positions[node], positions)?;
+                let normal = shape.normal(&foot.weights)?;
+                let is_behind = dot(normal, sub(positions[node], foot.point)) < 0.0;
+                (is_behind && dot(own, normal) <= FACING).then_some(foot.distance)
+            });
+            DEPTH * behind.fold(reach / DEPTH, f64::min)
+        };
+        surface.nodes().iter().enumerate().map(depth).collect()
+    }
+}

@@ -1,0 +1,194 @@
+//! Surfaces against themselves: what is met and what is not, hairpins whose arms meet, units.
+
+use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, NodeToFacet, Surface};
+use contact_dynamics::{Composite, EnergyMomentum, PersistencyCorrection, Simulation, StepControl};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use std::f64::consts::PI;
+
+const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
+
+/// A hairpin of thickness 0.2: an arm of length 2 below, a half circle on the right, and an arm above, with a slot of
+/// `slot` between, a fifth shorter; `shift` moves its nodes along it, so that nodes do not face each other.
+fn bend([s, t]: [f64; 2], slot: f64, shift: f64) -> [f64; 2] {
+    let (radius, arc) = (0.5 * slot, 1.0);
+    // s from 0 to 2 along the lower arm, over the bend, and back along the upper one; t from the inside to the outside.
+    if s < 2.0 {
+        [s, -radius - t]
+    } else if s < 2.0 + arc {
+        let angle = PI * (s - 2.0) / arc;
+        [2.0 + (radius + t) * angle.sin(), -(radius + t) * angle.cos()]
+    } else {
+        let back = s - 2.0 - arc;
+        [2.0 - 0.8 * back * (1.0 - shift * (2.0 - back)), radius + t]
+    }
+}
+
+fn hairpin(slot: f64, shift: f64) -> Solid<2> {
+    Solid::rectangle([5.0, 0.2], [40, 2], MATERIAL).mapped(|[s, t]| bend([s, 0.2 - t], slot, shift))
+}
+
+fn surface<const D: usize>(solid: &Solid<D>) -> Surface {
+    Surface::of_cells(&solid.nodes, &solid.elements).unwrap()
+}
+
+fn of_itself<const D: usize>(solid: &Solid<D>) -> NodeToFacet<f64> {
+    NodeToFacet::of_itself(&solid.nodes, &solid.node_dofs(), &surface(solid)).unwrap()
+}
+
+/// Nodes with rows, and their gaps, in the reference configuration.
+fn rows(mut contact: NodeToFacet<f64>) -> Vec<(usize, f64)> {
+    let zeros = vec![0.0; contact.dofs().len()];
+    contact.search(0.0, &zeros, &zeros, 0.0).unwrap();
+    let contacts = Contacts::of(&contact);
+    let mut gaps = vec![0.0; contacts.len()];
+    contact.gaps(0.0, &zeros, &mut gaps).unwrap();
+    (0..contacts.len()).map(|row| (contacts.name(row).0, gaps[row])).collect()
+}
+
+#[test]
+fn bodies_that_do_not_fold_do_not_meet_themselves() {
+    let block = Solid::block([1.0; 3], [3; 3], MATERIAL);
+    let plate = Solid::block([1.0, 1.0, 0.02], [6, 6, 1], MATERIAL);
+    let wedge = Solid::block([1.0; 3], [4; 3], MATERIAL).mapped(|[x, y, z]| [x, y, z * (0.02 + 0.4 * x)]);
+    for solid in [&block, &plate, &wedge] {
+        for reach in [0.1, 0.5, 3.0] {
+            let contact = of_itself(solid).reach(reach).unwrap();
+            assert_eq!(rows(contact), [], "reach {reach}, {:?}", solid.nodes.last());
+        }
+    }
+    let disc = Solid::disc(1.0, 6, MATERIAL);
+    assert_eq!(rows(of_itself(&disc).reach(5.0).unwrap()), []);
+    // Thrown and turned they do not either.
+    let mut contact = of_itself(&plate).reach(0.5).unwrap();
+    let place = |contact: &NodeToFacet<f64>, x: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+        contact.dofs().iter().map(|&dof| x(dof / 3, dof % 3)).collect()
+    };
+    let turned = place(&contact, &|node, axis| {
+        let [x, y, z] = plate.nodes[node];
+        [-y - x, x - y, z - z][axis]
+    });
+    let velocity = place(&contact, &|node, axis| [-10.0 * plate.nodes[node][1], 10.0 * plate.nodes[node][0], 0.0][axis]);
+    contact.search(0.0, &turned, &velocity, 0.1).unwrap();
+    assert!(Contacts::of(&contact).is_empty());
+}
+
+#[test]
+fn arms_of_a_hairpin_face_each_other() {
+    let slot = 0.1;
+    let found = rows(of_itself(&hairpin(slot, 0.06)));
+    // All inner nodes of the arms, up to the bend, and no outer one.
+    assert!(found.len() > 30, "{}", found.len());
+    let pin = hairpin(slot, 0.06);
+    for (node, gap) in found {
+        let [x, y] = pin.nodes[node];
+        assert!(y.abs() < 0.5 * slot + 1e-12 && gap > 0.0, "{x} {y}: {gap}");
+        assert!(x > 1.8 || (gap - slot).abs() < 1e-12, "{x} {y}: {gap}");
+    }
+}
+
+/// The facets of the inner side of each arm.
+fn arms(pin: &Solid<2>, slot: f64) -> [Vec<Facet>; 2] {
+    let inner = |sign: f64| {
+        let on = move |&node: &usize| (pin.nodes[node][1] - 0.5 * sign * slot).abs() < 1e-9 && pin.nodes[node][0] < 1.99;
+        let facets = pin.boundary().into_iter().filter(move |facet| facet.iter().all(on));
+        facets.map(|facet| Facet::from([facet[0], facet[1]])).collect()
+    };
+    [inner(-1.0), inner(1.0)]
+}
+
+/// Both arms thrown at each other.
+fn thrown(pin: &Solid<2>, speed: f64) -> Vec<f64> {
+    pin.nodes.iter().flat_map(|&[x, y]| [0.0, if x < 2.0 { -y.signum() * speed * (1.0 - 0.5 * x) } else { 0.0 }]).collect()
+}
+
+#[test]
+fn arms_meet_as_two_surfaces_do() {
+    let slot = 0.1;
+    let pin = hairpin(slot, 0.06);
+    let run = |contact: NodeToFacet<f64>| {
+        let mut run = Simulation::builder(pin.system::<f64>(), Composite, 2e-3)
+            .velocity(thrown(&pin, 1.0))
+            .constraint(contact.reach(0.09).unwrap())
+            .corrector(PersistencyCorrection::default())
+            .build()
+            .unwrap();
+        let mut pressed = 0;
+        while run.time() < 0.3 {
+            run.step().unwrap();
+            pressed = pressed.max(run.state().contacts().forces().iter().filter(|force| **force > 0.0).count());
+        }
+        (run.state().displacement().to_vec(), pressed)
+    };
+    let (own, pressed) = run(of_itself(&pin));
+    let [lower, upper] = arms(&pin, slot);
+    let (two, as_two) = run(NodeToFacet::new(&pin.nodes, &pin.node_dofs(), upper, lower).unwrap());
+    assert!(pressed > 2 && pressed == as_two, "{pressed} {as_two}");
+    let largest = own.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    assert!(largest > 0.04);
+    for (x, y) in own.iter().zip(&two) {
+        assert!((x - y).abs() < 1e-6 * largest, "{x} {y}");
+    }
+}
+
+#[test]
+fn a_hairpin_that_snaps_shut_gains_no_energy() {
+    let pin = hairpin(0.2, 0.06);
+    let system = Hyperelastic::new(&pin, Law::NeoHookean);
+    let particles = system.particles.clone();
+    let velocity = thrown(&pin, 3.0);
+    let momentum = |v: &[f64]| -> [f64; 2] {
+        let mass = pin.lumped_mass::<f64>();
+        [0, 1].map(|axis| v.iter().zip(&mass).skip(axis).step_by(2).map(|(v, m)| m * v).sum())
+    };
+    let start = momentum(&velocity);
+    let (still, scale) = (vec![0.0; velocity.len()], velocity.iter().zip(pin.lumped_mass::<f64>()).map(|(v, m)| m * v.abs()).sum::<f64>());
+    let turning = particles.angular_momentum(&still, &velocity);
+    let mut run = Simulation::builder(system, EnergyMomentum, 5e-3)
+        .velocity(velocity)
+        .constraint(of_itself(&pin))
+        .corrector(PersistencyCorrection::default())
+        .step_control(StepControl::halving(1e-4).unwrap())
+        .build()
+        .unwrap();
+    let first = run.energy().total();
+    let (mut most, mut deepest, mut pressed) = (first, 0.0_f64, 0);
+    while run.time() < 0.5 {
+        run.step().unwrap();
+        most = most.max(run.energy().total());
+        deepest = run.gaps().iter().fold(deepest, |low, gap| low.min(*gap));
+        pressed = pressed.max(run.state().contacts().forces().iter().filter(|force| **force > 0.0).count());
+    }
+    assert!(pressed > 2 && most < (1.0 + 1e-6) * first, "{pressed} pressed, energy {most} of {first}");
+    assert!(deepest > -1e-6, "{deepest}");
+    let end = momentum(run.state().velocity());
+    assert!((0..2).all(|axis| (end[axis] - start[axis]).abs() < 1e-10 * scale));
+    let turned = particles.angular_momentum(run.state().displacement(), run.state().velocity());
+    assert!((turned - turning).abs() < 1e-2 * scale, "{turning} {turned}");
+}
+
+#[test]
+fn columns_in_space_meet_and_units_do_not_matter() {
+    // Two columns on a plate, 0.3 apart, thrown at each other.
+    let column = |from: f64| Solid::block([1.0, 1.0, 2.0], [2, 2, 4], MATERIAL).moved([from, 0.0, 0.0]);
+    let forces = |unit: f64| {
+        let pair = column(0.0).with(column(1.3));
+        let nodes: Vec<[f64; 3]> = pair.nodes.iter().map(|x| x.map(|x| unit * x)).collect();
+        let contact = NodeToFacet::of_itself(&nodes, &pair.node_dofs(), &surface(&pair)).unwrap();
+        let velocity = pair.nodes.iter().flat_map(|x| [unit * if x[0] < 1.1 { 1.0 } else { -1.0 }, 0.0, 0.0]).collect();
+        let mut run = Simulation::builder(pair.system::<f64>(), Composite, 5e-3)
+            .velocity(velocity)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::default())
+            .build()
+            .unwrap();
+        run.run_until(0.2, &mut ()).unwrap();
+        run.state().contacts().forces().iter().sum::<f64>() / unit
+    };
+    let expected = forces(1.0);
+    // Of both sides: the pressure of bars that meet is ρ c v, and half of the rows see it each.
+    assert!(expected > 5.0, "{expected}");
+    for unit in [1e-6, 1e6] {
+        assert!((forces(unit) / expected - 1.0).abs() < 1e-9, "{unit}");
+    }
+}
