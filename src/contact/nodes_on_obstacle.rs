@@ -106,6 +106,23 @@ struct Row<T, const D: usize> {
     friction: f64,
 }
 
+impl<T: Real, const D: usize> Row<T, D> {
+    /// Distance of a place in the frame of the obstacle from the tangent plane.
+    fn on_tangent_plane(&self, place: [T; D]) -> T {
+        self.distance + dot(self.own_normal, minus(place, self.place))
+    }
+
+    /// Distance of a place in the frame of the obstacle and normal there; of a place on the other side of the obstacle
+    /// those of the tangent plane, which is not passed unseen.
+    fn seen_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
+        let (distance, normal) = obstacle.distance(place);
+        match dot(normal, self.own_normal) > T::zero() {
+            true => (distance, normal),
+            false => (self.on_tangent_plane(place), self.own_normal),
+        }
+    }
+}
+
 impl<T: Real, const D: usize> std::fmt::Debug for NodesOnObstacle<'_, T, D> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("NodesOnObstacle")
@@ -465,14 +482,14 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         let now = self.motion.at(t)?;
-        let flat = self.obstacle.fixed_normal().is_some();
+        let (flat, turns) = (self.obstacle.fixed_normal().is_some(), self.motion.turns());
         for (row, gap) in self.rows.iter().zip(gaps) {
             let place = now.to_own(self.nodes[row.node].at(u));
-            *gap = match flat {
+            *gap = match (flat, turns) {
                 // The distance itself is affine, and the same to the bit whenever the last search was.
-                true => self.obstacle.distance(place).0,
-                // The tangent plane moves with the obstacle.
-                false => row.distance + dot(row.own_normal, minus(place, row.place)),
+                (true, _) => self.obstacle.distance(place).0,
+                (false, true) => row.seen_from(&*self.obstacle, place).0,
+                (false, false) => row.on_tangent_plane(place),
             };
         }
         Ok(())
@@ -482,15 +499,19 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         if self.obstacle.fixed_normal().is_some() && self.motion.is_rest() {
             return Ok(Rates::Zero);
         }
-        let now = self.motion.at(t)?;
+        let (now, turns) = (self.motion.at(t)?, self.motion.turns());
         for (row, rates) in self.rows.iter().zip(rates) {
             let node = &self.nodes[row.node];
             let (x, v) = (node.at(u), node.of(v));
-            let curvature = self.obstacle.curvature(now.to_own(x), now.own_velocity(x, v));
-            *rates = GapRates {
-                rate: -dot(row.normal, now.velocity_at(x)),
-                acceleration: curvature - dot(row.normal, now.apparent_acceleration(x, v)),
-            };
+            let (place, velocity) = (now.to_own(x), now.velocity_at(x));
+            let mut rate = -dot(row.normal, velocity);
+            if turns {
+                // Elsewhere than where rows are linearized the gap has another normal: what ġ has besides G v.
+                let normal = now.direction(row.seen_from(&*self.obstacle, place).1);
+                rate += dot(minus(normal, row.normal), minus(v, velocity));
+            }
+            let curvature = self.obstacle.curvature(place, now.own_velocity(x, v));
+            *rates = GapRates { rate, acceleration: curvature - dot(row.normal, now.apparent_acceleration(x, v)) };
         }
         Ok(Rates::Given)
     }

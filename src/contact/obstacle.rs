@@ -1,9 +1,15 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
 mod capsule;
+#[cfg(feature = "search")]
+mod closed_surface;
+mod cone;
 mod cuboid;
 
 pub use capsule::Capsule;
+#[cfg(feature = "search")]
+pub use closed_surface::ClosedSurface;
+pub use cone::Cone;
 pub use cuboid::Cuboid;
 
 use crate::error::{Error, Result, positive};

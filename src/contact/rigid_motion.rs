@@ -270,7 +270,8 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         // (In the plane rotations are made here.)
         if D == 3 {
             let [a, b] = [rotation[0], rotation[1]];
-            let normal: [T; D] = std::array::from_fn(|k| a[(k + 1) % D] * b[(k + 2) % D] - a[(k + 2) % D] * b[(k + 1) % D]);
+            let normal: [T; D] =
+                std::array::from_fn(|k| a[(k + 1) % D] * b[(k + 2) % D] - a[(k + 2) % D] * b[(k + 1) % D]);
             let determinant = dot(normal, rotation[2]);
             if determinant < T::zero() {
                 return Err(Error::Parameter {

@@ -1,5 +1,6 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
+mod closed;
 mod facet;
 mod nodes;
 mod projection;
@@ -14,10 +15,11 @@ pub(crate) use shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;
 use crate::error::{Error, Result};
-use shape::{Foot, Location, RIM, Rim};
+pub(crate) use shape::{Foot, Location};
+use shape::{RIM, Rim};
 
 /// Facets that share sides, with their neighbors.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Surface {
     facets: Vec<Facet>,
     rims: Vec<Rim>,

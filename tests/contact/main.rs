@@ -11,4 +11,7 @@ mod obstacles;
 mod passing_through;
 mod pounding;
 mod rate_laws;
+#[cfg(feature = "search")]
+mod shapes;
+mod turning;
 mod two_bodies;

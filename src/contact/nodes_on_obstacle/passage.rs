@@ -1,8 +1,8 @@
 //! What a step has done to nodes near an obstacle: refused if one went through it, or was stopped along a wrong normal.
 
-use super::Row;
 use super::super::obstacle::{dot, minus};
 use super::super::{LARGEST_MISS, LARGEST_TURN, Obstacle, STEEP, press_differently};
+use super::Row;
 use crate::real::Real;
 
 /// Whether an obstacle turns by more in a step than a way along it can be told from its ends.
