@@ -279,12 +279,12 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// g̈ = n · (a − a_c − ω̇ × r − ω × (ω × r) − 2 ω × w) + ẏᵀ (∇²d) ẏ,   w = v − v_c − ω × r,  ẏ = Rᵀ w
     /// ```
     ///
-    /// A plane that turns is a curved surface: its rows follow. Steps in which the obstacle turns by more than 30° while
-    /// a node is as near as its way are refused ([`Error::PassedThrough`]), also of a ball that turns about its center;
-    /// what turns fast without changing its shape in space is better [dragged](Self::dragging). Wrong rates are found as
-    /// far as an obstacle that turns or moves says it does not ([`Error::SilentMotion`]); for others there is
-    /// [`verify::gap_jacobian`](crate::verify::gap_jacobian). A closure that returns no rotation fails what asked for it
-    /// with [`Error::Parameter`] or [`Error::NotFinite`].
+    /// A plane that turns is a curved surface: its rows follow. Steps in which the obstacle turns by more than 30° are
+    /// refused ([`Error::PassedThrough`]) while a node is nearer than its way, as seen from the obstacle, also of a ball
+    /// that turns about its center; what turns fast without changing its shape in space is better
+    /// [dragged](Self::dragging). Rates that are zero though gaps move are refused ([`Error::SilentMotion`]), other
+    /// wrong ones are not: [`verify::gap_jacobian`](crate::verify::gap_jacobian) finds them. A closure that returns no
+    /// rotation fails what asked for it with [`Error::Parameter`] or [`Error::NotFinite`].
     ///
     /// ```
     /// use contact_dynamics::contact::{NodesOnObstacle, Plane, RigidMotion};

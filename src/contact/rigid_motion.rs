@@ -229,8 +229,8 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
     }
 
     /// Up to how far from the straight line between its ends the way leads, in the frame of a body that turns by
-    /// `angle`, of something that goes straight in space: from x, by `way` against the body's origin, in a time h. R ÿ is
-    /// −a_c − ω × (ω × r) − 2 ω × ṙ, and an eighth of h² ÿ lies between a line and its chord.
+    /// `angle`, of something that goes straight in space: from x, by `way` against the body's origin, in a time h. R ÿ
+    /// is −a_c − ω × (ω × r) − 2 ω × w, and an eighth of h² ÿ lies between a line and its chord.
     pub(super) fn bend(&self, x: [T; D], way: [T; D], angle: T, h: T) -> T {
         if self.turn.is_none() {
             return T::zero();

@@ -21,9 +21,9 @@ type Leaf = GeomWithData<Rectangle<Point>, usize>;
 /// doi:10.1109/TVCG.2005.49). The closest facet is found in an R*-tree.
 ///
 /// The distance is exact, and its normal turns within the radius around an edge, which steps must resolve where nodes
-/// press on it. Flat facets are moved outward by the radius. A round body pressed on where it is convex feels its facets:
-/// normals jump by the angle between them over a way of radius times angle. In notches, where the surface is not convex,
-/// the normal jumps from one face to the other.
+/// press on it: on a round body by the angle between two facets, on a way of the radius times that. Flat facets are
+/// moved outward by the radius. In notches, where the surface is not convex, the normal jumps from one face to the
+/// other.
 ///
 /// ```
 /// use contact_dynamics::contact::{ClosedSurface, Obstacle};

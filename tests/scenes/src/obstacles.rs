@@ -87,7 +87,7 @@ pub fn in_plane(random: &mut Congruential) -> Vec<Named<2>> {
     // A star of five rays: with notches.
     let corner = |k: usize| {
         let (sin, cos) = (std::f64::consts::TAU * k as f64 / 10.0).sin_cos();
-        let length = if k % 2 == 0 { 1.4 * radius } else { 0.6 * radius };
+        let length = if k.is_multiple_of(2) { 1.4 * radius } else { 0.6 * radius };
         [center[0] + length * cos, center[1] + length * sin]
     };
     let star: Vec<_> = (0..10).map(corner).collect();
