@@ -223,7 +223,8 @@ fn a_body_with_notches_knows_its_inside() {
     }
     let far = ClosedSurface::new(&vertices, &triangles, 0.05).unwrap();
     assert!((far.distance([1e6 + 0.4, 0.3, 0.0]).0 - 0.05).abs() < 1e-9);
-    let single: Vec<[f32; 3]> = vertices.iter().map(|x| [x[0] - 1e6, x[1], x[2]].map(|x| x as f32)).collect();
+    let single: Vec<[f32; 3]> =
+        vertices.iter().map(|x| [x[0] - 1e6, x[1], x[2]].map(<f32 as contact_dynamics::Real>::of)).collect();
     let coarse = ClosedSurface::new(&single, &triangles, 0.05).unwrap().distance([0.4_f32, 0.3, 0.0]);
     assert!((coarse.0 - 0.05).abs() < 1e-6 && (coarse.1[1] - 1.0).abs() < 1e-6);
     assert!(prism.distance([f64::NAN, 0.0, 0.0]).0.is_nan());

@@ -54,13 +54,13 @@ fn corrected(scheme: &dyn TimeIntegrator) -> Vec<Box<dyn Corrector<f64>>> {
 }
 
 /// A run of one particle.
-fn run<'a, const D: usize>(
+fn run<const D: usize>(
     make: fn() -> Box<dyn TimeIntegrator>,
     h: f64,
-    contact: NodesOnObstacle<'a, f64, D>,
+    contact: NodesOnObstacle<'_, f64, D>,
     force: [f64; D],
     velocity: [f64; D],
-) -> Simulation<'a, f64> {
+) -> Simulation<'_, f64> {
     Simulation::builder(particle(force), make(), h)
         .velocity(velocity.to_vec())
         .constraint(contact)
@@ -356,10 +356,10 @@ fn chain() -> (LinearSystem<'static, f64>, Vec<[f64; 2]>) {
 }
 
 /// The largest distance of displacements on the way of two runs of the chain.
-fn apart<'a>(
+fn apart(
     make: fn() -> Box<dyn TimeIntegrator>,
     velocity: [[f64; 2]; 2],
-    contacts: [NodesOnObstacle<'a, f64, 2>; 2],
+    contacts: [NodesOnObstacle<'_, f64, 2>; 2],
 ) -> f64 {
     let mut runs: Vec<_> = contacts
         .into_iter()
@@ -449,18 +449,6 @@ fn the_frame_does_not_matter() {
     }
 }
 
-#[test]
-fn debug_preexisting() {
-    let places = chain().1;
-    for make in &SCHEMES[..3] {
-        let disc = Sphere::new([0.35, -1.0], 1.0, Side::Outside).unwrap();
-        let wind = [20.0, 0.0];
-        let c = || on(disc, &places).friction(0.4);
-        let found = apart(*make, [[0.0; 2], wind], [c(), c().moving(move |t| [wind.map(|v| v * t), wind, [0.0; 2]])]);
-        println!("DEBUG {} {found:e}", make().name());
-    }
-}
-
 /// Schemes that impose contact on velocities keep the rows of the start of the step: of order one, not wrong.
 #[test]
 fn velocity_level_schemes_follow_a_turning_plane_to_first_order() {
@@ -542,7 +530,7 @@ fn obstacles_that_turn_too_far_in_a_step_are_refused_near_nodes() {
             None => built,
         };
         let mut run = built.build().unwrap();
-        run.step().map(|_| run.time())
+        run.step().map(|()| run.time())
     };
     // 29 and 31 degrees, away from the node; whole turns, by which nothing has moved between the ends.
     let (near, degrees) = ([0.5, 0.2], 10.0_f64.to_radians());
@@ -597,7 +585,7 @@ fn no_node_passes_through_a_rod_that_turns() {
                     match run.step() {
                         Err(Error::PassedThrough { .. }) if !control => break None,
                         Err(error) => panic!("{what}: {error}"),
-                        Ok(_) => {}
+                        Ok(()) => {}
                     }
                     if run.state().contacts().closed().contains(&true) {
                         break Some(run.time());
