@@ -16,6 +16,7 @@ mod mortar;
 mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
+mod rigid_motion;
 mod rows;
 #[cfg(feature = "search")]
 mod surface;
@@ -36,7 +37,10 @@ pub use mortar::Mortar;
 #[cfg(feature = "search")]
 pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
-pub use obstacle::{Capsule, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
+#[cfg(feature = "search")]
+pub use obstacle::ClosedSurface;
+pub use obstacle::{Capsule, Cone, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
+pub use rigid_motion::RigidMotion;
 pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
 #[cfg(feature = "search")]

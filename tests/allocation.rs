@@ -1,6 +1,6 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
-use contact_dynamics::contact::{ContactLaw, Plane, Side, Sphere};
+use contact_dynamics::contact::{ClosedSurface, ContactLaw, Obstacle, Plane, RigidMotion, Side, Sphere};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
@@ -15,6 +15,7 @@ use contact_dynamics_scenes::bed::Bed;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::masses::{Takers, Treatment};
+use contact_dynamics_scenes::obstacles::ball_mesh;
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, spring};
@@ -169,16 +170,29 @@ fn large_motion() {
 /// A block that a ball rolls over: candidates come and go, normals turn, a supernodal factor. A step allocates only for
 /// more candidates than ever before, or for more of them pressed.
 fn solids() {
-    for law in [ContactLaw::Rigid, ContactLaw::hertz(1.0, 1.0)] {
+    let center = [-0.2, 0.5, 1.5];
+    // (The last one is a mesh that turns.)
+    for (law, turns) in
+        [(ContactLaw::Rigid, false), (ContactLaw::hertz(1.0, 1.0), false), (ContactLaw::hertz(1.0, 1.0), true)]
+    {
         let block = Solid::block([1.0; 3], [6; 3], Material { young: 100.0, poisson: 0.3, density: 1.0 });
         let top: Vec<usize> = block.surface_nodes().into_iter().filter(|&n| block.nodes[n][2] > 0.99).collect();
-        let ball = Sphere::new([-0.2, 0.5, 1.5], 0.52, Side::Outside).unwrap();
+        let ball = Sphere::new(center, 0.52, Side::Outside).unwrap();
+        let (vertices, triangles) = ball_mesh(center, 0.47, 3);
+        let mesh = ClosedSurface::new(&vertices, &triangles, 0.05).unwrap();
+        let ball: Box<dyn Obstacle<f64, 3>> = if turns { Box::new(mesh) } else { Box::new(ball) };
         let contact = NodesOnObstacle::new(ball, &block.nodes, &block.node_dofs(), &top)
             .unwrap()
             .with_law(law)
             .reach(0.3)
-            .unwrap()
-            .moving(|t| [[t, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]);
+            .unwrap();
+        let way = |t: f64| [[t, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
+        let contact = match turns {
+            true => contact.turning(move |t| {
+                RigidMotion::about_axis(center, [0.0, 1.0, 0.0], [2.0 * t, 2.0, 0.0]).translated(way(t))
+            }),
+            false => contact.moving(way),
+        };
         let mut run = Simulation::builder(block.system(), Composite, 5e-3)
             .constraint(contact)
             .corrector(PersistencyCorrection::with_history_projection())

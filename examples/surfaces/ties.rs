@@ -24,7 +24,8 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     let fine = if quick { [16, 4] } else { [48, 12] };
     let bending = first(&frequencies(&Solid::rectangle(SIZE, fine, MATERIAL), None)?, false);
     let mut row = |bar: &str, elements: &str, frequencies: &[(f64, bool)]| {
-        let (bends, stretches) = (first(frequencies, false) / bending - 1.0, first(frequencies, true) * SIZE[0] / PI - 1.0);
+        let (bends, stretches) =
+            (first(frequencies, false) / bending - 1.0, first(frequencies, true) * SIZE[0] / PI - 1.0);
         writeln!(table, "| {bar} | {elements} | {:.2} % | {:.2} % |", 100.0 * bends, 100.0 * stretches)
     };
     for cells in [[8, 2], [12, 4], [16, 4]] {

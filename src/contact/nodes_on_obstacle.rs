@@ -1,16 +1,18 @@
-//! Nodes of a deformable body against a rigid obstacle, which may move.
+//! Nodes of a deformable body against a rigid obstacle, which may move and turn.
+
+mod motion;
+mod passage;
 
 use super::dofs::DofList;
 use super::obstacle::{across, dot, minus};
 use super::{
-    Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, LARGEST_MISS, LARGEST_TURN, Obstacle,
-    Rates, STEEP, Stride, Variation, check_local, check_mesh, press_differently,
+    Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Obstacle, Rates, RigidMotion, Stride,
+    Variation, check_local, check_mesh,
 };
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
-
-/// Translation of an obstacle at t, its velocity and its acceleration.
-type Motion<'a, T, const D: usize> = Box<dyn FnMut(f64) -> [[T; D]; 3] + Send + 'a>;
+use motion::{Course, Motion};
+use passage::{look_at, turns_too_far};
 
 /// A node: its number, where it is at u = 0, and the places of the dofs of its displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,14 +45,16 @@ type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + S
 ///
 /// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end;
 /// schemes that impose contact on velocities see the tangent plane of the start of the step instead (which moves with
-/// the obstacle), and on a surface of radius R that leaves a gap of up to (h v)²/(2R) a step. With a `reach` only nodes
+/// the obstacle, and keeps its normal for the step if that turns), and on a surface of radius R that leaves a gap of up
+/// to (h v)²/(2R) a step. With a `reach` only nodes
 /// nearer than that, or than their velocity brings them within the step, are candidates, and a body farther away costs
 /// a bounding box.
 ///
 /// Steps are refused ([`Error::PassedThrough`], which a smaller step mends) in which a node goes straight through the
 /// body; presses along a normal that turns by more than 30° on its way; or is stopped along a normal that is not that
-/// of the place where it is, so that the energy lost would be wrong by more than a tenth. What this cannot see is a way
-/// that is not straight: a node that turns around within a step.
+/// of the place where it is, so that the energy lost would be wrong by more than a tenth; also steps in which the
+/// obstacle itself [turns](Self::turning) by more than 30° with a node near it. What this cannot see is a way that is
+/// not straight: a node that turns around within a step.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
@@ -74,7 +78,7 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     nodes: Vec<Node<T, D>>,
     law: ContactLaw,
     reach: T,
-    motion: Option<Motion<'a, T, D>>,
+    motion: Motion<'a, T, D>,
     friction: f64,
     roughness: Option<Roughness<'a, T, D>>,
     drag: Option<Drag<'a, T, D>>,
@@ -87,17 +91,36 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row<T, const D: usize> {
     node: usize,
-    /// Where the distance is linearized, in the frame of the obstacle, with distance and normal there.
+    /// Where the distance is linearized, with distance and normal there, in the frame of the obstacle.
     place: [T; D],
     distance: T,
+    own_normal: [T; D],
+    /// The normal in space.
     normal: [T; D],
     /// The largest coordinate of the node, of which that place is what the obstacle's motion leaves.
     size: T,
     /// Coordinates of the node where it was looked at last.
     at: [T; D],
-    /// Gap and normal at the search.
+    /// Gap and normal at the search, in the frame of the obstacle.
     start: (T, [T; D]),
     friction: f64,
+}
+
+impl<T: Real, const D: usize> Row<T, D> {
+    /// Distance of a place in the frame of the obstacle from the tangent plane.
+    fn on_tangent_plane(&self, place: [T; D]) -> T {
+        self.distance + dot(self.own_normal, minus(place, self.place))
+    }
+
+    /// Distance of a place in the frame of the obstacle and normal there; of a place on the other side of the obstacle
+    /// those of the tangent plane, which is not passed unseen.
+    fn seen_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
+        let (distance, normal) = obstacle.distance(place);
+        match dot(normal, self.own_normal) > T::zero() {
+            true => (distance, normal),
+            false => (self.on_tangent_plane(place), self.own_normal),
+        }
+    }
 }
 
 impl<T: Real, const D: usize> std::fmt::Debug for NodesOnObstacle<'_, T, D> {
@@ -145,7 +168,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
             nodes,
             law,
             reach,
-            motion: None,
+            motion: Motion::Rest,
             friction,
             roughness: None,
             drag: None,
@@ -157,7 +180,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     }
 
     /// Coulomb's friction with a coefficient μ, from 0, for all nodes. Slip is the velocity of a node against the
-    /// points of the surface: those move with the obstacle ([`moving`](Self::moving), [`dragging`](Self::dragging)).
+    /// points of the surface: those move with the obstacle ([`moving`](Self::moving), [`turning`](Self::turning)) or
+    /// along it ([`dragging`](Self::dragging)).
     ///
     /// ```
     /// use contact_dynamics::contact::{NodesOnObstacle, Plane};
@@ -196,7 +220,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
 
     /// Lets the points of the surface move along it, though the obstacle stays where it is: belts, turning wheels. The
     /// closure returns the velocity at t of the point of the obstacle that is at x (in space), and its acceleration;
-    /// those of [`moving`](Self::moving) are added. For a wheel that turns with ω they are ω × r and −ω² r.
+    /// those of [`moving`](Self::moving) and [`turning`](Self::turning) are added. For a wheel that turns with ω they
+    /// are ω × r and −ω² r; unlike an obstacle that turns it may turn as far as it likes in a step.
     #[must_use]
     pub fn dragging(mut self, drag: impl FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a) -> Self {
         self.drag = Some(Box::new(drag));
@@ -205,7 +230,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
 
     /// Which dofs rows may act on: with friction all, along a fixed normal those it has a part of.
     fn settle_acting(&mut self) {
-        let normal = self.obstacle.fixed_normal();
+        let normal = self.fixed_normal();
         let rubs = self.roughness.is_some() || self.friction != 0.0;
         self.acts.fill(rubs || normal.is_none());
         for (node, normal) in self.nodes.iter().filter_map(|node| normal.map(|normal| (node, normal))) {
@@ -234,79 +259,88 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         Ok(self)
     }
 
-    /// Moves the obstacle: the closure returns its translation at t, its velocity and its acceleration.
+    /// Moves the obstacle without turning it: the closure returns its displacement at t, its velocity and its
+    /// acceleration.
     #[must_use]
     pub fn moving(mut self, motion: impl FnMut(f64) -> [[T; D]; 3] + Send + 'a) -> Self {
-        self.motion = Some(Box::new(motion));
+        self.motion = Motion::Shifting(Box::new(motion));
+        self.settle_acting();
         self
     }
 
-    /// Translation, velocity and acceleration of the obstacle.
-    fn motion(&mut self, t: f64) -> [[T; D]; 3] {
-        self.motion.as_mut().map_or([[T::zero(); D]; 3], |motion| motion(t))
+    /// Moves and turns the obstacle: the closure returns its [`RigidMotion`] at t. In its own frame the obstacle stands
+    /// still, so that any [`Obstacle`] turns.
+    ///
+    /// With the motion x = c + R y of its points, r = x − c, and ω × r the velocity of turning, the gap of a node at x
+    /// is the distance d at y = Rᵀ(x − c), its normal n = R ∇d, and
+    ///
+    /// ```text
+    /// ∂g/∂t = −n · (v_c + ω × r)
+    /// g̈ = n · (a − a_c − ω̇ × r − ω × (ω × r) − 2 ω × w) + ẏᵀ (∇²d) ẏ,   w = v − v_c − ω × r,  ẏ = Rᵀ w
+    /// ```
+    ///
+    /// A plane that turns is a curved surface: its rows follow. Steps in which the obstacle turns by more than 30° are
+    /// refused ([`Error::PassedThrough`]) while a node is nearer than its way, as seen from the obstacle, also of a ball
+    /// that turns about its center; what turns fast without changing its shape in space is better
+    /// [dragged](Self::dragging). Rates that are zero though gaps move are refused ([`Error::SilentMotion`]), other
+    /// wrong ones are not: [`verify::gap_jacobian`](crate::verify::gap_jacobian) finds them. A closure that returns no
+    /// rotation fails what asked for it with [`Error::Parameter`] or [`Error::NotFinite`].
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{NodesOnObstacle, Plane, RigidMotion};
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, PersistencyCorrection, Simulation};
+    ///
+    /// // A tube that turns about the origin with ω = 2 flings out what is in it: r = r₀ cosh ω t, and presses on it
+    /// // with 2 m ω ṙ.
+    /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
+    /// let tube = NodesOnObstacle::new(Plane::new([0.0; 2], [0.0, 1.0])?, &[[1.0, 0.0]], &[[0, 1]], &[0])?
+    ///     .turning(|t| RigidMotion::about_point([0.0; 2], [2.0 * t, 2.0, 0.0]));
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0; 2], free)?, Newmark::trapezoidal(), 1e-3)
+    ///     .velocity(vec![0.0, 2.0])
+    ///     .constraint(tube)
+    ///     .corrector(PersistencyCorrection::with_history_projection())
+    ///     .build()?;
+    /// run.run_until(1.0, &mut ())?;
+    /// let u = run.state().displacement();
+    /// let (r, force) = ((1.0 + u[0]).hypot(u[1]), run.state().contacts().forces()[0]);
+    /// assert!((r / 2.0_f64.cosh() - 1.0).abs() < 1e-5);
+    /// assert!((force / (8.0 * 2.0_f64.sinh()) - 1.0).abs() < 1e-5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn turning(mut self, motion: impl FnMut(f64) -> RigidMotion<T, D> + Send + 'a) -> Self {
+        self.motion = Motion::Turning(Box::new(motion));
+        self.settle_acting();
+        self
+    }
+
+    /// The normal in space, if it is the same everywhere and at all times.
+    fn fixed_normal(&self) -> Option<[T; D]> {
+        self.obstacle.fixed_normal().filter(|_| !self.motion.turns())
     }
 
     /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal, and
-    /// than the longest way that a node makes against the obstacle, which moves by `carried` in the time `ahead`.
-    fn is_far(&self, u: &[T], v: &[T], shift: [T; D], carried: [T; D], ahead: T) -> bool {
+    /// than the longest way that a node makes against the obstacle in the time `ahead`.
+    fn is_far(&self, u: &[T], v: &[T], course: &Course<T, D>, ahead: T) -> bool {
         if self.reach.is_infinite() {
             return false;
         }
         let (mut low, mut high) = ([T::infinity(); D], [T::neg_infinity(); D]);
         let mut longest = T::zero();
         for node in &self.nodes {
-            let way = minus(node.of(v).map(|v| ahead * v), carried);
-            longest = longest.max(dot(way, way));
-            for (axis, x) in node.at(u).into_iter().enumerate() {
+            let at = node.at(u);
+            longest = longest.max(course.square(at, node.of(v).map(|v| ahead * v)));
+            for (axis, x) in at.into_iter().enumerate() {
                 (low[axis], high[axis]) = (low[axis].min(x), high[axis].max(x));
             }
         }
         let half = T::of(0.5);
         let center = std::array::from_fn(|k| half * (low[k] + high[k]));
         let diagonal = minus(high, low);
-        let (distance, _) = self.obstacle.distance(minus(center, shift));
+        let (distance, _) = self.obstacle.distance(course.ends[0].to_own(center));
         distance > half * dot(diagonal, diagonal).sqrt() + self.reach + longest.sqrt()
-    }
-}
-
-/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is
-/// wrong, and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end:
-/// closed or not.
-fn look_at<T: Real, const D: usize>(
-    obstacle: &dyn Obstacle<T, D>,
-    row: Option<(&Row<T, D>, [bool; 2])>,
-    ends: [[T; D]; 2],
-    velocity: [T; D],
-) -> std::result::Result<(), (&'static str, T)> {
-    let way = minus(ends[1], ends[0]);
-    let (gap, normal) = obstacle.distance(ends[1]);
-    let Some((row, [was_closed, closed])) = row else {
-        let start = obstacle.distance(ends[0]).0;
-        return match gap < T::zero() || obstacle.passage(ends[0], ends[1]).is_some() {
-            true => Err(("was out of reach, and is in the body or beyond it", start)),
-            false => Ok(()),
-        };
-    };
-    let (start, start_normal) = row.start;
-    if closed {
-        if dot(start_normal, normal) < T::of(LARGEST_TURN) {
-            return Err(("presses on a surface that turns by more than 30 degrees on the way", start));
-        }
-        let speed = dot(velocity, velocity).sqrt();
-        let shares = [start_normal, normal].map(|n| (dot(n, velocity) / speed).value());
-        if !was_closed && speed > T::zero() && press_differently(shares) {
-            return Err(("was stopped along a normal that is not the one where it met the surface", start));
-        }
-        return Ok(());
-    }
-    // (Between the ends the gap of the search is linear; what is inside in truth alone was missed.)
-    let missed = start + dot(start_normal, way) - gap;
-    if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(way, way).sqrt() {
-        return Err(("is in the body, and was taken to be outside", start));
-    }
-    match obstacle.passage(ends[0], ends[1]) {
-        Some(passage) if passage.steepness > T::of(STEEP) => Err(("went through the body", start)),
-        _ => Ok(()),
     }
 }
 
@@ -352,28 +386,25 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         check_local(u.len(), self.dofs.as_slice().len())?;
         std::mem::swap(&mut self.rows, &mut self.before);
         self.rows.clear();
-        let [shift, ..] = self.motion(t);
-        let carried = match self.reach.is_infinite() || self.motion.is_none() {
-            true => [T::zero(); D],
-            false => minus(self.motion(t + ahead)[0], shift),
-        };
+        let now = self.motion.at(t)?;
+        let still = self.reach.is_infinite() || self.motion.is_rest();
+        let later = if still { now } else { self.motion.at(t + ahead)? };
         let ahead = T::of(ahead);
-        if !self.is_far(u, v, shift, carried, ahead) {
+        let course = Course::new([now, later], ahead);
+        if !self.is_far(u, v, &course, ahead) {
             for (index, node) in self.nodes.iter().enumerate() {
                 let (x, size) = (node.at(u), |size: T, x: &T| size.max(x.abs()));
-                let (place, size) = (minus(x, shift), x.iter().fold(T::zero(), size));
+                let (place, size) = (now.to_own(x), x.iter().fold(T::zero(), size));
                 let (distance, normal) = self.obstacle.distance(place);
-                let near = || {
-                    let way = minus(node.of(v).map(|v| ahead * v), carried);
-                    distance <= self.reach + dot(way, way).sqrt()
-                };
+                let near = || distance <= self.reach + course.square(x, node.of(v).map(|v| ahead * v)).sqrt();
                 // NaN stays, to be reported as a gap.
                 if distance <= self.reach || distance.is_nan() || near() {
                     self.rows.push(Row {
                         node: index,
                         place,
                         distance,
-                        normal,
+                        own_normal: normal,
+                        normal: now.direction(normal),
                         size,
                         at: x,
                         start: (distance, normal),
@@ -391,16 +422,17 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        if self.obstacle.fixed_normal().is_some() {
+        if self.fixed_normal().is_some() {
             return Ok(Candidates::Unchanged);
         }
-        let [shift, ..] = self.motion(t);
+        let now = self.motion.at(t)?;
         let mut moved = Candidates::Unchanged;
         for row in &mut self.rows {
             let x = self.nodes[row.node].at(u);
-            (row.place, row.size) = (minus(x, shift), x.iter().fold(T::zero(), |size, x| size.max(x.abs())));
-            let (distance, normal) = self.obstacle.distance(row.place);
-            (row.distance, row.at) = (distance, x);
+            (row.place, row.size) = (now.to_own(x), x.iter().fold(T::zero(), |size, x| size.max(x.abs())));
+            let (distance, own_normal) = self.obstacle.distance(row.place);
+            let normal = now.direction(own_normal);
+            (row.distance, row.own_normal, row.at) = (distance, own_normal, x);
             if let Some(x) = normal.iter().find(|x| !x.is_finite()) {
                 let contact = ContactId { constraint: 0, feature: self.nodes[row.node].number, candidate: 0 };
                 return Err(Error::ContactNotFinite { t, what: "the normal", contact, value: x.value() });
@@ -418,23 +450,30 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             row.at = self.nodes[row.node].at(step.u[1]);
         }
         // Through a plane a row lets nothing pass.
-        if self.reach.is_infinite() && self.obstacle.fixed_normal().is_some() {
+        if self.reach.is_infinite() && self.fixed_normal().is_some() {
             return Ok(());
         }
-        let [[from, speed, _], [to, ..]] = step.t.map(|t| self.motion(t));
+        let [from, to] = [self.motion.at(step.t[0])?, self.motion.at(step.t[1])?];
+        let course = Course::new([from, to], T::of(step.t[1] - step.t[0]));
         let Self { nodes, rows, obstacle, reach, .. } = self;
         let mut rows = rows.iter().enumerate().peekable();
         for (index, node) in nodes.iter().enumerate() {
             let row = rows.next_if(|(_, row)| row.node == index);
-            let ends = [minus(node.at(step.u[0]), from), minus(node.at(step.u[1]), to)];
+            let places = step.u.map(|u| node.at(u));
+            let ends = [from.to_own(places[0]), to.to_own(places[1])];
             let way = minus(ends[1], ends[0]);
-            let length = dot(way, way).sqrt();
+            let length = dot(way, way).sqrt() + course.bend(places[0], minus(places[1], places[0]));
             // What is no candidate was farther away than the reach.
-            if row.map_or(*reach, |(_, row)| row.start.0) > length {
+            let start = row.map_or(*reach, |(_, row)| row.start.0);
+            if start > length {
                 continue;
             }
             let row = row.map(|(k, row)| (row, step.closed.map(|flags| flags[k])));
-            if let Err((what, gap)) = look_at(&**obstacle, row, ends, minus(node.of(step.v), speed)) {
+            let looked = match turns_too_far(course.angle) {
+                true => Err(("is near an obstacle that turns by more than 30 degrees in the step", start)),
+                false => look_at(&**obstacle, row, ends, from.own_velocity(places[0], node.of(step.v))),
+            };
+            if let Err((what, gap)) = looked {
                 return Err(step.refuse((node.number, 0), what, length.value(), gap.value()));
             }
         }
@@ -442,43 +481,53 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let [shift, ..] = self.motion(t);
-        let flat = self.obstacle.fixed_normal().is_some();
+        let now = self.motion.at(t)?;
+        let (flat, turns) = (self.obstacle.fixed_normal().is_some(), self.motion.turns());
         for (row, gap) in self.rows.iter().zip(gaps) {
-            let place = minus(self.nodes[row.node].at(u), shift);
-            *gap = match flat {
+            let place = now.to_own(self.nodes[row.node].at(u));
+            *gap = match (flat, turns) {
                 // The distance itself is affine, and the same to the bit whenever the last search was.
-                true => self.obstacle.distance(place).0,
-                false => row.distance + dot(row.normal, minus(place, row.place)),
+                (true, _) => self.obstacle.distance(place).0,
+                (false, true) => row.seen_from(&*self.obstacle, place).0,
+                (false, false) => row.on_tangent_plane(place),
             };
         }
         Ok(())
     }
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        if self.obstacle.fixed_normal().is_some() && self.motion.is_none() {
+        if self.obstacle.fixed_normal().is_some() && self.motion.is_rest() {
             return Ok(Rates::Zero);
         }
-        let [shift, velocity, acceleration] = self.motion(t);
+        let (now, turns) = (self.motion.at(t)?, self.motion.turns());
         for (row, rates) in self.rows.iter().zip(rates) {
             let node = &self.nodes[row.node];
-            let curvature = self.obstacle.curvature(minus(node.at(u), shift), minus(node.of(v), velocity));
-            *rates =
-                GapRates { rate: -dot(row.normal, velocity), acceleration: curvature - dot(row.normal, acceleration) };
+            let (x, v) = (node.at(u), node.of(v));
+            let (place, velocity) = (now.to_own(x), now.velocity_at(x));
+            let mut rate = -dot(row.normal, velocity);
+            if turns {
+                // Elsewhere than where rows are linearized the gap has another normal: what ġ has besides G v.
+                let normal = now.direction(row.seen_from(&*self.obstacle, place).1);
+                rate += dot(minus(normal, row.normal), minus(v, velocity));
+            }
+            let curvature = self.obstacle.curvature(place, now.own_velocity(x, v));
+            *rates = GapRates { rate, acceleration: curvature - dot(row.normal, now.apparent_acceleration(x, v)) };
         }
         Ok(Rates::Given)
     }
 
     fn slip_rates(&mut self, t: f64, u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        if self.motion.is_none() && self.drag.is_none() {
+        if self.motion.is_rest() && self.drag.is_none() {
             return Ok(Rates::Zero);
         }
-        let [_, velocity, acceleration] = self.motion(t);
+        let now = self.motion.at(t)?;
         let Self { nodes, rows, drag, .. } = self;
         let mut rates = rates.iter_mut();
         for row in rows.iter().filter(|row| row.friction != 0.0) {
+            let x = nodes[row.node].at(u);
+            let (velocity, acceleration) = (now.velocity_at(x), now.acceleration_at(x));
             let still = [[T::zero(); D]; 2];
-            let [along, faster] = drag.as_mut().map_or(still, |drag| drag(t, nodes[row.node].at(u)));
+            let [along, faster] = drag.as_mut().map_or(still, |drag| drag(t, x));
             for (rates, tangent) in rates.by_ref().take(D.saturating_sub(1)).zip(across(row.normal)) {
                 *rates = GapRates {
                     rate: -dot(tangent, velocity) - dot(tangent, along),
@@ -490,7 +539,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 
     fn variation(&self) -> Variation {
-        match self.obstacle.fixed_normal() {
+        match self.fixed_normal() {
             Some(_) if self.reach.is_infinite() && self.roughness.is_none() => Variation::Never,
             Some(_) => Variation::BySearch,
             None => Variation::Follows,

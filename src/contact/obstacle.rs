@@ -1,9 +1,15 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
 mod capsule;
+#[cfg(feature = "search")]
+mod closed_surface;
+mod cone;
 mod cuboid;
 
 pub use capsule::Capsule;
+#[cfg(feature = "search")]
+pub use closed_surface::ClosedSurface;
+pub use cone::Cone;
 pub use cuboid::Cuboid;
 
 use crate::error::{Error, Result, positive};
@@ -401,12 +407,17 @@ fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
 /// `x / |x|`; vectors that are zero or not finite are refused under the name given.
 pub(super) fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
     finite(name, &x)?;
-    // Scaled first: squares of very small or large entries leave the range of the scalar.
-    let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
-    if largest == T::zero() {
+    if x.iter().all(|x| *x == T::zero()) {
         return Err(Error::Parameter { name, value: 0.0, range: "a vector that is not zero" });
     }
+    Ok(unit_or_nan(x))
+}
+
+/// `x / |x|`, NaN if x is zero or not finite.
+pub(super) fn unit_or_nan<T: Real, const D: usize>(x: [T; D]) -> [T; D] {
+    // Scaled first: squares of very small or large entries leave the range of the scalar.
+    let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
     let scaled = x.map(|x| x / largest);
     let length = dot(scaled, scaled).sqrt();
-    Ok(scaled.map(|x| x / length))
+    scaled.map(|x| x / length)
 }

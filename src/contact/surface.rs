@@ -1,5 +1,6 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
+mod closed;
 mod facet;
 mod kin;
 mod nodes;
@@ -16,12 +17,12 @@ pub(crate) use nodes::{Nodes, points};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand};
 pub(crate) use search::{Bounds, Neighborhood, overhang};
-pub(crate) use shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
+pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use shape::{Foot, Location, RIM, Rim};
+use shape::{RIM, Rim};
 
 /// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.
 ///

@@ -68,7 +68,8 @@ fn bodies_that_do_not_fold_do_not_meet_themselves() {
         let [x, y, z] = plate.nodes[node];
         [-y - x, x - y, z - z][axis]
     });
-    let velocity = place(&contact, &|node, axis| [-10.0 * plate.nodes[node][1], 10.0 * plate.nodes[node][0], 0.0][axis]);
+    let velocity =
+        place(&contact, &|node, axis| [-10.0 * plate.nodes[node][1], 10.0 * plate.nodes[node][0], 0.0][axis]);
     contact.search(0.0, &turned, &velocity, 0.1).unwrap();
     assert!(Contacts::of(&contact).is_empty());
 }
@@ -90,7 +91,8 @@ fn arms_of_a_hairpin_face_each_other() {
 /// The facets of the inner side of each arm.
 fn arms(pin: &Solid<2>, slot: f64) -> [Vec<Facet>; 2] {
     let inner = |sign: f64| {
-        let on = move |&node: &usize| (pin.nodes[node][1] - 0.5 * sign * slot).abs() < 1e-9 && pin.nodes[node][0] < 1.99;
+        let on =
+            move |&node: &usize| (pin.nodes[node][1] - 0.5 * sign * slot).abs() < 1e-9 && pin.nodes[node][0] < 1.99;
         let facets = pin.boundary().into_iter().filter(move |facet| facet.iter().all(on));
         facets.map(|facet| Facet::from([facet[0], facet[1]])).collect()
     };
@@ -99,7 +101,10 @@ fn arms(pin: &Solid<2>, slot: f64) -> [Vec<Facet>; 2] {
 
 /// Both arms thrown at each other.
 fn thrown(pin: &Solid<2>, speed: f64) -> Vec<f64> {
-    pin.nodes.iter().flat_map(|&[x, y]| [0.0, if x < 2.0 { -y.signum() * speed * (1.0 - 0.5 * x) } else { 0.0 }]).collect()
+    pin.nodes
+        .iter()
+        .flat_map(|&[x, y]| [0.0, if x < 2.0 { -y.signum() * speed * (1.0 - 0.5 * x) } else { 0.0 }])
+        .collect()
 }
 
 #[test]
@@ -142,7 +147,10 @@ fn a_hairpin_that_snaps_shut_gains_no_energy() {
         [0, 1].map(|axis| v.iter().zip(&mass).skip(axis).step_by(2).map(|(v, m)| m * v).sum())
     };
     let start = momentum(&velocity);
-    let (still, scale) = (vec![0.0; velocity.len()], velocity.iter().zip(pin.lumped_mass::<f64>()).map(|(v, m)| m * v.abs()).sum::<f64>());
+    let (still, scale) = (
+        vec![0.0; velocity.len()],
+        velocity.iter().zip(pin.lumped_mass::<f64>()).map(|(v, m)| m * v.abs()).sum::<f64>(),
+    );
     let turning = particles.angular_momentum(&still, &velocity);
     let mut run = Simulation::builder(system, EnergyMomentum, 5e-3)
         .velocity(velocity)

@@ -13,6 +13,9 @@ mod offsets;
 mod passing_through;
 mod pounding;
 mod rate_laws;
+#[cfg(feature = "search")]
+mod shapes;
 mod surfaces;
 mod ties;
+mod turning;
 mod two_bodies;

@@ -116,7 +116,9 @@ fn offsets_that_are_none_are_refused() {
     let mut offsets = vec![0.0; count];
     offsets[4] = f64::NAN;
     assert!(matches!(contact().offsets(&offsets), Err(Error::NotFinite { index: 4, .. })));
-    for (times, factors) in [([1.0, 1.0], [0.0, 1.0]), ([0.0, f64::INFINITY], [0.0, 1.0]), ([0.0, 1.0], [f64::NAN, 1.0])] {
+    for (times, factors) in
+        [([1.0, 1.0], [0.0, 1.0]), ([0.0, f64::INFINITY], [0.0, 1.0]), ([0.0, 1.0], [f64::NAN, 1.0])]
+    {
         assert!(matches!(contact().ramp(times, factors), Err(Error::Parameter { .. })));
     }
 }

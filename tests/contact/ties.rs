@@ -28,7 +28,8 @@ fn check_patch<const D: usize>(stack: &Stack<D>, upper: bool) {
     let nodes = &stack.solid.nodes;
     let mut random = xorshift(5);
     let gradient: Vec<f64> = (0..D * D).map(|_| random() - 0.5).collect();
-    let linear = |x: &[f64; D]| -> [f64; D] { std::array::from_fn(|i| (0..D).map(|j| gradient[D * i + j] * x[j]).sum()) };
+    let linear =
+        |x: &[f64; D]| -> [f64; D] { std::array::from_fn(|i| (0..D).map(|j| gradient[D * i + j] * x[j]).sum()) };
     let u: Vec<f64> = nodes.iter().flat_map(linear).collect();
     let u = local(&tie, &u);
     tie.search(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
@@ -88,7 +89,8 @@ fn rings() -> (Solid<2>, [Vec<Facet>; 2]) {
     let split = inner.nodes.len();
     let both = inner.with(outer);
     let facets = |lower: bool| {
-        let on_circle = |&n: &usize| (n < split) == lower && (both.nodes[n][0].hypot(both.nodes[n][1]) - 1.0).abs() < 1e-9;
+        let on_circle =
+            |&n: &usize| (n < split) == lower && (both.nodes[n][0].hypot(both.nodes[n][1]) - 1.0).abs() < 1e-9;
         let facets = both.boundary().into_iter().filter(|facet| facet.iter().all(on_circle));
         facets.map(|facet| Stack::<2>::facet(&facet)).collect::<Vec<_>>()
     };

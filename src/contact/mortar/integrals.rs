@@ -13,9 +13,7 @@
 //! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
-use crate::contact::surface::{
-    Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm,
-};
+use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
 const LEAST: f64 = 1e-6;

@@ -63,12 +63,13 @@ impl Kin {
         lists.build(points, surface, positions, reach);
         let depth = |(place, &node): (usize, &usize)| {
             let Some(own) = surface.node_normal(node, positions) else { return reach };
-            let behind = lists.of(place).iter().filter(|&&facet| !self.keeps_apart(place, facet)).filter_map(|&facet| {
-                let (shape, foot) = surface.project(facet, positions[node], positions)?;
-                let normal = shape.normal(&foot.weights)?;
-                let is_behind = dot(normal, sub(positions[node], foot.point)) < 0.0;
-                (is_behind && dot(own, normal) <= FACING).then_some(foot.distance)
-            });
+            let behind =
+                lists.of(place).iter().filter(|&&facet| !self.keeps_apart(place, facet)).filter_map(|&facet| {
+                    let (shape, foot) = surface.project(facet, positions[node], positions)?;
+                    let normal = shape.normal(&foot.weights)?;
+                    let is_behind = dot(normal, sub(positions[node], foot.point)) < 0.0;
+                    (is_behind && dot(own, normal) <= FACING).then_some(foot.distance)
+                });
             DEPTH * behind.fold(reach / DEPTH, f64::min)
         };
         surface.nodes().iter().enumerate().map(depth).collect()

@@ -66,11 +66,7 @@ impl Surface {
     }
 
     /// Pressure and shear stress at each node; zero where facets cancel each other.
-    fn tractions<T: Real, const D: usize>(
-        &self,
-        positions: &[[T; D]],
-        forces: &[[T; D]],
-    ) -> Result<Vec<(f64, Point)>> {
+    fn tractions<T: Real, const D: usize>(&self, positions: &[[T; D]], forces: &[[T; D]]) -> Result<Vec<(f64, Point)>> {
         let (positions, forces) = (self.points(positions)?, self.points(forces)?);
         let mut areas = vec![[0.0; 3]; self.nodes.len()];
         self.integrate(&positions, |place, share, area| areas[place] = add_scaled(areas[place], share, area));

@@ -17,6 +17,7 @@ pub mod large;
 pub mod masses;
 pub mod measure;
 pub mod mindlin;
+pub mod obstacles;
 pub mod on_system;
 pub mod output;
 pub mod particles;

@@ -1,0 +1,52 @@
+//! What a step has done to nodes near an obstacle: refused if one went through it, or was stopped along a wrong normal.
+
+use super::super::obstacle::{dot, minus};
+use super::super::{LARGEST_MISS, LARGEST_TURN, Obstacle, STEEP, press_differently};
+use super::Row;
+use crate::real::Real;
+
+/// Whether an obstacle turns by more in a step than a way along it can be told from its ends.
+pub(super) fn turns_too_far<T: Real>(angle: T) -> bool {
+    angle.value() > LARGEST_TURN.acos()
+}
+
+/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is
+/// wrong, and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end:
+/// closed or not.
+pub(super) fn look_at<T: Real, const D: usize>(
+    obstacle: &dyn Obstacle<T, D>,
+    row: Option<(&Row<T, D>, [bool; 2])>,
+    ends: [[T; D]; 2],
+    velocity: [T; D],
+) -> std::result::Result<(), (&'static str, T)> {
+    let way = minus(ends[1], ends[0]);
+    let (gap, normal) = obstacle.distance(ends[1]);
+    let Some((row, [was_closed, closed])) = row else {
+        let start = obstacle.distance(ends[0]).0;
+        return match gap < T::zero() || obstacle.passage(ends[0], ends[1]).is_some() {
+            true => Err(("was out of reach, and is in the body or beyond it", start)),
+            false => Ok(()),
+        };
+    };
+    let (start, start_normal) = row.start;
+    if closed {
+        if dot(start_normal, normal) < T::of(LARGEST_TURN) {
+            return Err(("presses on a surface that turns by more than 30 degrees on the way", start));
+        }
+        let speed = dot(velocity, velocity).sqrt();
+        let shares = [start_normal, normal].map(|n| (dot(n, velocity) / speed).value());
+        if !was_closed && speed > T::zero() && press_differently(shares) {
+            return Err(("was stopped along a normal that is not the one where it met the surface", start));
+        }
+        return Ok(());
+    }
+    // (Between the ends the gap of the search is linear; what is inside in truth alone was missed.)
+    let missed = start + dot(start_normal, way) - gap;
+    if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(way, way).sqrt() {
+        return Err(("is in the body, and was taken to be outside", start));
+    }
+    match obstacle.passage(ends[0], ends[1]) {
+        Some(passage) if passage.steepness > T::of(STEEP) => Err(("went through the body", start)),
+        _ => Ok(()),
+    }
+}
