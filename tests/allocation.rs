@@ -1,6 +1,8 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
-use contact_dynamics::contact::{ClosedSurface, ContactLaw, Obstacle, Plane, RigidMotion, Side, Sphere};
+use contact_dynamics::contact::{
+    ClosedSurface, ContactLaw, NodeToFacet, Obstacle, Plane, RigidMotion, Side, Sphere, Surface, Tie,
+};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
@@ -36,6 +38,8 @@ fn steps_do_not_allocate() {
     rotors();
     friction();
     weighted_gaps();
+    ties();
+    a_surface_against_itself();
 }
 
 /// A bar on a rough bed that comes to rest, and a block that is thrown along a rough floor: once all contacts have
@@ -90,6 +94,49 @@ fn weighted_gaps() {
         run.step().unwrap();
     }
     assert_steps_allocate_nothing(&mut run, 300, 5, "weighted gaps");
+}
+
+/// Two rings that spin, tied on a circle where their facets do not fit: rows turn all the time.
+fn ties() {
+    let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
+    let [inner, outer] = [([0.5, 1.0], 12), ([1.0, 1.5], 17)].map(|(radii, n)| Solid::ring(radii, [1, n], material));
+    let split = inner.nodes.len();
+    let rings = inner.with(outer);
+    let [one, other] = [true, false].map(|inside| {
+        let on_circle =
+            |&n: &usize| (n < split) == inside && (rings.nodes[n][0].hypot(rings.nodes[n][1]) - 1.0).abs() < 1e-9;
+        let facets = rings.boundary().into_iter().filter(|facet| facet.iter().all(on_circle));
+        facets.map(|facet| Stack::<2>::facet(&facet)).collect::<Vec<_>>()
+    });
+    let tie = Tie::new(&rings.nodes, &rings.node_dofs(), other, one).unwrap();
+    let velocity = rings.nodes.iter().flat_map(|[x, y]| [-y, *x]).collect();
+    let system = Hyperelastic::new(&rings, Law::NeoHookean);
+    let mut run = Simulation::builder(system, EnergyMomentum, 5e-3).velocity(velocity).constraint(tie).build().unwrap();
+    for _ in 0..5 {
+        run.step().unwrap();
+    }
+    assert_steps_allocate_nothing(&mut run, 50, 0, "ties that turn");
+}
+
+/// Two blocks given as one surface, that bounce on each other.
+fn a_surface_against_itself() {
+    let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
+    let blocks = [3, 4].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], material));
+    let stack = Stack::new(blocks, 1e-3, |x| x);
+    let surface = Surface::of_cells(&stack.solid.nodes, &stack.solid.elements).unwrap();
+    let contact = NodeToFacet::of_itself(&stack.solid.nodes, &stack.solid.node_dofs(), &surface).unwrap();
+    let mass = stack.solid.lumped_mass::<f64>();
+    let mut system = stack.solid.system().load(move |_, f| {
+        f.iter_mut().zip(&mass).skip(1).step_by(2).for_each(|(f, m)| *f = -10.0 * m);
+    });
+    for node in (0..stack.solid.nodes.len()).filter(|&node| stack.solid.nodes[node][1] == 0.0) {
+        system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
+    }
+    let mut run = Simulation::builder(system, Composite, 2e-3).constraint(contact).build().unwrap();
+    for _ in 0..60 {
+        run.step().unwrap();
+    }
+    assert_steps_allocate_nothing(&mut run, 300, 5, "a surface against itself");
 }
 
 /// Takes so many steps of a run in which contacts change at least so often, from its start to their end.

@@ -379,6 +379,7 @@ impl Surface {
     }
 }
 
+#[allow(clippy::into_iter_without_iter)] // `facets` gives them to look at
 impl<'s> IntoIterator for &'s Surface {
     type Item = Facet;
     type IntoIter = std::iter::Copied<std::slice::Iter<'s, Facet>>;

@@ -62,14 +62,18 @@ fn linear_displacements_and_constant_tractions_pass() {
         for slope in [0.0, 0.35] {
             let bodies = [lower, upper].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL));
             let stack = Stack::new(bodies, 0.0, |[x, y]| [x, y + slope * x * (2.0 - y) * y]);
-            [true, false].into_iter().for_each(|above| check_patch(&stack, above));
+            for above in [true, false] {
+                check_patch(&stack, above);
+            }
         }
     }
     for (lower, upper) in [([3, 3, 1], [2, 2, 1]), ([2, 3, 1], [4, 1, 1])] {
         let bodies = || [lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL));
         for slope in [0.0, 0.25] {
             let stack = Stack::new(bodies(), 0.0, |[x, y, z]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z]);
-            [true, false].into_iter().for_each(|above| check_patch(&stack, above));
+            for above in [true, false] {
+                check_patch(&stack, above);
+            }
         }
     }
 }
@@ -198,7 +202,7 @@ fn parts_that_do_not_meet_are_not_tied() {
     assert!(matches!(shared, Error::Incompatible { .. }));
 }
 
-/// The time and the least displacement of the end of two tied bars that are pulled.
+/// The displacement, in units, of the end of two tied bars that are pulled.
 fn pulled<T: Real>(unit: f64) -> f64 {
     let bodies = [3, 2].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL));
     let stack = Stack::new(bodies, 0.0, |x| x);
