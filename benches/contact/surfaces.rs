@@ -1,5 +1,5 @@
-//! Steps of two blocks whose meshes do not match, one pressed on the other: nodes on facets and weighted gaps, beside the
-//! bare solve and the step apart.
+//! Steps of two blocks whose meshes do not match, one pressed on the other: nodes on facets and weighted gaps, beside
+//! the bare solve and the step apart.
 
 use super::{MATERIAL, RATIOS, closed};
 use contact_dynamics::contact::ContactConstraint;

@@ -18,16 +18,16 @@ use rows::{Made, Rows};
 /// Share of the reach above which a row that nothing lies over any more is open.
 const OPEN: f64 = 0.01;
 
-/// Share of the smallest facet that surfaces may have moved against each other since the search where such a row goes on
-/// as it was: what slides off the rim ends its step.
+/// Share of the smallest facet that surfaces may have moved against each other since the search where such a row goes
+/// on as it was: what slides off the rim ends its step.
 const BEYOND: f64 = 0.25;
 
 /// Contact of two deforming surfaces whose nodes need not match: gaps weighted over the facets of one surface, the
 /// slave, against those of the other, the master. Segments in two dimensions, triangles and bilinear quadrilaterals in
 /// three.
 ///
-/// The gap of a slave node is the mean of the distance between the surfaces, with the node's shape function N as weight,
-/// over the part of the slave surface that the master covers:
+/// The gap of a slave node is the mean of the distance between the surfaces, with the node's shape function N as
+/// weight, over the part of the slave surface that the master covers:
 ///
 /// g = ∫ N (x_m − x_s)·n dA / ∫ N dA (length; positive outside),
 ///
@@ -42,18 +42,18 @@ const BEYOND: f64 = 0.25;
 ///
 /// # Which surface is the slave
 ///
-/// Pressure on flat surfaces is exact with either choice, whatever the meshes. Where a small surface slides over a large
-/// one the small one should be the slave, even if its facets are the larger ones: the contact moves with its nodes, and
-/// forces vary less (`docs/contact.md`, ironing). A search costs the intersection of all pairs of facets that are near
-/// each other.
+/// Pressure on flat surfaces is exact with either choice, whatever the meshes. Where a small surface slides over a
+/// large one the small one should be the slave, even if its facets are the larger ones: the contact moves with its
+/// nodes, and forces vary less (`docs/contact.md`, ironing). A search costs the intersection of all pairs of facets
+/// that are near each other.
 ///
 /// # Linearization
 ///
 /// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
 /// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are found by differences. What is close
 /// enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
-/// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the search
-/// it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
+/// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the
+/// search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
 /// through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a smaller step
 /// mends). Geometry is computed in `f64` in every run.
 ///
@@ -123,9 +123,9 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the dimension is not 2 or 3, if the lists differ in length, if a facet does not fit, or if
-    /// a node does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
-    /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
+    /// [`Error::Dimension`] if the dimension is not 2 or 3, if the lists differ in length, if a facet does not fit, or
+    /// if a node does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without
+    /// facets; [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
     /// [`Error::Incompatible`] at a branch of a surface, and for nodes that both surfaces have.
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
@@ -166,16 +166,16 @@ impl<T: Real> Mortar<T> {
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the mean velocity of the slave against the points of the
-    /// master that it lies on, weighted as the gap is.
+    /// Coulomb's friction with a coefficient μ, from 0. Slip is the mean velocity of the slave against the points of
+    /// the master that it lies on, weighted as the gap is.
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
     }
 
-    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the thickness of
-    /// a shell whose facets are its middle surface, the thickness of a coating; negative if they lie inside. Between
+    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the thickness
+    /// of a shell whose facets are its middle surface, the thickness of a coating; negative if they lie inside. Between
     /// nodes the shape functions interpolate. The gap is n·(x_m − x_s) less the offsets of both.
     ///
     /// Forces act on the facets: that a friction force acts at a distance from the middle surface is left out.
@@ -212,12 +212,12 @@ impl<T: Real> Mortar<T> {
     }
 
     /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
-    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration (a polynomial
-    /// of the fifth degree).
+    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration (a
+    /// polynomial of the fifth degree).
     ///
-    /// A press fit whose bodies are meshed as they are before, one overlapping the other by d, begins with offsets whose
-    /// sum is −d and factors from 1 to 0; one whose bodies are meshed as if they just fitted ends with a sum of d, by
-    /// factors from 0 to 1.
+    /// A press fit whose bodies are meshed as they are before, one overlapping the other by d, begins with offsets
+    /// whose sum is −d and factors from 1 to 0; one whose bodies are meshed as if they just fitted ends with a sum of
+    /// d, by factors from 0 to 1.
     ///
     /// # Errors
     ///
@@ -227,8 +227,8 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// How far (length) outside of each other, and inside, facets meet at least; by default the mean size of the facets,
-    /// of the coarser surface. What the velocities bring near within a step is found as well.
+    /// How far (length) outside of each other, and inside, facets meet at least; by default the mean size of the
+    /// facets, of the coarser surface. What the velocities bring near within a step is found as well.
     ///
     /// # Errors
     ///
@@ -239,8 +239,8 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// How far (length) the surfaces may move relative to each other before lists of pairs are built anew; if not given,
-    /// half of what is searched. It changes the cost, not the result.
+    /// How far (length) the surfaces may move relative to each other before lists of pairs are built anew; if not
+    /// given, half of what is searched. It changes the cost, not the result.
     ///
     /// # Errors
     ///

@@ -261,12 +261,12 @@ impl<T: Real> NodeToFacet<T> {
     /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. For bodies that
     /// fold, and for several bodies whose surfaces are given as one.
     ///
-    /// Of the facets a node does not meet those within one [ring](Self::rings), those that do not face it (normals within
-    /// 102° of each other), and those behind it by more than half of the material there: how thick that is is found in
-    /// the reference configuration, as far as the [`reach`](Self::reach). So nothing may be inside of itself there.
-    /// Of two nodes that stand on each other the one with the smaller number has a row. A search reaches as far as any
-    /// two nodes of the surface move against each other within the step: a body that spins fast looks farther than it
-    /// must.
+    /// Of the facets a node does not meet those within one [ring](Self::rings), those that do not face it (normals
+    /// within 102° of each other), and those behind it by more than half of the material there: how thick that is is
+    /// found in the reference configuration, as far as the [`reach`](Self::reach). So nothing may be inside of itself
+    /// there. Of two nodes that stand on each other the one with the smaller number has a row. A search reaches as far
+    /// as any two nodes of the surface move against each other within the step: a body that spins fast looks farther
+    /// than it must.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -305,8 +305,8 @@ impl<T: Real> NodeToFacet<T> {
     }
 
     /// How many rings of facets around a node it does not meet, of [its own surface](Self::of_itself): 0 are the facets
-    /// that have the node, 1 those that share a node with one of them, and so on. By default 1. It has no meaning for two
-    /// surfaces.
+    /// that have the node, 1 those that share a node with one of them, and so on. By default 1. It has no meaning for
+    /// two surfaces.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
         self.rings = rings;

@@ -280,8 +280,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// ```
     ///
     /// A plane that turns is a curved surface: its rows follow. Steps in which the obstacle turns by more than 30° are
-    /// refused ([`Error::PassedThrough`]) while a node is nearer than its way, as seen from the obstacle, also of a ball
-    /// that turns about its center; what turns fast without changing its shape in space is better
+    /// refused ([`Error::PassedThrough`]) while a node is nearer than its way, as seen from the obstacle, also of a
+    /// ball that turns about its center; what turns fast without changing its shape in space is better
     /// [dragged](Self::dragging). Rates that are zero though gaps move are refused ([`Error::SilentMotion`]), other
     /// wrong ones are not: [`verify::gap_jacobian`](crate::verify::gap_jacobian) finds them. A closure that returns no
     /// rotation fails what asked for it with [`Error::Parameter`] or [`Error::NotFinite`].

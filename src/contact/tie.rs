@@ -19,17 +19,18 @@ use joint::Joint;
 /// g_k = ∫ N (u_m − u_s)_k dA / ∫ N dA = 0 (length),
 ///
 /// with u_m at the point of the master that lies over the point of the slave along its facet's normal (mesh tying by
-/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Any linear displacement passes
-/// exactly, whatever the meshes. The force of a row acts along k, positive on the master and negative on the slave, and
-/// ∫ N dA is the node's [`area`](Self::area).
+/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Any linear displacement
+/// passes exactly, whatever the meshes. The force of a row acts along k, positive on the master and negative on the
+/// slave, and ∫ N dA is the node's [`area`](Self::area).
 ///
 /// # Surfaces that do not fit
 ///
 /// Where facets of both surfaces lie upon each other rows are linear in u, and the same for ever. Where they do not, on
-/// curved surfaces with different meshes for instance, x_m − x_s is not zero at the start. It stays what it was, in axes
-/// that turn with each slave facet: g = Σ Rᵀ ∫ N (x_m − x_s) dA / ∫ N dA minus its initial value, R the rotation of the
-/// facet since. So bodies turn freely by any angle and forces conserve angular momentum; with fixed axes such a gap
-/// would resist turning (Puso 2004 moves the nodes instead). These rows [follow](ContactConstraint::follow) the motion.
+/// curved surfaces with different meshes for instance, x_m − x_s is not zero at the start. It stays what it was, in
+/// axes that turn with each slave facet: g = Σ Rᵀ ∫ N (x_m − x_s) dA / ∫ N dA minus its initial value, R the rotation
+/// of the facet since. So bodies turn freely by any angle and forces conserve angular momentum; with fixed axes such a
+/// gap would resist turning (Puso 2004 moves the nodes instead). These rows [follow](ContactConstraint::follow) the
+/// motion.
 ///
 /// # Which surface is the slave
 ///
@@ -82,8 +83,8 @@ pub struct Tie<T: Real> {
 }
 
 impl<T: Real> Tie<T> {
-    /// Ties the facets of a `slave` surface, whose nodes get the rows, to those of a `master`, where they are within the
-    /// [`reach`](Self::reach) of each other.
+    /// Ties the facets of a `slave` surface, whose nodes get the rows, to those of a `master`, where they are within
+    /// the [`reach`](Self::reach) of each other.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
     /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
@@ -99,8 +100,8 @@ impl<T: Real> Tie<T> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        /// Share of the mean facet of the coarser surface: more than a curved surface is off its facets that turn by 45°
-        /// from one to the next.
+        /// Share of the mean facet of the coarser surface: more than a curved surface is off its facets that turn by
+        /// 45° from one to the next.
         const REACH: f64 = 0.1;
         let mut nodes = Nodes::new(coordinates, dofs)?;
         let slave = Surface::of_facets(slave, D, &nodes.coordinates)?;

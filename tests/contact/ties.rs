@@ -1,4 +1,5 @@
-//! Ties: constant tractions and linear displacements pass exactly, surfaces that do not fit turn freely, what is refused.
+//! Ties: constant tractions and linear displacements pass exactly, surfaces that do not fit turn freely, what is
+//! refused.
 
 use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Surface, Tie};
 use contact_dynamics::{EnergyMomentum, Error, Newmark, Real, Simulation, verify};

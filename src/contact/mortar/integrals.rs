@@ -6,9 +6,10 @@
 //! δg = μ·(δx_m − δx_s − g δn), μ = ν/(ν·n), δ∫N g dA = Σ ω N (J δg + g δJ):
 //!
 //! where the ray moves on along the master facet nothing changes to first order but what μ holds. The limits of the
-//! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there; where
-//! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under translations and rotations, term by term: so
-//! forces along the derivative conserve linear and angular momentum to rounding.
+//! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there;
+//! where the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under
+//! translations and rotations, term by term: so forces along the derivative conserve linear and angular momentum to
+//! rounding.
 //!
 //! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.

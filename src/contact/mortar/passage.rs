@@ -8,8 +8,8 @@ use crate::contact::{LARGEST_MISS, Stride};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Share of the smallest facet that the surfaces may move against each other without being looked at, and that they move
-/// between two looks.
+/// Share of the smallest facet that the surfaces may move against each other without being looked at, and that they
+/// move between two looks.
 const FINE: f64 = 0.125;
 
 /// The most looks a step. What moves farther is refused where its way leads through the other surface's box.

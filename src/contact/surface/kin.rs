@@ -22,8 +22,8 @@ pub(crate) struct Kin {
 }
 
 impl Kin {
-    /// Finds the facets within `rings` of each node (none: those that have it), and how thick the material is behind it,
-    /// as far as `reach`.
+    /// Finds the facets within `rings` of each node (none: those that have it), and how thick the material is behind
+    /// it, as far as `reach`.
     pub(crate) fn new(surface: &Surface, rings: usize, positions: &[Point], reach: f64) -> Self {
         let mut kin = Self { starts: vec![0], facets: Vec::new(), depths: Vec::new() };
         let mut own: Vec<usize> = Vec::new();
@@ -55,8 +55,8 @@ impl Kin {
         self.depths[place]
     }
 
-    /// Behind a node that faces a facet there is material, as nothing is inside of itself in the reference configuration:
-    /// a share of the least distance.
+    /// Behind a node that faces a facet there is material, as nothing is inside of itself in the reference
+    /// configuration: a share of the least distance.
     fn depths(&self, surface: &Surface, positions: &[Point], reach: f64) -> Vec<f64> {
         let mut lists = Neighborhood::default();
         let points = surface.nodes().iter().map(|&node| Bounds::of_points([positions[node]]));

@@ -35,11 +35,12 @@ impl Surface {
     /// The outer sides of a mesh: the sides of its cells that no other cell has, with normals that point out of the
     /// cells. `coordinates` are the reference coordinates of all nodes.
     ///
-    /// A cell is the list of its nodes, corners first, as finite-element codes and mesh formats have them. Its number of
-    /// nodes tells what it is: in two dimensions a triangle (3, 6) or a quadrilateral (4, 8, 9), in three a tetrahedron
-    /// (4, 10), a pyramid (5, 13, 14), a wedge (6, 15, 18) or a hexahedron (8, 20, 27). Cells may be numbered either way
-    /// around. The nodes of a cell of second order that are no corners may come in any order: on each side those are
-    /// taken that are closest to its middle and to the middles of its edges; such a side becomes several facets.
+    /// A cell is the list of its nodes, corners first, as finite-element codes and mesh formats have them. Its number
+    /// of nodes tells what it is: in two dimensions a triangle (3, 6) or a quadrilateral (4, 8, 9), in three a
+    /// tetrahedron (4, 10), a pyramid (5, 13, 14), a wedge (6, 15, 18) or a hexahedron (8, 20, 27). Cells may be
+    /// numbered either way around. The nodes of a cell of second order that are no corners may come in any order: on
+    /// each side those are taken that are closest to its middle and to the middles of its edges; such a side becomes
+    /// several facets.
     ///
     /// ```
     /// use contact_dynamics::contact::Surface;

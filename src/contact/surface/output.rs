@@ -38,9 +38,9 @@ impl Surface {
         Ok(self.nodes.iter().map(normal).map(|normal| std::array::from_fn(|axis| T::of(normal[axis]))).collect())
     }
 
-    /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make: −f·A/|A|²
-    /// with A = ∫ N n dA, n outward. A pressure that is the same all over the surface comes out as it is, at edges and
-    /// corners too; what it leaves of the forces is [`shears`](Self::shears).
+    /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make:
+    /// −f·A/|A|² with A = ∫ N n dA, n outward. A pressure that is the same all over the surface comes out as it is, at
+    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears).
     ///
     /// `positions` and `forces` are those of all nodes of the mesh: contact forces are those of
     /// [`contact_forces`](crate::Simulation::contact_forces). At the border of a contact that ends inside of a facet
@@ -114,7 +114,8 @@ fn quadrature(facet: &Facet, shape: &Shape) -> Vec<([f64; 4], Point)> {
         let second = if shape.is_segment() { [0.0, 0.0, 1.0] } else { second };
         (weights, cross(first, second).map(|x| share * x))
     };
-    // Linear functions on segments and triangles; of a bilinear quadrilateral N n dA is of degree two in each direction.
+    // Linear functions on segments and triangles; of a bilinear quadrilateral N n dA is of degree two in each
+    // direction.
     match facet.count {
         2 => vec![at([0.5, 0.5, 0.0, 0.0], 1.0)],
         3 => vec![at([1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0], 0.5)],

@@ -205,7 +205,8 @@ impl Base {
     /// How a function with these values at the corners of a master facet grows where the rays of this facet meet it, if
     /// the point below moves: along the facet, for the foot of the ray moves with it.
     ///
-    /// With d the vectors across n whose products with the tangents are 0 and 1, dξ = d · dx for the foot's coordinate ξ.
+    /// With d the vectors across n whose products with the tangents are 0 and 1, dξ = d · dx for the foot's coordinate
+    /// ξ.
     pub(crate) fn slope(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], values: &[f64; 4]) -> Point {
         let count = facet.nodes().len();
         let [first, second] = facet.shape(positions).tangents_at(weights);
@@ -222,8 +223,8 @@ impl Base {
         self.count
     }
 
-    /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`: the
-    /// vector that each corner's motion is multiplied by.
+    /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`:
+    /// the vector that each corner's motion is multiplied by.
     pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
         let [first, second] = self.shape.tangents_at(weights);
         let [by_first, by_second] = match self.count {
@@ -257,7 +258,8 @@ struct Flat {
 }
 
 impl Flat {
-    /// The shape functions at a point: of a quadrilateral by Newton's method, which is exact at once for parallelograms.
+    /// The shape functions at a point: of a quadrilateral by Newton's method, which is exact at once for
+    /// parallelograms.
     fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
         let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
