@@ -4,12 +4,14 @@
 //! `cargo bench --bench contact -- [elements a side]…` (default 10 and 20) takes over ten minutes for all of it; a part
 //! alone is asked for by name: `-- blocks` for the above and a plate with ten thousand candidates, `-- pressed` for
 //! steps with few and many pressed contacts, `-- impact` for steps in which hundreds change, `-- nonlinear` for
-//! iterations with contact, `-- surfaces` for meshes that do not match, `-- candidates` for a million candidates.
+//! iterations with contact, `-- surfaces` for meshes that do not match, `-- search` for a hundred thousand facets, `--
+//! candidates` for a million candidates.
 
 mod candidates;
 mod impact;
 mod nonlinear;
 mod pressed;
+mod search;
 mod surfaces;
 
 use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
@@ -35,12 +37,13 @@ type Part = (&'static str, fn(&Arguments));
 
 fn main() {
     let arguments = Arguments::read(&[10, 20], &[4]);
-    let parts: [Part; 6] = [
+    let parts: [Part; 7] = [
         ("blocks", blocks),
         ("pressed", pressed::measure),
         ("impact", impact::measure),
         ("nonlinear", nonlinear::measure),
         ("surfaces", surfaces::measure),
+        ("search", search::measure),
         ("candidates", candidates::measure),
     ];
     let asked = |word: &str| std::env::args().any(|argument| argument == word);

@@ -1,0 +1,65 @@
+//! Searches between two plates of a hundred thousand facets, and linearizations of what they find, beside the step
+//! without contact.
+
+use super::MATERIAL;
+use contact_dynamics::contact::ContactConstraint;
+use contact_dynamics::{Newmark, Simulation};
+use contact_dynamics_scenes::solids::Solid;
+use contact_dynamics_scenes::stacks::Stack;
+use contact_dynamics_scenes::timing::{Arguments, Ratio, Table, Unit};
+
+const RATIOS: &[Ratio] = &[Ratio { heading: "/ step", to: &["step without contact"] }];
+
+/// A constraint with two states of its dofs: at rest, and with the upper plate some facets aside.
+struct Searched {
+    contact: Box<dyn ContactConstraint<f64>>,
+    states: [Vec<f64>; 2],
+    aside: bool,
+}
+
+impl Searched {
+    fn new(contact: Box<dyn ContactConstraint<f64>>, stack: &Stack<3>) -> Self {
+        let is_upper = |dof: usize| dof / 3 >= stack.split;
+        let moved = |dof: &usize| if is_upper(*dof) && dof % 3 == 0 { 5.0 } else { 0.0 };
+        let aside = contact.dofs().iter().map(moved).collect();
+        Self { states: [vec![0.0; contact.dofs().len()], aside], contact, aside: false }
+    }
+
+    /// Searches where the plates are, or where they have moved to since the last search.
+    fn search(&mut self, moves: bool) {
+        self.aside ^= moves;
+        let u = &self.states[usize::from(self.aside)];
+        self.contact.search(0.0, u, &self.states[0], 0.0).expect("plates that meet");
+    }
+}
+
+pub(super) fn measure(arguments: &Arguments) {
+    let n = if arguments.quick { 6 } else { 224 };
+    let side = n as f64;
+    let plates = [0.0, 0.3].map(|aside| {
+        Solid::block([side, side, 1.0], [n, n, 1], MATERIAL).mapped(|[x, y, z]| [x + aside, y + 0.4 * aside, z])
+    });
+    let stack = Stack::new(plates, 0.1, |x| x);
+    println!("two plates of {n}² facets, {} dofs", stack.solid.dofs());
+    let mut table = Table::new(Unit::Milli, RATIOS);
+    let h = 1.0 / MATERIAL.wave_speed();
+    let mut run =
+        Simulation::builder(stack.solid.system::<f64>(), Newmark::trapezoidal(), h).build().expect("free plates");
+    run.step().expect("a well-posed step");
+    table.row("step without contact", move || run.step().expect("a well-posed step"));
+    let nodes = |passes: usize| stack.nodes_on_facets(passes).expect("surfaces");
+    for (what, moves) in [("lists kept", false), ("lists anew", true)] {
+        let contacts: [(&str, Box<dyn ContactConstraint<f64>>); 3] = [
+            ("nodes on facets, one pass", Box::new(nodes(1))),
+            ("nodes on facets, two passes", Box::new(nodes(2))),
+            ("mortar", Box::new(stack.mortar(true).expect("surfaces"))),
+        ];
+        for (name, contact) in contacts {
+            let mut searched = Searched::new(contact, &stack);
+            searched.search(false);
+            table.row(format!("{name}, {what}"), move || searched.search(moves));
+        }
+    }
+    table.sample(arguments.repeated(5), 1);
+    table.print();
+}
