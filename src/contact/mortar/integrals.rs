@@ -105,10 +105,13 @@ impl Entry {
 #[derive(Debug, Default)]
 pub(super) struct Integrals {
     pub(super) sums: Vec<Sums>,
-    entries: Vec<(usize, Entry)>,
+    entries: Vec<Entry>,
     merged: Vec<Entry>,
-    /// Where the entries of each row begin.
+    /// Where the merged entries of each row begin.
     starts: Vec<usize>,
+    /// (node, place among the entries) by row, and where each row begins there.
+    sorted: Vec<(usize, usize)>,
+    begins: Vec<usize>,
 }
 
 /// What a facet adds to the rows of a slave facet's corners, by its own corners.
@@ -268,28 +271,44 @@ impl Integrals {
         for (a, &row) in places.iter().enumerate().take(count) {
             for (b, &node) in facet.nodes().iter().enumerate() {
                 let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
-                self.entries.push((self.entries.len(), Entry { row, node, moment, area, share }));
+                self.entries.push(Entry { row, node, moment, area, share });
             }
         }
     }
 
     /// Sums entries of a row that belong to one node, in the order in which they were found.
+    ///
+    /// (Rows are told apart by counting: a sort of all entries of a large surface takes as long as finding them.)
     fn merge(&mut self) {
-        self.entries.sort_unstable_by_key(|(number, entry)| (entry.row, entry.node, *number));
-        self.merged.clear();
-        self.starts.clear();
-        for (_, entry) in &self.entries {
-            match self.merged.last_mut() {
-                Some(last) if (last.row, last.node) == (entry.row, entry.node) => last.add(entry),
-                _ => self.merged.push(*entry),
+        let Self { sums, entries, merged, starts, sorted, begins } = self;
+        begins.clear();
+        begins.resize(sums.len() + 2, 0);
+        // Counted two places on, so that after the sums each row's place is where its next entry goes.
+        entries.iter().for_each(|entry| begins[entry.row + 2] += 1);
+        for row in 2..begins.len() {
+            begins[row] += begins[row - 1];
+        }
+        sorted.clear();
+        sorted.resize(entries.len(), (0, 0));
+        for (number, entry) in entries.iter().enumerate() {
+            let place = &mut begins[entry.row + 1];
+            sorted[*place] = (entry.node, number);
+            *place += 1;
+        }
+        merged.clear();
+        starts.clear();
+        for row in 0..sums.len() {
+            let first = merged.len();
+            starts.push(first);
+            let of_row = &mut sorted[begins[row]..begins[row + 1]];
+            of_row.sort_unstable();
+            for &(node, number) in &*of_row {
+                match merged[first..].last_mut() {
+                    Some(last) if last.node == node => last.add(&entries[number]),
+                    _ => merged.push(entries[number]),
+                }
             }
         }
-        let mut next = 0;
-        for place in 0..=self.sums.len() {
-            while self.merged.get(next).is_some_and(|entry| entry.row < place) {
-                next += 1;
-            }
-            self.starts.push(next);
-        }
+        starts.push(merged.len());
     }
 }
