@@ -284,7 +284,9 @@ impl Integrals {
         begins.clear();
         begins.resize(sums.len() + 2, 0);
         // Counted two places on, so that after the sums each row's place is where its next entry goes.
-        entries.iter().for_each(|entry| begins[entry.row + 2] += 1);
+        for entry in &*entries {
+            begins[entry.row + 2] += 1;
+        }
         for row in 2..begins.len() {
             begins[row] += begins[row - 1];
         }
