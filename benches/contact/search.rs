@@ -20,7 +20,7 @@ struct Searched {
 impl Searched {
     fn new(contact: Box<dyn ContactConstraint<f64>>, stack: &Stack<3>) -> Self {
         let is_upper = |dof: usize| dof / 3 >= stack.split;
-        let moved = |dof: &usize| if is_upper(*dof) && dof % 3 == 0 { 5.0 } else { 0.0 };
+        let moved = |dof: &usize| if is_upper(*dof) && dof.is_multiple_of(3) { 5.0 } else { 0.0 };
         let aside = contact.dofs().iter().map(moved).collect();
         Self { states: [vec![0.0; contact.dofs().len()], aside], contact, aside: false }
     }
