@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
+mod corners;
 mod ironing;
 mod patch;
 mod rings;
@@ -11,7 +12,12 @@ use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("surfaces")?;
-    let tables = [patch::table(output.quick)?, ironing::table(output.quick)?, rings::table(output.quick)?].join("\n");
+    let quick = output.quick;
+    if std::env::var_os("CORNERS").is_some() {
+        println!("{}", corners::table(quick)?);
+        return Ok(());
+    }
+    let tables = [patch::table(quick)?, ironing::table(quick)?, rings::table(quick)?, corners::table(quick)?].join("\n");
     println!("{tables}");
     output.write("surfaces.md", &tables)
 }
