@@ -36,6 +36,9 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     let falls = if quick { 1 } else { 20 };
     for (name, landing) in landings {
         for (contact, keeps) in CONTACTS {
+            if std::env::var("ONLY").is_ok_and(|only| !contact.starts_with(only.as_str())) {
+                continue;
+            }
             let mut random = xorshift(77);
             let (mut gained, mut failed, mut refused) = (0, 0, 0);
             let (mut highest, mut node, mut edge) = (0.0_f64, 0.0_f64, 0.0_f64);

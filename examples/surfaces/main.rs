@@ -17,7 +17,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{}", corners::table(quick)?);
         return Ok(());
     }
-    let tables = [patch::table(quick)?, ironing::table(quick)?, rings::table(quick)?, corners::table(quick)?].join("\n");
+    let tables =
+        [patch::table(quick)?, ironing::table(quick)?, rings::table(quick)?, corners::table(quick)?].join("\n");
     println!("{tables}");
     output.write("surfaces.md", &tables)
 }

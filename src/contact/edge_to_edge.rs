@@ -14,7 +14,7 @@ use crate::real::Real;
 use edges::Edge;
 use lines::Crossing;
 use pairs::{LEAST_SINE, Pair};
-use rows::{Rows, Stand};
+use rows::Rows;
 
 /// The angle by which a surface turns around an edge, if not given: 30°.
 const SHARP: f64 = std::f64::consts::FRAC_PI_6;
@@ -44,11 +44,12 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// # Linearization
 ///
 /// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step
-/// ([`search`](ContactConstraint::search)), those whose closest points are on both edges, and those that velocities
-/// bring there within the step. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the contact
-/// of the step. [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. An edge goes on a
-/// quarter of itself beyond its ends within a step; a pair that has come farther apart there is open. Geometry is
-/// computed in `f64` in every run.
+/// ([`search`](ContactConstraint::search)): edges that meet, and those that may come to meet within the step, by their
+/// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
+/// contact of the step. [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the
+/// closest points lie beyond an end, or the normal outside of those of a body, the gap is larger than that of the lines
+/// by four times the share of the shorter edge (the sine): it is continuous where edges come to meet or slide off
+/// each other, and the row is that of the lines. Geometry is computed in `f64` in every run.
 ///
 /// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an
 /// eighth of the smallest one have gone into each other by more than a tenth of their way, taken as straight, or were
@@ -292,16 +293,13 @@ impl<T: Real> EdgeToEdge<T> {
             let bounds = edge.bounds(&nodes.positions);
             for &second in neighborhood.of(first) {
                 let pair = pair(edges, surfaces, [first, second]);
-                let range = *reach + ahead * pair.way(&velocity);
-                if !bounds.inflated(range).intersects(&pair.edges[1].bounds(&nodes.positions)) {
+                let way = ahead * pair.way(&velocity);
+                if !bounds.inflated(*reach + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
                     continue;
                 }
-                let held = pair.meet_within(range, &at);
-                let crossing = held.or_else(|| pair.meet_ahead(ahead, &at, &velocity));
-                if let Some(crossing) = crossing {
-                    let stand = Stand::new(crossing, held.is_some());
+                if let Some(crossing) = pair.near(*reach, way, &at) {
                     let names = (pair.nodes(), |node| nodes.places(node));
-                    found.push([first, second], stand, crossing.gap, names, u);
+                    found.push([first, second], (crossing, pair.gap(&crossing, &at)), names, u);
                 }
             }
         }
@@ -322,9 +320,9 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { affine, pairs, stands } = &self.rows;
-        for (row, (&index, stand)) in pairs.iter().zip(stands).enumerate() {
-            let (pair, crossing) = (self.pair(index), &stand.crossing);
+        let Rows { affine, pairs, crossings } = &self.rows;
+        for (row, (&index, crossing)) in pairs.iter().zip(crossings).enumerate() {
+            let pair = self.pair(index);
             let [ends, _] = pair.ends(&|node| self.nodes.positions[node]);
             let position = Edge::point(ends, crossing.shares[0].clamp(0.0, 1.0));
             let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -363,26 +361,26 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         Ok(Candidates::changed_if(!same))
     }
 
-    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+    fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
         if self.rows.pairs.is_empty() || self.move_nodes(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
-        let Self { nodes, edges, surfaces, rows, found, reach, .. } = self;
+        let Self { nodes, edges, surfaces, rows, found, .. } = self;
         let at = |node: usize| nodes.positions[node];
         found.clear();
-        for (row, (&index, stand)) in rows.pairs.iter().zip(&rows.stands).enumerate() {
+        for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {
             let pair = pair(edges, surfaces, index);
             // Edges that have become parallel: the row stays as it was.
             let crossing = Crossing::of(pair.ends(&at)).filter(|crossing| crossing.sine >= 0.5 * LEAST_SINE);
-            let Some(crossing) = crossing.map(|crossing| crossing.as_seen_along(stand.crossing.normal)) else {
-                found.keep(rows, row);
-                continue;
-            };
-            let stand = stand.followed_by(crossing, t, pair.stays(&crossing, stand.held, &at));
-            let gap = if stand.meets { crossing.gap } else { crossing.gap.max(*reach) };
-            found.push(index, stand, gap, (pair.nodes(), |node| nodes.places(node)), u);
+            match crossing.map(|crossing| crossing.as_seen_along(before.normal)) {
+                Some(crossing) => {
+                    let names = (pair.nodes(), |node| nodes.places(node));
+                    found.push(index, (crossing, pair.gap(&crossing, &at)), names, u);
+                }
+                None => found.keep(rows, row),
+            }
         }
         let same = rows.affine.jacobian == found.affine.jacobian;
         std::mem::swap(rows, found);
@@ -397,15 +395,12 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     }
 
     fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        let Rows { pairs, stands, .. } = &self.rows;
-        for (rates, (&index, stand)) in rates.iter_mut().zip(pairs.iter().zip(stands)) {
+        let Rows { pairs, crossings, .. } = &self.rows;
+        for (rates, (&index, crossing)) in rates.iter_mut().zip(pairs.iter().zip(crossings)) {
             let pair = self.pair(index);
             let at = |node: usize| add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
             let velocity = |node: usize| self.nodes.vector(node, v);
-            let acceleration = match stand.meets {
-                true => stand.crossing.acceleration(pair.ends(&at), pair.ends(&velocity)),
-                false => 0.0,
-            };
+            let acceleration = crossing.acceleration(pair.ends(&at), pair.ends(&velocity));
             *rates = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
         }
         Ok(Rates::Given)

@@ -24,14 +24,15 @@ impl Wedge {
         dot(self.along, cross(left, right)).atan2(dot(left, right))
     }
 
-    /// Whether a normal across the edge is one of the body there, from that of the one facet to that of the other; up
-    /// to a sine.
-    fn has(&self, normal: Point, margin: f64) -> bool {
+    /// Sine of the angle by which a normal across the edge lies outside of those that the body has there, between those
+    /// of its facets; 1 for one that looks the other way, and where the edge is not convex.
+    fn miss(&self, normal: Point) -> f64 {
         let [left, right] = self.normals;
-        dot(self.along, cross(left, right)) > 0.0
-            && dot(normal, left) + dot(normal, right) > 0.0
-            && dot(self.along, cross(left, normal)) >= -margin
-            && dot(self.along, cross(normal, right)) >= -margin
+        if dot(self.along, cross(left, right)) <= 0.0 || dot(normal, left) + dot(normal, right) <= 0.0 {
+            return 1.0;
+        }
+        let beyond = [cross(normal, left), cross(right, normal)].map(|turn| dot(self.along, turn));
+        beyond[0].max(beyond[1]).max(0.0)
     }
 
     /// Whether the opposite of a normal leads into the body.
@@ -88,15 +89,9 @@ impl Edge {
         })
     }
 
-    /// Whether the body has a normal at a share of the edge; up to a sine.
-    pub(super) fn has_normal(
-        &self,
-        normal: Point,
-        (share, margin): (f64, f64),
-        surface: &Surface,
-        at: &impl Fn(usize) -> Point,
-    ) -> bool {
-        self.wedge(share, surface, at).is_some_and(|wedge| wedge.has(normal, margin))
+    /// Sine of the angle by which a normal lies outside of those of the body at a share of the edge.
+    pub(super) fn miss(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> f64 {
+        self.wedge(share, surface, at).map_or(1.0, |wedge| wedge.miss(normal))
     }
 
     /// Whether the way back from a share of the edge along a normal leads into the body.

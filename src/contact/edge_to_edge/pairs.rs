@@ -1,8 +1,8 @@
-//! Which pairs of edges may press on each other: found where they are, and where their velocities bring them together.
+//! Which pairs of edges press on each other, and which may come to within a step.
 
 use super::edges::Edge;
-use super::lines::{Crossing, Ways};
-use crate::contact::surface::{Bounds, Point, Surface, add_scaled, dot, norm, sub};
+use super::lines::Crossing;
+use crate::contact::surface::{Bounds, Point, Surface, norm, sub};
 
 /// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
 /// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
@@ -15,12 +15,17 @@ const ROUNDING: f64 = 1e-9;
 /// Depth, in shares of the shorter edge, up to which a pair is kept whatever the shape of the bodies behind.
 const SHALLOW: f64 = 1e-3;
 
-/// How far, in shares of an edge, the line through it stands for an edge that the closest point leaves within a step;
-/// and by which sine the normal may leave the bodies' own.
-const BEYOND: f64 = 0.25;
+/// How steeply the gap opens where edges miss each other.
+const STEEP: f64 = 4.0;
 
-/// How far outside of an edge the closest point may be where a search begins to look where velocities lead.
-const AHEAD: f64 = 1.0;
+/// Depth in shares of the shorter edge, beside the way of a step, beyond which two lines are far sides of bodies, not edges that
+/// have crossed.
+const DEEPEST: f64 = 0.25;
+
+/// What a step may change beside the way of its velocities, in shares of an edge; the sine by which normals may turn
+/// within it at most.
+const UNFORESEEN: f64 = 0.1;
+const LARGEST_TURN: f64 = 0.5;
 
 /// Edges of two surfaces.
 #[derive(Clone, Copy)]
@@ -51,12 +56,22 @@ impl Pair<'_> {
         one.min(other)
     }
 
-    /// Whether the normal, turned, is one of the first body, and as it is one of the second.
-    fn has_normal(&self, crossing: &Crossing, margin: f64, at: &impl Fn(usize) -> Point) -> bool {
-        let [first, second] = self.edges;
-        let back = crossing.normal.map(|x| -x);
-        second.has_normal(crossing.normal, (crossing.shares[1], margin), self.surfaces[1], at)
-            && first.has_normal(back, (crossing.shares[0], margin), self.surfaces[0], at)
+    /// By how much edges miss each other at their closest points, zero if they meet there: shares of the edges beyond
+    /// their ends, and sines by which the normal, turned, is none of the first body, or as it is none of the second.
+    fn miss(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
+        let ([first, second], [s, t]) = (self.edges, crossing.shares);
+        let turned = first.miss(crossing.normal.map(|x| -x), s, self.surfaces[0], at);
+        let miss = turned.max(second.miss(crossing.normal, t, self.surfaces[1], at));
+        crossing.excess().into_iter().fold(miss, f64::max)
+    }
+
+    /// The gap of the edges: that of the lines where they meet. Where they miss each other it opens by so many times
+    /// what they miss, so that it is continuous; lines that cross behind acute edges, outside of the bodies, are open.
+    pub(super) fn gap(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
+        let shorter = self.shorter(at);
+        let open = crossing.gap + STEEP * shorter * self.miss(crossing, at);
+        let outside = open < -SHALLOW * shorter && !self.is_inside(crossing, at);
+        if outside { -open } else { open }
     }
 
     /// Whether each edge is in the body of the other, if the gap is negative.
@@ -67,45 +82,40 @@ impl Pair<'_> {
             && first.is_behind(back, crossing.shares[0], self.surfaces[0], at)
     }
 
-    /// The closest points, if they are on both edges and the normal between them is one of both bodies: seen so that the
-    /// gap is positive outside.
-    pub(super) fn meet(&self, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
-        let crossing = Crossing::of(self.ends(at)).filter(|crossing| {
-            crossing.sine >= LEAST_SINE && crossing.excess().iter().all(|&excess| excess <= ROUNDING)
+    /// Whether edges that press on each other are where they may.
+    pub(super) fn is_about(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> bool {
+        const ABOUT: f64 = 0.25;
+        self.miss(crossing, at) <= ABOUT
+    }
+
+    /// Where the edges meet, seen so that the gap is positive outside.
+    pub(super) fn meeting(&self, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
+        let crossing = Crossing::of(self.ends(at)).filter(|crossing| crossing.sine >= LEAST_SINE)?;
+        [crossing, crossing.turned()].into_iter().find(|crossing| self.miss(crossing, at) <= ROUNDING)
+    }
+
+    /// The lines through edges that meet within a distance of `reach` and the way, or that may come to meet
+    /// within a step in which they move against each other by a way of about this length.
+    pub(super) fn near(&self, reach: f64, way: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
+        let ends = self.ends(at);
+        let lengths = ends.map(|[from, to]| norm(sub(to, from)));
+        let crossing = Crossing::of(ends).filter(|crossing| {
+            let mut excess = crossing.excess().into_iter().zip(lengths);
+            crossing.sine >= LEAST_SINE
+                && crossing.gap.abs() <= reach + way
+                && excess.all(|(excess, length)| excess * length <= UNFORESEEN * length + 2.0 * way)
         })?;
-        [crossing, crossing.turned()].into_iter().find(|crossing| self.has_normal(crossing, ROUNDING, at))
-    }
-
-    /// The same within a distance and a depth of `range`.
-    pub(super) fn meet_within(&self, range: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
-        let crossing = self.meet(at).filter(|crossing| crossing.gap.abs() <= range)?;
-        let deep = crossing.gap < -SHALLOW * self.shorter(at);
-        (!deep || self.is_inside(&crossing, at)).then_some(crossing)
-    }
-
-    /// The lines as they are now, if velocities bring the edges on each other within the time `ahead`.
-    pub(super) fn meet_ahead(
-        &self,
-        ahead: f64,
-        at: &impl Fn(usize) -> Point,
-        velocity: &impl Fn(usize) -> Point,
-    ) -> Option<Crossing> {
-        let by = self.ends(velocity).map(|ends| ends.map(|v| v.map(|v| ahead * v)));
-        let ways = Ways::new(self.ends(at), by);
-        let entry = ways.meetings().find_map(|share| {
-            let then = |node: usize| add_scaled(at(node), share * ahead, velocity(node));
-            let crossing = self.meet(&then)?;
-            (dot(crossing.normal, motion(by, crossing.shares)) < 0.0).then_some(crossing)
-        })?;
-        let now = Crossing::of(ways.at(0.0)).filter(|now| now.sine >= LEAST_SINE)?;
-        let now = now.as_seen_along(entry.normal);
-        (now.gap >= 0.0 && now.excess().iter().all(|&excess| excess <= AHEAD)).then_some(now)
-    }
-
-    /// Whether edges that a search has found, held or ahead, can press on each other there.
-    pub(super) fn stays(&self, crossing: &Crossing, held: bool, at: &impl Fn(usize) -> Point) -> bool {
-        let beyond = if held { BEYOND } else { ROUNDING };
-        crossing.excess().iter().all(|&excess| excess <= beyond) && self.has_normal(crossing, BEYOND, at)
+        let shorter = lengths[0].min(lengths[1]);
+        let turn = (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN);
+        let deepest = reach.min(DEEPEST * shorter) + way;
+        let [first, second] = self.edges;
+        let is_near = |crossing: &Crossing| {
+            let (normal, back, [s, t]) = (crossing.normal, crossing.normal.map(|x| -x), crossing.shares);
+            crossing.gap >= -deepest
+                && first.miss(back, s, self.surfaces[0], at) <= turn
+                && second.miss(normal, t, self.surfaces[1], at) <= turn
+        };
+        [crossing, crossing.turned()].into_iter().find(is_near)
     }
 }
 

@@ -39,31 +39,30 @@ impl<T: Real> EdgeToEdge<T> {
 
     fn look_along(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
-        let swept = |pair: &Pair<'_>, k: usize| {
-            Bounds::of_points(pair.edges[k].nodes.into_iter().flat_map(|node| [start(node), end(node)]))
-        };
-        let others = Bounds::of_points(self.bodies[1].iter().flat_map(|&node| [start(node), end(node)]));
+        for (row, &index) in self.rows.pairs.iter().enumerate() {
+            if let Err((what, way, gap)) = self.look_at_row(row, step, &self.pair(index), (&start, &end)) {
+                return Err(step.refuse((index[0], index[1]), what, way, gap));
+            }
+        }
+        let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
+        let others = swept(&self.bodies[1]);
         // Lists know what an edge may meet, unless it was faster than its velocity promised.
         let listed = longest <= self.listed;
-        for first in 0..self.edges[0].len() {
+        for (first, edge) in self.edges[0].iter().enumerate() {
+            let bounds = swept(&edge.nodes);
+            if !bounds.intersects(&others) {
+                continue;
+            }
             let list = listed.then(|| self.neighborhood.of(first));
-            let count = list.map_or(self.edges[1].len(), <[usize]>::len);
-            for k in 0..count {
+            for k in 0..list.map_or(self.edges[1].len(), <[usize]>::len) {
                 let index = [first, list.map_or(k, |list| list[k])];
                 let pair = self.pair(index);
-                if k == 0 && !swept(&pair, 0).intersects(&others) {
-                    break;
-                }
-                let row = self.rows.pairs.binary_search(&index).ok();
-                if row.is_none() && !swept(&pair, 0).intersects(&swept(&pair, 1)) {
+                // What a spring stops goes in.
+                let springs = self.law.is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
+                if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
                     continue;
                 }
-                let looked = match row {
-                    Some(row) => self.look_at_row(row, step, &pair, (&start, &end)),
-                    None => Ok(()),
-                };
-                let looked = looked.and_then(|()| self.look_at_way(row.is_some(), &pair, (&start, &end)));
-                if let Err((what, way, gap)) = looked {
+                if let Err((what, way, gap)) = self.look_at_way(&pair, (&start, &end)) {
                     return Err(step.refuse((index[0], index[1]), what, way, gap));
                 }
             }
@@ -82,18 +81,18 @@ impl<T: Real> EdgeToEdge<T> {
         if step.closed[0][row] || !step.closed[1][row] {
             return Ok(());
         }
-        let stand = &self.rows.stands[row];
+        let normal = self.rows.crossings[row].normal;
         let [before, after] = [pair.ends(start), pair.ends(end)];
         let Some([from, to]) = Crossing::of(before).zip(Crossing::of(after)).map(<[Crossing; 2]>::from) else {
             return Ok(());
         };
-        let [from, to] = [from, to].map(|crossing| crossing.as_seen_along(stand.crossing.normal));
+        let [from, to] = [from, to].map(|crossing| crossing.as_seen_along(normal));
         let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
         let way = norm(motion(by, to.shares));
         if way <= FINE * self.finest {
             return Ok(());
         }
-        if !pair.stays(&to, true, end) {
+        if !pair.is_about(&to, end) {
             return Err(("was stopped where the edges do not meet", way, from.gap));
         }
         if to.gap.abs() > LARGEST_MISS * way {
@@ -111,7 +110,6 @@ impl<T: Real> EdgeToEdge<T> {
     /// Says whether the edges have gone into each other on their ways, and how deep.
     fn look_at_way(
         &self,
-        has_row: bool,
         pair: &Pair<'_>,
         (start, end): (&impl Fn(usize) -> Point, &impl Fn(usize) -> Point),
     ) -> std::result::Result<(), (&'static str, f64, f64)> {
@@ -119,13 +117,9 @@ impl<T: Real> EdgeToEdge<T> {
         let after = pair.ends(end);
         let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
         let ways = Ways::new(before, by);
-        // What a spring stops goes in.
-        if has_row && self.law.is_compliant() {
-            return Ok(());
-        }
         for share in ways.meetings() {
             let then = |node: usize| add_scaled(start(node), share, sub(end(node), start(node)));
-            let Some(entry) = pair.meet(&then) else { continue };
+            let Some(entry) = pair.meeting(&then) else { continue };
             let along = motion(by, entry.shares);
             let way = norm(along);
             if dot(entry.normal, along) >= 0.0 || way <= FINE * self.finest {
