@@ -7,7 +7,7 @@ mod passage;
 mod rows;
 
 use super::obstacle::across;
-use super::surface::{Bounds, Facet, Neighborhood, Nodes, Point, Surface, add_scaled, norm, sub};
+use super::surface::{Bounds, Facet, Neighborhood, Nodes, Point, Surface, add_scaled, sub};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -47,9 +47,9 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// ([`search`](ContactConstraint::search)): edges that meet, and those that may come to meet within the step, by their
 /// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
 /// contact of the step. [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the
-/// closest points lie beyond an end, or the normal outside of those of a body, the gap is larger than that of the lines
-/// by four times the share of the shorter edge (the sine): it is continuous where edges come to meet or slide off
-/// each other, and the row is that of the lines. Geometry is computed in `f64` in every run.
+/// closest points lie beyond an end, the gap is larger than that of the lines by twice what they are beyond, and its row
+/// the derivative of that: gaps are continuous where edges come to meet or slide off each other. Geometry is computed
+/// in `f64` in every run.
 ///
 /// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an
 /// eighth of the smallest one have gone into each other by more than a tenth of their way, taken as straight, or were
@@ -251,10 +251,9 @@ impl<T: Real> EdgeToEdge<T> {
         nodes.read_bodies(&self.bodies)?;
         self.acts.clear();
         self.acts.resize(nodes.dofs().len(), false);
-        self.finest = f64::INFINITY;
+        self.finest = edges.iter().flatten().map(|edge| edge.length).fold(f64::INFINITY, f64::min);
         for &[from, to] in self.ends_of.iter().flatten() {
             nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
-            self.finest = self.finest.min(norm(sub(nodes.coordinates[to], nodes.coordinates[from])));
         }
         self.built_at.clear();
         self.rows.clear();
@@ -299,7 +298,7 @@ impl<T: Real> EdgeToEdge<T> {
                 }
                 if let Some(crossing) = pair.near(*reach, way, &at) {
                     let names = (pair.nodes(), |node| nodes.places(node));
-                    found.push([first, second], (crossing, pair.gap(&crossing, &at)), names, u);
+                    found.push(([first, second], crossing), pair.row(&crossing, &at), names, u);
                 }
             }
         }
@@ -377,7 +376,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             match crossing.map(|crossing| crossing.as_seen_along(before.normal)) {
                 Some(crossing) => {
                     let names = (pair.nodes(), |node| nodes.places(node));
-                    found.push(index, (crossing, pair.gap(&crossing, &at)), names, u);
+                    found.push((index, crossing), pair.row(&crossing, &at), names, u);
                 }
                 None => found.keep(rows, row),
             }
@@ -400,7 +399,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             let pair = self.pair(index);
             let at = |node: usize| add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
             let velocity = |node: usize| self.nodes.vector(node, v);
-            let acceleration = crossing.acceleration(pair.ends(&at), pair.ends(&velocity));
+            let acceleration = pair.acceleration(crossing, &at, &velocity);
             *rates = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
         }
         Ok(Rates::Given)

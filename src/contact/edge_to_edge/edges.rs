@@ -1,12 +1,14 @@
 //! The edges of a surface: convex sides between facets that turn, and the normals that a body has there.
 
-use crate::contact::surface::{Bounds, Point, Shape, Surface, add_scaled, cross, dot, sub, unit};
+use crate::contact::surface::{Bounds, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
 
 /// A side that two facets share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
     /// Its two nodes, the smaller one first.
     pub(super) nodes: [usize; 2],
+    /// Its length in the reference coordinates.
+    pub(super) length: f64,
     /// The facet that has them in this order, and which of its sides that is; then the facet that has them in the other.
     sides: [(usize, usize); 2],
 }
@@ -49,7 +51,8 @@ impl Edge {
             for (side, &first) in nodes.iter().enumerate() {
                 let second = nodes[(side + 1) % nodes.len()];
                 let Some(across) = surface.neighbor(facet, side).filter(|_| first < second) else { continue };
-                let edge = Self { nodes: [first, second], sides: [(facet, side), across] };
+                let length = norm(sub(coordinates[second], coordinates[first]));
+                let edge = Self { nodes: [first, second], length, sides: [(facet, side), across] };
                 let wedge = edge.wedge(0.5, surface, &|node| coordinates[node]);
                 if wedge.is_some_and(|wedge| wedge.turn() > angle) {
                     edges.push(edge);

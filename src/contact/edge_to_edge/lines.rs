@@ -55,6 +55,23 @@ impl Crossing {
         [1.0 - s, s, t - 1.0, -t]
     }
 
+    /// The derivatives of one of the shares by the positions of the four ends.
+    ///
+    /// With r = x_e − x_f = g n and w = δx_e − δx_f at fixed shares, r·d = r·c = 0 along both edges d and c give
+    /// d·d δs − c·d δt = −(w·d + r·δd) and d·c δs − c·c δt = −(w·c + r·δc).
+    pub(super) fn share_gradient(&self, edge: usize, [e, f]: [Ends; 2]) -> [Point; 4] {
+        let (d, c) = (sub(e[1], e[0]), sub(f[1], f[0]));
+        let (dd, dc, cc) = (dot(d, d), dot(d, c), dot(c, c));
+        let square = norm(cross(d, c)).powi(2);
+        // Factors of w·d + r·δd and of w·c + r·δc.
+        let [by_first, by_second] = if edge == 0 { [-cc, dc] } else { [-dc, dd] }.map(|x| x / square);
+        let apart = self.normal.map(|x| self.gap * x);
+        let moved = add_scaled(d.map(|x| by_first * x), by_second, c);
+        let turned = [-by_first, by_first, -by_second, by_second];
+        let weights = self.weights();
+        [0, 1, 2, 3].map(|k| add_scaled(moved.map(|x| weights[k] * x), turned[k], apart))
+    }
+
     /// d²g/dτ² of two edges whose ends move in straight lines, at velocities `v`.
     ///
     /// With N = t_e × t_f and r from any point of the second line to any point of the first that move with the edges,
@@ -158,6 +175,28 @@ mod tests {
         let ways = Ways::new([falling, still], [[[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]], [[0.0; 3]; 2]]);
         let times: Vec<f64> = ways.meetings().collect();
         assert!(times.len() == 1 && (times[0] - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn derivatives_of_shares_are_those_of_differences() {
+        let ends = [[[-0.7, 0.1, 0.3], [0.9, -0.2, 0.4]], [[0.1, -1.2, 0.0], [-0.2, 0.8, 0.1]]];
+        let crossing = Crossing::of(ends).unwrap();
+        for edge in [0, 1] {
+            // (The same seen from either side.)
+            for seen in [crossing, crossing.turned()] {
+                for (k, gradient) in seen.share_gradient(edge, ends).into_iter().enumerate() {
+                    for (axis, entry) in gradient.into_iter().enumerate() {
+                        let share = |by: f64| {
+                            let mut moved = ends;
+                            moved[k / 2][k % 2][axis] += by;
+                            Crossing::of(moved).unwrap().shares[edge]
+                        };
+                        let difference = (share(1e-5) - share(-1e-5)) / 2e-5;
+                        assert!((entry - difference).abs() < 1e-8, "{entry} {difference}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! Which pairs of edges press on each other, and which may come to within a step.
+//! Two edges and the bodies behind them: whether they meet, whether they may come to within a step, and their gap.
 
 use super::edges::Edge;
-use super::lines::Crossing;
-use crate::contact::surface::{Bounds, Point, Surface, norm, sub};
+use super::lines::{Crossing, Ways};
+use crate::contact::surface::{Bounds, Point, Surface, add_scaled, sub};
 
 /// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
 /// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
@@ -15,11 +15,11 @@ const ROUNDING: f64 = 1e-9;
 /// Depth, in shares of the shorter edge, up to which a pair is kept whatever the shape of the bodies behind.
 const SHALLOW: f64 = 1e-3;
 
-/// How steeply the gap opens where edges miss each other.
-const STEEP: f64 = 4.0;
+/// How steeply the gap opens beyond the end of an edge.
+const STEEP: f64 = 2.0;
 
-/// Depth in shares of the shorter edge, beside the way of a step, beyond which two lines are far sides of bodies, not edges that
-/// have crossed.
+/// Depth in shares of the shorter edge, beside the way of a step, beyond which two lines are far sides of bodies, not
+/// edges that have crossed.
 const DEEPEST: f64 = 0.25;
 
 /// What a step may change beside the way of its velocities, in shares of an edge; the sine by which normals may turn
@@ -51,27 +51,21 @@ impl Pair<'_> {
         one.farthest(&other)
     }
 
-    fn shorter(&self, at: &impl Fn(usize) -> Point) -> f64 {
-        let [one, other] = self.ends(at).map(|[from, to]| norm(sub(to, from)));
-        one.min(other)
+    fn shorter(&self) -> f64 {
+        self.edges[0].length.min(self.edges[1].length)
+    }
+
+    /// Sine of the angle by which the normal, turned, is none of the first body, or as it is none of the second.
+    fn misses_normal(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
+        let ([first, second], [s, t]) = (self.edges, crossing.shares);
+        let turned = first.miss(crossing.normal.map(|x| -x), s, self.surfaces[0], at);
+        turned.max(second.miss(crossing.normal, t, self.surfaces[1], at))
     }
 
     /// By how much edges miss each other at their closest points, zero if they meet there: shares of the edges beyond
-    /// their ends, and sines by which the normal, turned, is none of the first body, or as it is none of the second.
+    /// their ends, and that sine.
     fn miss(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
-        let ([first, second], [s, t]) = (self.edges, crossing.shares);
-        let turned = first.miss(crossing.normal.map(|x| -x), s, self.surfaces[0], at);
-        let miss = turned.max(second.miss(crossing.normal, t, self.surfaces[1], at));
-        crossing.excess().into_iter().fold(miss, f64::max)
-    }
-
-    /// The gap of the edges: that of the lines where they meet. Where they miss each other it opens by so many times
-    /// what they miss, so that it is continuous; lines that cross behind acute edges, outside of the bodies, are open.
-    pub(super) fn gap(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
-        let shorter = self.shorter(at);
-        let open = crossing.gap + STEEP * shorter * self.miss(crossing, at);
-        let outside = open < -SHALLOW * shorter && !self.is_inside(crossing, at);
-        if outside { -open } else { open }
+        crossing.excess().into_iter().fold(self.misses_normal(crossing, at), f64::max)
     }
 
     /// Whether each edge is in the body of the other, if the gap is negative.
@@ -94,28 +88,68 @@ impl Pair<'_> {
         [crossing, crossing.turned()].into_iter().find(|crossing| self.miss(crossing, at) <= ROUNDING)
     }
 
-    /// The lines through edges that meet within a distance of `reach` and the way, or that may come to meet
-    /// within a step in which they move against each other by a way of about this length.
+    /// The lines through edges that meet within a distance of `reach` and the way, or that may come to meet within a
+    /// step in which they move against each other by a way of about this length.
     pub(super) fn near(&self, reach: f64, way: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
-        let ends = self.ends(at);
-        let lengths = ends.map(|[from, to]| norm(sub(to, from)));
-        let crossing = Crossing::of(ends).filter(|crossing| {
-            let mut excess = crossing.excess().into_iter().zip(lengths);
+        let crossing = Crossing::of(self.ends(at)).filter(|crossing| {
+            let mut excess = crossing.excess().into_iter().zip(self.edges);
             crossing.sine >= LEAST_SINE
                 && crossing.gap.abs() <= reach + way
-                && excess.all(|(excess, length)| excess * length <= UNFORESEEN * length + 2.0 * way)
+                && excess.all(|(excess, edge)| excess * edge.length <= UNFORESEEN * edge.length + 2.0 * way)
         })?;
-        let shorter = lengths[0].min(lengths[1]);
+        let shorter = self.shorter();
         let turn = (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN);
         let deepest = reach.min(DEEPEST * shorter) + way;
-        let [first, second] = self.edges;
         let is_near = |crossing: &Crossing| {
-            let (normal, back, [s, t]) = (crossing.normal, crossing.normal.map(|x| -x), crossing.shares);
-            crossing.gap >= -deepest
-                && first.miss(back, s, self.surfaces[0], at) <= turn
-                && second.miss(normal, t, self.surfaces[1], at) <= turn
+            let misses = self.misses_normal(crossing, at);
+            // What is in already must be in the bodies, and meet; what comes must come from outside.
+            let inside = || misses <= ROUNDING && crossing.gap >= -deepest && self.is_inside(crossing, at);
+            misses <= turn && (crossing.gap >= -SHALLOW * shorter || inside())
         };
         [crossing, crossing.turned()].into_iter().find(is_near)
+    }
+
+    /// The edge whose end the closest points lie farther beyond (as a length), if any, and by how much.
+    fn beyond(&self, crossing: &Crossing) -> Option<(usize, f64)> {
+        let excess = crossing.excess();
+        let [one, other] = [0, 1].map(|edge| excess[edge] * self.edges[edge].length);
+        let (edge, length) = if one >= other { (0, one) } else { (1, other) };
+        (length > 0.0).then_some((edge, length))
+    }
+
+    /// What the gap opens by with the share of an edge beyond whose end the closest points lie.
+    fn slope(&self, crossing: &Crossing, edge: usize) -> f64 {
+        let slope = STEEP * self.edges[edge].length;
+        if crossing.shares[edge] < 0.0 { -slope } else { slope }
+    }
+
+    /// The gap of the edges, and its derivatives by the positions of the four ends: those of the lines where closest
+    /// points are on the edges. Beyond an end the gap opens by so many times what they are beyond: so it is continuous.
+    pub(super) fn row(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> (f64, [Point; 4]) {
+        let row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
+        let Some((edge, length)) = self.beyond(crossing) else { return (crossing.gap, row) };
+        let (slope, gradient) = (self.slope(crossing, edge), crossing.share_gradient(edge, self.ends(at)));
+        (crossing.gap + STEEP * length, [0, 1, 2, 3].map(|k| add_scaled(row[k], slope, gradient[k])))
+    }
+
+    /// d²g/dτ² of that gap along straight ways at some velocities. (Of what the closest points are beyond an end, from
+    /// differences.)
+    pub(super) fn acceleration(
+        &self,
+        crossing: &Crossing,
+        at: &impl Fn(usize) -> Point,
+        velocity: &impl Fn(usize) -> Point,
+    ) -> f64 {
+        const STEP: f64 = 1e-3;
+        let (ends, speeds) = (self.ends(at), self.ends(velocity));
+        let lines = crossing.acceleration(ends, speeds);
+        let way = self.way(velocity);
+        let Some((edge, _)) = self.beyond(crossing).filter(|_| way > 0.0) else { return lines };
+        let time = STEP * self.shorter() / way;
+        let ways = Ways::new(ends, speeds);
+        let share = |time: f64| Crossing::of(ways.at(time)).map_or(crossing.shares[edge], |then| then.shares[edge]);
+        let second = (share(time) - 2.0 * share(0.0) + share(-time)) / (time * time);
+        lines + self.slope(crossing, edge) * second
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::lines::Crossing;
 use crate::contact::affine_rows::AffineRows;
+use crate::contact::surface::Point;
 use crate::real::Real;
 
 /// The rows that a search found, where they are linearized.
@@ -25,18 +26,15 @@ impl<T: Real> Rows<T> {
         self.crossings.clear();
     }
 
-    /// Appends the row of two edges with a gap, by their four nodes.
+    /// Appends the row of two edges: their four nodes, the gap and its derivatives by the positions of these.
     pub(super) fn push<'a>(
         &mut self,
-        pair: [usize; 2],
-        (crossing, gap): (Crossing, f64),
+        (pair, crossing): ([usize; 2], Crossing),
+        (gap, row): (f64, [Point; 4]),
         (nodes, places): ([usize; 4], impl Fn(usize) -> &'a [usize]),
         u: &[T],
     ) {
-        let entries = nodes.into_iter().zip(crossing.weights()).flat_map(|(node, share)| {
-            let along = crossing.normal.map(|component| share * component);
-            places(node).iter().copied().zip(along)
-        });
+        let entries = nodes.into_iter().zip(row).flat_map(|(node, weights)| places(node).iter().copied().zip(weights));
         self.affine.push(gap, entries, u);
         self.pairs.push(pair);
         self.crossings.push(crossing);
