@@ -13,10 +13,6 @@ use std::error::Error;
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("surfaces")?;
     let quick = output.quick;
-    if std::env::var_os("CORNERS").is_some() {
-        println!("{}", corners::table(quick)?);
-        return Ok(());
-    }
     let tables =
         [patch::table(quick)?, ironing::table(quick)?, rings::table(quick)?, corners::table(quick)?].join("\n");
     println!("{tables}");

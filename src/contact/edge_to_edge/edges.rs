@@ -1,6 +1,6 @@
 //! The edges of a surface: convex sides between facets that turn, and the normals that a body has there.
 
-use crate::contact::surface::{Bounds, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
+use crate::contact::surface::{Bounds, Facet, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
 
 /// A side that two facets share.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ impl Edge {
     /// The convex edges of a surface around which it turns by more than an angle, in the order of their nodes.
     pub(super) fn of(surface: &Surface, angle: f64, coordinates: &[Point]) -> Vec<Self> {
         let mut edges = Vec::new();
-        for (facet, nodes) in surface.facets().iter().map(|facet| facet.nodes()).enumerate() {
+        for (facet, nodes) in surface.facets().iter().map(Facet::nodes).enumerate() {
             for (side, &first) in nodes.iter().enumerate() {
                 let second = nodes[(side + 1) % nodes.len()];
                 let Some(across) = surface.neighbor(facet, side).filter(|_| first < second) else { continue };

@@ -12,11 +12,13 @@ pub(super) const LEAST_SINE: f64 = 0.05;
 /// Shares of an edge, and sines, that are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Depth, in shares of the shorter edge, up to which a pair is kept whatever the shape of the bodies behind.
+/// Depth, in shares of the shorter edge, up to which a pair is kept whatever the shape of the bodies behind, and by
+/// which edges that are in each other come out in a step: all at once would throw them.
 const SHALLOW: f64 = 1e-3;
 
-/// How steeply the gap opens beyond the end of an edge.
+/// How steeply the gap opens beyond the end of an edge, and the share of the edge in which it comes to.
 const STEEP: f64 = 2.0;
+const WIDTH: f64 = 0.1;
 
 /// Depth in shares of the shorter edge, beside the way of a step, beyond which two lines are far sides of bodies, not
 /// edges that have crossed.
@@ -109,31 +111,34 @@ impl Pair<'_> {
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
 
-    /// The edge whose end the closest points lie farther beyond (as a length), if any, and by how much.
-    fn beyond(&self, crossing: &Crossing) -> Option<(usize, f64)> {
-        let excess = crossing.excess();
-        let [one, other] = [0, 1].map(|edge| excess[edge] * self.edges[edge].length);
-        let (edge, length) = if one >= other { (0, one) } else { (1, other) };
-        (length > 0.0).then_some((edge, length))
+    /// The depth that edges found inside keep for a step: all but what comes out in one.
+    pub(super) fn kept_inside(&self, gap: f64) -> f64 {
+        (-gap - SHALLOW * self.shorter()).max(0.0)
     }
 
-    /// What the gap opens by with the share of an edge beyond whose end the closest points lie.
-    fn slope(&self, crossing: &Crossing, edge: usize) -> f64 {
-        let slope = STEEP * self.edges[edge].length;
-        if crossing.shares[edge] < 0.0 { -slope } else { slope }
+    /// The edge beyond whose end the closest points lie, if any, and the opening of the gap for it with its derivatives
+    /// by the share of that edge: a x²/(x + w) in lengths of the edge, x being what they are beyond.
+    fn opening(&self, crossing: &Crossing) -> Option<(usize, [f64; 3])> {
+        let excess = crossing.excess();
+        let [one, other] = [0, 1].map(|edge| excess[edge] * self.edges[edge].length);
+        let edge = usize::from(one < other);
+        let (x, w) = (excess[edge], WIDTH);
+        let size = STEEP * self.edges[edge].length;
+        let outward = if crossing.shares[edge] < 0.0 { -size } else { size };
+        let value = [size * x * x / (x + w), outward * x * (x + 2.0 * w), size * 2.0 * w * w];
+        (x > 0.0).then(|| (edge, [value[0], value[1] / (x + w).powi(2), value[2] / (x + w).powi(3)]))
     }
 
     /// The gap of the edges, and its derivatives by the positions of the four ends: those of the lines where closest
-    /// points are on the edges. Beyond an end the gap opens by so many times what they are beyond: so it is continuous.
+    /// points are on the edges. Beyond an end the gap opens, slowly at first, so that both are continuous.
     pub(super) fn row(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> (f64, [Point; 4]) {
         let row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
-        let Some((edge, length)) = self.beyond(crossing) else { return (crossing.gap, row) };
-        let (slope, gradient) = (self.slope(crossing, edge), crossing.share_gradient(edge, self.ends(at)));
-        (crossing.gap + STEEP * length, [0, 1, 2, 3].map(|k| add_scaled(row[k], slope, gradient[k])))
+        let Some((edge, [opening, slope, _])) = self.opening(crossing) else { return (crossing.gap, row) };
+        let gradient = crossing.share_gradient(edge, self.ends(at));
+        (crossing.gap + opening, [0, 1, 2, 3].map(|k| add_scaled(row[k], slope, gradient[k])))
     }
 
-    /// d²g/dτ² of that gap along straight ways at some velocities. (Of what the closest points are beyond an end, from
-    /// differences.)
+    /// d²g/dτ² of that gap along straight ways at some velocities. (Shares beyond an end from differences.)
     pub(super) fn acceleration(
         &self,
         crossing: &Crossing,
@@ -144,12 +149,13 @@ impl Pair<'_> {
         let (ends, speeds) = (self.ends(at), self.ends(velocity));
         let lines = crossing.acceleration(ends, speeds);
         let way = self.way(velocity);
-        let Some((edge, _)) = self.beyond(crossing).filter(|_| way > 0.0) else { return lines };
+        let Some((edge, [_, slope, bend])) = self.opening(crossing).filter(|_| way > 0.0) else { return lines };
         let time = STEP * self.shorter() / way;
         let ways = Ways::new(ends, speeds);
         let share = |time: f64| Crossing::of(ways.at(time)).map_or(crossing.shares[edge], |then| then.shares[edge]);
-        let second = (share(time) - 2.0 * share(0.0) + share(-time)) / (time * time);
-        lines + self.slope(crossing, edge) * second
+        let [before, now, after] = [-time, 0.0, time].map(share);
+        let (first, second) = ((after - before) / (2.0 * time), (after - 2.0 * now + before) / (time * time));
+        lines + slope * second + bend * first * first
     }
 }
 

@@ -95,7 +95,7 @@ impl<T: Real> EdgeToEdge<T> {
         if !pair.is_about(&to, end) {
             return Err(("was stopped where the edges do not meet", way, from.gap));
         }
-        if to.gap.abs() > LARGEST_MISS * way {
+        if (to.gap + self.rows.inside[row]).abs() > LARGEST_MISS * way {
             return Err(("was stopped away from the other edge", way, from.gap));
         }
         let speed = motion(pair.ends(&|node| self.nodes.vector(node, step.v)), from.shares);
