@@ -85,7 +85,6 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// ];
 /// let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
 /// let (below, above) = ([[0, 1, 3], [1, 0, 2]], [[4, 5, 7], [5, 4, 6]]);
-/// let above = above.map(|[a, b, c]| [b, a, c]); // seen from below
 /// let mut contact = EdgeToEdge::new(&coordinates, &dofs, above, below)?;
 /// assert_eq!(contact.edges(), [[[4, 5]], [[0, 1]]]);
 ///
