@@ -5,6 +5,8 @@ mod affine_rows;
 mod constraint;
 mod contacts;
 mod dofs;
+#[cfg(feature = "search")]
+mod edge_to_edge;
 mod gap_function;
 mod gaps;
 mod groups;
@@ -26,6 +28,8 @@ mod tie;
 
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub use contacts::{Contact, Contacts};
+#[cfg(feature = "search")]
+pub use edge_to_edge::EdgeToEdge;
 pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps, rounding};
 pub(crate) use groups::Groups;

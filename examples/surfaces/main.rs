@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
+mod corners;
 mod ironing;
 mod patch;
 mod rings;
@@ -13,7 +14,14 @@ use std::error::Error;
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("surfaces")?;
     let quick = output.quick;
-    let tables = [patch::table(quick)?, ties::table(quick)?, ironing::table(quick)?, rings::table(quick)?].join("\n");
+    let tables = [
+        patch::table(quick)?,
+        ties::table(quick)?,
+        ironing::table(quick)?,
+        rings::table(quick)?,
+        corners::table(quick)?,
+    ]
+    .join("\n");
     println!("{tables}");
     output.write("surfaces.md", &tables)
 }

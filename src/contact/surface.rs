@@ -267,6 +267,11 @@ impl Surface {
         self.rims[facet].sides
     }
 
+    /// The facet across a side of a facet, and which of its sides that is; none where the surface ends.
+    pub(crate) fn neighbor(&self, facet: usize, side: usize) -> Option<(usize, usize)> {
+        self.neighbors[facet][side]
+    }
+
     /// The closest point of a facet, with the shape of the facet.
     pub(crate) fn project(&self, facet: usize, p: Point, positions: &[Point]) -> Option<(Shape, Foot)> {
         self.project_beyond(facet, p, RIM, positions)

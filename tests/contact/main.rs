@@ -3,6 +3,7 @@
 mod bipenalty;
 mod constraints;
 mod curved;
+mod edges;
 mod gap_function;
 mod itself;
 mod laws;

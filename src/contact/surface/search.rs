@@ -99,9 +99,19 @@ impl Neighborhood {
         positions: &[Point],
         range: f64,
     ) {
+        let facets = surface.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
+        self.build_among(boxes, facets, range);
+    }
+
+    /// Lists anew, for each box, which of the others are within `range` of it.
+    pub(crate) fn build_among(
+        &mut self,
+        boxes: impl Iterator<Item = Bounds> + Clone,
+        others: impl Iterator<Item = Bounds>,
+        range: f64,
+    ) {
         let all = boxes.clone().reduce(|all, bounds| all.with(&bounds)).unwrap_or(Bounds::EMPTY);
-        let leaves = surface.facets().iter().enumerate().filter_map(|(index, facet)| {
-            let bounds = Bounds::of_corners(&facet.shape(positions));
+        let leaves = others.enumerate().filter_map(|(index, bounds)| {
             let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
             let near = bounds.inflated(range + overhang(&bounds) + rounding);
             let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);

@@ -9,6 +9,7 @@ pub mod damped_contact;
 pub mod decks;
 pub mod disc;
 pub mod drops;
+pub mod falls;
 pub mod frames;
 pub mod ground;
 pub mod hosts;

@@ -1,0 +1,419 @@
+//! Contact of the edges of one deforming body with those of another.
+
+mod edges;
+mod lines;
+mod pairs;
+mod passage;
+mod rows;
+
+use super::obstacle::across;
+use super::surface::{Bounds, Facet, Neighborhood, Nodes, Point, Surface, add_scaled, sub};
+use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
+use crate::error::{Error, Result, positive};
+use crate::real::Real;
+use edges::Edge;
+use lines::Crossing;
+use pairs::{LEAST_SINE, Pair};
+use rows::Rows;
+
+/// The angle by which a surface turns around an edge, if not given: 30°.
+const SHARP: f64 = std::f64::consts::FRAC_PI_6;
+
+/// Contact of the edges of two deforming surfaces in three dimensions, where they cross: beside
+/// [`NodeToFacet`](super::NodeToFacet) or [`Mortar`](super::Mortar) of the same surfaces, which do not see it.
+///
+/// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)). The
+/// lines through an edge e of the first surface and an edge f of the second are closest in x_e and x_f. The pair is in
+/// contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is one of the
+/// second body at f, between the normals of the two facets beside f, and −n one of the first body at e: then n is a
+/// normal of the Minkowski difference of the bodies, and which of the two signs fits is known. The gap is
+///
+/// `g = n · (x_e − x_f)` (length; positive outside).
+///
+/// Its row of G is n times (1 − s, s) on the ends of e and −n times (1 − t, t) on those of f, s and t the places of x_e
+/// and x_f along them. That is the derivative of g, for n is orthogonal to both edges. x_e − x_f is parallel to n: forces
+/// conserve momentum and angular momentum at the configuration where rows are linearized.
+///
+/// # Beside which contact
+///
+/// A pair of edges keeps apart what crosses between nodes; a corner on a facet, a face on a face, edges that are
+/// parallel within 2.9° (sine 0.05) are left to nodes and facets. (Nodes let such edges sink into each other by no more
+/// than half an edge times that sine.) Where an edge ends on another one, both speak: redundant rows share their
+/// multipliers in the least norm.
+///
+/// # Linearization
+///
+/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step
+/// ([`search`](ContactConstraint::search)): edges that meet, and those that may come to meet within the step, by their
+/// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
+/// contact of the step. [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the
+/// closest points lie beyond an end by a share x of an edge of length l, the gap is larger than that of the lines by
+/// 2 l x²/(x + 0.1): gaps and rows are continuous where edges come to meet or slide off each other. Geometry is computed
+/// in `f64` in every run.
+///
+/// Edges that a search finds in each other deeper than a thousandth of the shorter one, because a body has come in
+/// elsewhere, come out by so much in a step: their gaps are measured from there (but for springs). To throw them out at
+/// once would create energy.
+///
+/// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an
+/// eighth of the smallest one have gone into each other by more than a tenth of their way, taken as straight, or were
+/// stopped apart.
+///
+/// # Known failure
+///
+/// - Blocks that fall across an edge of another block, or beside it, gain energy in some falls that gain none without
+///   edges (`docs/contact.md` has a table): nodes on facets find nodes inside there, and throw them out.
+/// - An open rim is no edge: what is behind it is not known. Give the whole surface of a body.
+/// - Edges that are concave, or that turn by less than the angle, are seen by nodes and facets only.
+/// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is another contact:
+///   what a corrector or a friction law remembers of it begins anew.
+/// - Where an edge slides from one side of its mesh to the next it loses some of its speed along it, less than 0.5 %
+///   over two nodes in `tests/contact/edges.rs`.
+///
+/// # Identity
+///
+/// (edge of the first surface, edge of the second): indices in [`edges`](Self::edges).
+///
+/// ```
+/// use contact_dynamics::ContactConstraint;
+/// use contact_dynamics::contact::{Contacts, EdgeToEdge};
+///
+/// // Two roofs: a ridge along x below, one along y upside down 0.1 above it.
+/// let coordinates = [
+///     [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 1.0, -1.0],
+///     [0.0, -1.0, 0.1], [0.0, 1.0, 0.1], [-1.0, 0.0, 1.1], [1.0, 0.0, 1.1],
+/// ];
+/// let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+/// let (below, above) = ([[0, 1, 3], [1, 0, 2]], [[4, 5, 7], [5, 4, 6]]);
+/// let mut contact = EdgeToEdge::new(&coordinates, &dofs, above, below)?;
+/// assert_eq!(contact.edges(), [[[4, 5]], [[0, 1]]]);
+///
+/// let zero = [0.0; 24];
+/// contact.search(0.0, &zero, &zero, 0.0)?;
+/// let contacts = Contacts::of(&contact);
+/// assert_eq!((contacts.len(), contacts.name(0), contacts.normal(0)), (1, (0, 0), Some([0.0, 0.0, 1.0])));
+/// let weights: Vec<f64> = contacts.row(0).map(|(_, weight)| weight).collect();
+/// assert_eq!(weights, [0.5, 0.5, -0.5, -0.5]);
+/// let mut gap = [0.0];
+/// contact.gaps(0.0, &zero, &mut gap)?;
+/// assert!((gap[0] - 0.1_f64).abs() < 1e-15);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct EdgeToEdge<T: Real> {
+    nodes: Nodes,
+    surfaces: [Surface; 2],
+    edges: [Vec<Edge>; 2],
+    /// Nodes of the edges, by edge.
+    ends_of: [Vec<[usize; 2]>; 2],
+    /// Nodes of the edges and of the facets beside them.
+    bodies: [Vec<usize>; 2],
+    /// For each dof whether an edge has it.
+    acts: Vec<bool>,
+    /// The shortest edge, in the reference coordinates.
+    finest: f64,
+    law: ContactLaw,
+    friction: f64,
+    reach: f64,
+    skin: Option<f64>,
+    /// Edges of the second surface near each of the first.
+    neighborhood: Neighborhood,
+    /// How far from an edge the lists hold all others, where they were built.
+    listed: f64,
+    /// Positions when the lists were built, by node.
+    built_at: Vec<Point>,
+    /// Positions at the start and at the end of a step, by node.
+    ends: [Vec<Point>; 2],
+    rows: Rows<T>,
+    /// What the search under way finds.
+    found: Rows<T>,
+}
+
+impl<T: Real> EdgeToEdge<T> {
+    /// Contact of the edges of the facets `one` with those of the facets `other`.
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, and `dofs` the dofs of their displacements;
+    /// facets are triangles and quadrilaterals that name nodes by their index there, and their normals point out of the
+    /// bodies ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
+    /// [`with_law`](Self::with_law) gives another. A surface without an edge, as a ball's, is no error: there are no
+    /// candidates.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] if the lists differ in length, if a facet is a segment, or if a node does not exist;
+    /// [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
+    /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
+    /// [`Error::Incompatible`] at a branch of a surface, and for nodes that both surfaces have.
+    pub fn new<F: Into<Facet>, G: Into<Facet>>(
+        coordinates: &[[T; 3]],
+        dofs: &[[usize; 3]],
+        one: impl IntoIterator<Item = F>,
+        other: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        let mut nodes = Nodes::new(coordinates, dofs)?;
+        let one = Surface::of_facets(one, 3, &nodes.coordinates)?;
+        let other = Surface::of_facets(other, 3, &nodes.coordinates)?;
+        nodes.read_bodies(&[one.nodes().to_vec(), other.nodes().to_vec()])?;
+        let mut contact = Self {
+            ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
+            nodes,
+            reach: one.typical().max(other.typical()),
+            surfaces: [one, other],
+            edges: [Vec::new(), Vec::new()],
+            ends_of: [Vec::new(), Vec::new()],
+            bodies: [Vec::new(), Vec::new()],
+            acts: Vec::new(),
+            finest: f64::INFINITY,
+            law: ContactLaw::Rigid,
+            friction: 0.0,
+            skin: None,
+            neighborhood: Neighborhood::default(),
+            listed: 0.0,
+            built_at: Vec::new(),
+            rows: Rows::new(),
+            found: Rows::new(),
+        };
+        contact.find_edges(SHARP)?;
+        Ok(contact)
+    }
+
+    /// The law of all rows.
+    #[must_use]
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of the closest point of the first edge
+    /// against that of the second, as material points.
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64) -> Self {
+        self.friction = coefficient;
+        self
+    }
+
+    /// How far (length) outside and inside of each other edges are found at least; by default the mean size of the
+    /// facets, of the coarser surface. What the velocities bring near within a step is found as well.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn reach(mut self, reach: T) -> Result<Self> {
+        self.reach = positive("the reach of a contact search", reach.value())?;
+        self.built_at.clear();
+        Ok(self)
+    }
+
+    /// How far (length) the surfaces may move relative to each other before lists of near edges are built anew; if not
+    /// given, half of what is searched. It changes the cost, not the result.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless positive and finite.
+    pub fn skin(mut self, skin: T) -> Result<Self> {
+        self.skin = Some(positive("the skin of a contact search", skin.value())?);
+        self.built_at.clear();
+        Ok(self)
+    }
+
+    /// What an edge is: a side around which the surface turns by more than `angle` (radians, between the normals of its
+    /// facets in the reference coordinates) to a convex one; 30° if not given.
+    ///
+    /// What turns less is left to nodes on facets. Two edges of length l that cross in their middles then sink into each
+    /// other by ½ l tan(½ `angle`) at most before a node touches: by 13 % of an element at 30°. Smaller angles make
+    /// edges of the sides of a mesh on a curved surface, at the cost of a search among all of them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless from 0 to π.
+    pub fn sharp(mut self, angle: f64) -> Result<Self> {
+        if !(0.0..=std::f64::consts::PI).contains(&angle) {
+            let name = "the angle of a contact edge";
+            return Err(Error::Parameter { name, value: angle, range: "from 0 to π" });
+        }
+        self.find_edges(angle)?;
+        Ok(self)
+    }
+
+    /// The nodes of the edges of both surfaces, each edge with the smaller number first, in ascending order: features
+    /// are indices in the first list, candidates in the second.
+    pub fn edges(&self) -> [&[[usize; 2]]; 2] {
+        self.ends_of.each_ref().map(Vec::as_slice)
+    }
+
+    fn find_edges(&mut self, angle: f64) -> Result<()> {
+        let Self { nodes, surfaces, edges, .. } = self;
+        for (edges, surface) in edges.iter_mut().zip(&*surfaces) {
+            *edges = Edge::of(surface, angle, &nodes.coordinates);
+        }
+        self.ends_of = edges.each_ref().map(|edges| edges.iter().map(|edge| edge.nodes).collect());
+        for ((body, edges), surface) in self.bodies.iter_mut().zip(&*edges).zip(&*surfaces) {
+            body.clear();
+            body.extend(edges.iter().flat_map(|edge| edge.around(surface)));
+            body.sort_unstable();
+            body.dedup();
+        }
+        nodes.read_bodies(&self.bodies)?;
+        self.acts.clear();
+        self.acts.resize(nodes.dofs().len(), false);
+        self.finest = edges.iter().flatten().map(|edge| edge.length).fold(f64::INFINITY, f64::min);
+        for &[from, to] in self.ends_of.iter().flatten() {
+            nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
+        }
+        self.built_at.clear();
+        self.rows.clear();
+        Ok(())
+    }
+
+    fn pair(&self, [first, second]: [usize; 2]) -> Pair<'_> {
+        pair(&self.edges, &self.surfaces, [first, second])
+    }
+
+    /// Moves the nodes to where they are; returns the boxes of the two surfaces.
+    fn move_nodes(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
+        let [one, other] = &self.bodies;
+        Ok([self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?])
+    }
+
+    /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
+    fn update_lists(&mut self, range: f64) {
+        let moved = |&node: &usize| Some(sub(self.nodes.positions[node], *self.built_at.get(node)?));
+        let [one, other] = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().filter_map(moved)));
+        if !self.built_at.is_empty() && range + one.spread(&other) <= self.listed {
+            return;
+        }
+        self.listed = range + self.skin.unwrap_or(0.5 * range);
+        let [one, other] =
+            self.edges.each_ref().map(|edges| edges.iter().map(|edge| edge.bounds(&self.nodes.positions)));
+        self.neighborhood.build_among(one, other, self.listed);
+        self.built_at.clone_from(&self.nodes.positions);
+    }
+
+    fn find_rows(&mut self, u: &[T], v: &[T], ahead: f64) {
+        let Self { nodes, edges, surfaces, neighborhood, found, reach, law, .. } = self;
+        let at = |node: usize| nodes.positions[node];
+        let velocity = |node: usize| nodes.vector(node, v);
+        for (first, edge) in edges[0].iter().enumerate() {
+            let bounds = edge.bounds(&nodes.positions);
+            for &second in neighborhood.of(first) {
+                let pair = pair(edges, surfaces, [first, second]);
+                let way = ahead * pair.way(&velocity);
+                if !bounds.inflated(*reach + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
+                    continue;
+                }
+                if let Some(crossing) = pair.near(*reach, way, &at) {
+                    let names = (pair.nodes(), |node| nodes.places(node));
+                    let row = pair.row(&crossing, &at);
+                    // (A spring is to be compressed.)
+                    let inside = if law.is_compliant() { 0.0 } else { pair.kept_inside(row.0) };
+                    found.push(([first, second], crossing, inside), row, names, u);
+                }
+            }
+        }
+    }
+}
+
+fn pair<'a>(edges: &'a [Vec<Edge>; 2], surfaces: &'a [Surface; 2], [first, second]: [usize; 2]) -> Pair<'a> {
+    Pair { edges: [&edges[0][first], &edges[1][second]], surfaces: surfaces.each_ref() }
+}
+
+impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
+    fn dofs(&self) -> &[usize] {
+        self.nodes.dofs()
+    }
+
+    fn only_reads(&self, place: usize) -> bool {
+        !self.acts[place]
+    }
+
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        let Rows { affine, pairs, crossings, .. } = &self.rows;
+        for (row, (&index, crossing)) in pairs.iter().zip(crossings).enumerate() {
+            let pair = self.pair(index);
+            let [ends, _] = pair.ends(&|node| self.nodes.positions[node]);
+            let position = Edge::point(ends, crossing.shares[0].clamp(0.0, 1.0));
+            let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let mut contact = contacts.push_row((index[0], index[1]), self.law, (&affine.jacobian, row));
+            contact.magnitude(T::of(size)).position(position.map(T::of)).normal(crossing.normal.map(T::of));
+            if self.friction == 0.0 {
+                continue;
+            }
+            contact.friction(self.friction);
+            for tangent in across(crossing.normal) {
+                let entries = pair.nodes().into_iter().zip(crossing.weights()).flat_map(|(node, share)| {
+                    let places = self.nodes.places(node);
+                    places.iter().zip(tangent).map(move |(&place, along)| (place, T::of(share * along)))
+                });
+                contact.tangent_entries(entries);
+            }
+        }
+    }
+
+    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        check_local(u.len(), self.dofs().len())?;
+        let boxes = self.move_nodes(u)?;
+        let speeds =
+            [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
+        self.found.clear();
+        if self.edges.iter().all(|edges| !edges.is_empty()) {
+            let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+            if boxes[0].inflated(range).intersects(&boxes[1]) {
+                self.update_lists(range);
+                self.find_rows(u, v, ahead);
+            }
+        }
+        let (rows, found) = (&self.rows, &self.found);
+        let same = rows.pairs == found.pairs && rows.affine.jacobian == found.affine.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(Candidates::changed_if(!same))
+    }
+
+    fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
+        check_local(u.len(), self.dofs().len())?;
+        // A trial state that is not finite: the gaps say so.
+        if self.rows.pairs.is_empty() || self.move_nodes(u).is_err() {
+            return Ok(Candidates::Unchanged);
+        }
+        let Self { nodes, edges, surfaces, rows, found, .. } = self;
+        let at = |node: usize| nodes.positions[node];
+        found.clear();
+        for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {
+            let pair = pair(edges, surfaces, index);
+            // Edges that have become parallel: the row stays as it was.
+            let crossing = Crossing::of(pair.ends(&at)).filter(|crossing| crossing.sine >= 0.5 * LEAST_SINE);
+            match crossing.map(|crossing| crossing.as_seen_along(before.normal)) {
+                Some(crossing) => {
+                    let names = (pair.nodes(), |node| nodes.places(node));
+                    found.push((index, crossing, rows.inside[row]), pair.row(&crossing, &at), names, u);
+                }
+                None => found.keep(rows, row),
+            }
+        }
+        let same = rows.affine.jacobian == found.affine.jacobian;
+        std::mem::swap(rows, found);
+        Ok(Candidates::changed_if(!same))
+    }
+
+    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.pairs.len()) {
+            *gap = self.rows.affine.gap(row, u);
+        }
+        Ok(())
+    }
+
+    fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let Rows { pairs, crossings, .. } = &self.rows;
+        for (rates, (&index, crossing)) in rates.iter_mut().zip(pairs.iter().zip(crossings)) {
+            let pair = self.pair(index);
+            let at = |node: usize| add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
+            let velocity = |node: usize| self.nodes.vector(node, v);
+            let acceleration = pair.acceleration(crossing, &at, &velocity);
+            *rates = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
+        }
+        Ok(Rates::Given)
+    }
+
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        self.look_at(step)
+    }
+}

@@ -1,0 +1,110 @@
+//! The edges of a surface: convex sides between facets that turn, and the normals that a body has there.
+
+use crate::contact::surface::{Bounds, Facet, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
+
+/// A side that two facets share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    /// Its two nodes, the smaller one first.
+    pub(super) nodes: [usize; 2],
+    /// Its length in the reference coordinates.
+    pub(super) length: f64,
+    /// The facet that has them in this order, and which of its sides that is; then the facet that has them in the other.
+    sides: [(usize, usize); 2],
+}
+
+/// The edge with its facets where their nodes are.
+struct Wedge {
+    along: Point,
+    normals: [Point; 2],
+}
+
+impl Wedge {
+    /// Angle by which the surface turns around the edge: positive where it is convex.
+    fn turn(&self) -> f64 {
+        let [left, right] = self.normals;
+        dot(self.along, cross(left, right)).atan2(dot(left, right))
+    }
+
+    /// Sine of the angle by which a normal across the edge lies outside of those that the body has there, between those
+    /// of its facets; 1 for one that looks the other way, and where the edge is not convex.
+    fn miss(&self, normal: Point) -> f64 {
+        let [left, right] = self.normals;
+        if dot(self.along, cross(left, right)) <= 0.0 || dot(normal, left) + dot(normal, right) <= 0.0 {
+            return 1.0;
+        }
+        let beyond = [cross(normal, left), cross(right, normal)].map(|turn| dot(self.along, turn));
+        beyond[0].max(beyond[1]).max(0.0)
+    }
+
+    /// Whether the opposite of a normal leads into the body.
+    fn holds_behind(&self, normal: Point, margin: f64) -> bool {
+        self.normals.iter().all(|side| dot(normal, *side) >= -margin)
+    }
+}
+
+impl Edge {
+    /// The convex edges of a surface around which it turns by more than an angle, in the order of their nodes.
+    pub(super) fn of(surface: &Surface, angle: f64, coordinates: &[Point]) -> Vec<Self> {
+        let mut edges = Vec::new();
+        for (facet, nodes) in surface.facets().iter().map(Facet::nodes).enumerate() {
+            for (side, &first) in nodes.iter().enumerate() {
+                let second = nodes[(side + 1) % nodes.len()];
+                let Some(across) = surface.neighbor(facet, side).filter(|_| first < second) else { continue };
+                let length = norm(sub(coordinates[second], coordinates[first]));
+                let edge = Self { nodes: [first, second], length, sides: [(facet, side), across] };
+                let wedge = edge.wedge(0.5, surface, &|node| coordinates[node]);
+                if wedge.is_some_and(|wedge| wedge.turn() > angle) {
+                    edges.push(edge);
+                }
+            }
+        }
+        edges.sort_unstable_by_key(|edge| edge.nodes);
+        edges
+    }
+
+    /// Nodes of the two facets beside it.
+    pub(super) fn around<'a>(&self, surface: &'a Surface) -> impl Iterator<Item = usize> + use<'a> {
+        self.sides.into_iter().flat_map(|(facet, _)| surface.facets()[facet].nodes().iter().copied())
+    }
+
+    /// Its ends where nodes are.
+    pub(super) fn ends(&self, at: &impl Fn(usize) -> Point) -> [Point; 2] {
+        self.nodes.map(at)
+    }
+
+    /// Its box where nodes are.
+    pub(super) fn bounds(&self, positions: &[Point]) -> Bounds {
+        Bounds::of_points(self.nodes.map(|node| positions[node]))
+    }
+
+    fn wedge(&self, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> Option<Wedge> {
+        let normal = |(facet, side): (usize, usize), share: f64| {
+            let facet = &surface.facets()[facet];
+            let shape = Shape::new(facet.nodes.map(at), facet.count);
+            shape.normal(&shape.on_side(side, share))
+        };
+        let share = share.clamp(0.0, 1.0);
+        let [from, to] = self.ends(at);
+        Some(Wedge {
+            along: unit(sub(to, from))?,
+            normals: [normal(self.sides[0], share)?, normal(self.sides[1], 1.0 - share)?],
+        })
+    }
+
+    /// Sine of the angle by which a normal lies outside of those of the body at a share of the edge.
+    pub(super) fn miss(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> f64 {
+        self.wedge(share, surface, at).map_or(1.0, |wedge| wedge.miss(normal))
+    }
+
+    /// Whether the way back from a share of the edge along a normal leads into the body.
+    pub(super) fn is_behind(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> bool {
+        const ROUNDING: f64 = 1e-9;
+        self.wedge(share, surface, at).is_some_and(|wedge| wedge.holds_behind(normal, ROUNDING))
+    }
+
+    /// A point of it, if its ends are at those places.
+    pub(super) fn point([from, to]: [Point; 2], share: f64) -> Point {
+        add_scaled(from, share, sub(to, from))
+    }
+}

@@ -1,0 +1,218 @@
+//! Two straight edges: where the lines through them are closest, how far apart, and when moving ones meet.
+
+use crate::contact::surface::{Point, add_scaled, cross, dot, norm, sub};
+
+/// The two ends of an edge, or their velocities.
+pub(super) type Ends = [Point; 2];
+
+/// Where the lines through two edges are closest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    /// Shares along the edges, from 0 to 1 within them.
+    pub(super) shares: [f64; 2],
+    /// The unit vector along t_e × t_f.
+    pub(super) normal: Point,
+    /// The distance of the first line from the second along it, with its sign.
+    pub(super) gap: f64,
+    /// Sine of the angle between the edges.
+    pub(super) sine: f64,
+}
+
+impl Crossing {
+    /// The closest points of two lines; none if one has no length, or if they are parallel to rounding.
+    pub(super) fn of([e, f]: [Ends; 2]) -> Option<Self> {
+        const ROUNDING: f64 = 1e-12;
+        let (along, other) = (sub(e[1], e[0]), sub(f[1], f[0]));
+        let (across, between) = (cross(along, other), sub(e[0], f[0]));
+        let square = dot(across, across);
+        let sine = square.sqrt() / (norm(along) * norm(other));
+        if sine.is_nan() || sine <= ROUNDING {
+            return None;
+        }
+        let shares = [dot(cross(other, between), across) / square, dot(cross(along, between), across) / square];
+        let normal = across.map(|x| x / square.sqrt());
+        Some(Self { shares, normal, gap: dot(normal, between), sine })
+    }
+
+    /// Seen from the other side: the normal turned, the sign of the gap with it.
+    pub(super) fn turned(self) -> Self {
+        Self { normal: self.normal.map(|x| -x), gap: -self.gap, ..self }
+    }
+
+    /// The side from which it is seen along a direction.
+    pub(super) fn as_seen_along(self, direction: Point) -> Self {
+        if dot(self.normal, direction) < 0.0 { self.turned() } else { self }
+    }
+
+    /// How far, in shares of them, beyond the ends of the two edges the closest points lie; zero within.
+    pub(super) fn excess(&self) -> [f64; 2] {
+        self.shares.map(|share| (-share).max(share - 1.0).max(0.0))
+    }
+
+    /// Shape functions of the four ends in the motion of the first point against the second.
+    pub(super) fn weights(&self) -> [f64; 4] {
+        let [s, t] = self.shares;
+        [1.0 - s, s, t - 1.0, -t]
+    }
+
+    /// The derivatives of one of the shares by the positions of the four ends.
+    ///
+    /// With r = x_e − x_f = g n and w = δx_e − δx_f at fixed shares, r·d = r·c = 0 along both edges d and c give
+    /// d·d δs − c·d δt = −(w·d + r·δd) and d·c δs − c·c δt = −(w·c + r·δc).
+    pub(super) fn share_gradient(&self, edge: usize, [e, f]: [Ends; 2]) -> [Point; 4] {
+        let (d, c) = (sub(e[1], e[0]), sub(f[1], f[0]));
+        let (dd, dc, cc) = (dot(d, d), dot(d, c), dot(c, c));
+        let square = norm(cross(d, c)).powi(2);
+        // Factors of w·d + r·δd and of w·c + r·δc.
+        let [by_first, by_second] = if edge == 0 { [-cc, dc] } else { [-dc, dd] }.map(|x| x / square);
+        let apart = self.normal.map(|x| self.gap * x);
+        let moved = add_scaled(d.map(|x| by_first * x), by_second, c);
+        let turned = [-by_first, by_first, -by_second, by_second];
+        let weights = self.weights();
+        [0, 1, 2, 3].map(|k| add_scaled(moved.map(|x| weights[k] * x), turned[k], apart))
+    }
+
+    /// d²g/dτ² of two edges whose ends move in straight lines, at velocities `v`.
+    ///
+    /// With N = t_e × t_f and r from any point of the second line to any point of the first that move with the edges,
+    /// g = r·N/|N|. The closest points are taken, where r = g n: nothing is lost in differences of long vectors.
+    pub(super) fn acceleration(&self, [e, f]: [Ends; 2], [v, w]: [Ends; 2]) -> f64 {
+        let ([along, other], [turn, twist]) = ([e, f].map(|x| sub(x[1], x[0])), [v, w].map(|x| sub(x[1], x[0])));
+        let point = |ends: Ends, share: f64, turn: Point| add_scaled(ends[0], share, turn);
+        let speed = sub(point(v, self.shares[0], turn), point(w, self.shares[1], twist));
+        let (apart, across) = (self.normal.map(|x| self.gap * x), cross(along, other));
+        // (Either sign of N belongs to the same lines; g has that of the normal.)
+        let sign = if dot(self.normal, across) < 0.0 { -1.0 } else { 1.0 };
+        let first = add_scaled(cross(turn, other), 1.0, cross(along, twist));
+        let second = cross(turn, twist).map(|x| 2.0 * x);
+        let size = norm(across);
+        let triple = [dot(apart, across), dot(speed, across) + dot(apart, first)];
+        let triple_second = 2.0 * dot(speed, first) + dot(apart, second);
+        let growth = dot(across, first) / size;
+        let growth_second = (dot(first, first) + dot(across, second) - growth * growth) / size;
+        let [value, rate] = triple;
+        let quotient = triple_second - 2.0 * rate * growth / size - value * growth_second / size
+            + 2.0 * value * growth * growth / (size * size);
+        sign * quotient / size
+    }
+}
+
+/// Two edges whose ends move in straight lines, from τ = 0 to τ = 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ways {
+    from: [Ends; 2],
+    by: [Ends; 2],
+}
+
+impl Ways {
+    /// From some positions of their ends by some ways.
+    pub(super) fn new(from: [Ends; 2], by: [Ends; 2]) -> Self {
+        Self { from, by }
+    }
+
+    /// The edges at τ.
+    pub(super) fn at(&self, share: f64) -> [Ends; 2] {
+        [0, 1].map(|k| [0, 1].map(|end| add_scaled(self.from[k][end], share, self.by[k][end])))
+    }
+
+    /// The times within (0, 1], ascending, at which the lines meet: roots of (x_e − x_f)·(t_e × t_f), a cubic in τ.
+    /// (Bridson, Fedkiw and Anderson, ACM Trans. Graph. 21, 2002.)
+    pub(super) fn meetings(&self) -> impl Iterator<Item = f64> + use<> {
+        let cubic = self.cubic();
+        let value = move |x: f64| cubic[0] + x * (cubic[1] + x * (cubic[2] + x * cubic[3]));
+        // Between the roots of the derivative it is monotone.
+        let (a, b, c) = (3.0 * cubic[3], 2.0 * cubic[2], cubic[1]);
+        let discriminant = b * b - 4.0 * a * c;
+        let q = -0.5 * (b + discriminant.max(0.0).sqrt().copysign(b));
+        let inside = |x: f64| if x > 0.0 && x < 1.0 { x } else { 0.0 };
+        let turns = [if a == 0.0 { 0.0 } else { inside(q / a) }, if q == 0.0 { 0.0 } else { inside(c / q) }];
+        let ends = [0.0, turns[0].min(turns[1]), turns[0].max(turns[1]), 1.0];
+        (0..3).filter_map(move |k| {
+            let (mut low, mut high) = (ends[k], ends[k + 1]);
+            let begins = value(low);
+            if low >= high || begins == 0.0 || (value(high) > 0.0) == (begins > 0.0) && value(high) != 0.0 {
+                return None;
+            }
+            for _ in 0..52 {
+                let middle = 0.5 * (low + high);
+                match (value(middle) > 0.0) == (begins > 0.0) && value(middle) != 0.0 {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            Some(high)
+        })
+    }
+
+    /// Coefficients of the cubic.
+    fn cubic(&self) -> [f64; 4] {
+        let pair = |ends: [Ends; 2]| (sub(ends[0][1], ends[0][0]), sub(ends[1][1], ends[1][0]));
+        let ((d, c), (dd, dc)) = (pair(self.from), pair(self.by));
+        let (r, dr) = (sub(self.from[0][0], self.from[1][0]), sub(self.by[0][0], self.by[1][0]));
+        let products = [cross(d, c), add_scaled(cross(dd, c), 1.0, cross(d, dc)), cross(dd, dc)];
+        let [zeroth, first, second] = products;
+        [dot(r, zeroth), dot(dr, zeroth) + dot(r, first), dot(dr, first) + dot(r, second), dot(dr, second)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_meet_where_the_cubic_vanishes() {
+        // Both turn while one falls on the other.
+        let from = [[[-1.0, 0.1, 0.4], [1.0, -0.2, 0.5]], [[0.1, -1.0, 0.0], [-0.2, 1.0, 0.1]]];
+        let by = [[[0.1, 0.3, -1.0], [0.2, 0.1, -0.7]], [[0.3, 0.0, 0.1], [0.0, 0.0, 0.2]]];
+        let ways = Ways::new(from, by);
+        let times: Vec<f64> = ways.meetings().collect();
+        assert_eq!(times.len(), 1);
+        let gap = Crossing::of(ways.at(times[0])).unwrap().gap;
+        assert!(gap.abs() < 1e-14, "{gap:e}");
+        // A way and back again in one line: two meetings of (τ − ¼)(τ − ¾), made by an edge that turns over.
+        let still = [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+        let falling = [[-1.0, 0.0, 0.25], [1.0, 0.0, 0.25]];
+        let ways = Ways::new([falling, still], [[[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]], [[0.0; 3]; 2]]);
+        let times: Vec<f64> = ways.meetings().collect();
+        assert!(times.len() == 1 && (times[0] - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn derivatives_of_shares_are_those_of_differences() {
+        let ends = [[[-0.7, 0.1, 0.3], [0.9, -0.2, 0.4]], [[0.1, -1.2, 0.0], [-0.2, 0.8, 0.1]]];
+        let crossing = Crossing::of(ends).unwrap();
+        for edge in [0, 1] {
+            // (The same seen from either side.)
+            for seen in [crossing, crossing.turned()] {
+                for (k, gradient) in seen.share_gradient(edge, ends).into_iter().enumerate() {
+                    for (axis, entry) in gradient.into_iter().enumerate() {
+                        let share = |by: f64| {
+                            let mut moved = ends;
+                            moved[k / 2][k % 2][axis] += by;
+                            Crossing::of(moved).unwrap().shares[edge]
+                        };
+                        let difference = (share(1e-5) - share(-1e-5)) / 2e-5;
+                        assert!((entry - difference).abs() < 1e-8, "{entry} {difference}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_second_derivative_is_that_of_differences() {
+        let e = [[-0.7, 0.1, 0.3], [0.9, -0.2, 0.4]];
+        let f = [[0.1, -1.2, 0.0], [-0.2, 0.8, 0.1]];
+        let v = [[0.3, -0.8, 0.2], [-0.5, 0.4, 0.7]];
+        let w = [[-0.1, 0.2, 0.9], [0.6, -0.3, -0.4]];
+        let ways = Ways::new([e, f], [v, w]);
+        let gap = |time: f64| Crossing::of(ways.at(time)).unwrap().gap;
+        let step = 1e-4;
+        let difference = (gap(step) - 2.0 * gap(0.0) + gap(-step)) / (step * step);
+        let crossing = Crossing::of([e, f]).unwrap();
+        for seen in [(crossing, 1.0), (crossing.turned(), -1.0)] {
+            let found = seen.1 * seen.0.acceleration([e, f], [v, w]);
+            assert!((found - difference).abs() < 1e-6, "{found} {difference}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What edges have gone through in a step: their straight ways against each other.
+
+use super::EdgeToEdge;
+use super::lines::{Crossing, Ways};
+use super::pairs::{Pair, motion};
+use crate::contact::surface::{Bounds, Point, add_scaled, dot, norm, sub};
+use crate::contact::{LARGEST_MISS, Stride, press_differently};
+use crate::error::Result;
+use crate::real::Real;
+
+/// Share of the smallest edge that edges may move against each other without being looked at.
+const FINE: f64 = 0.125;
+
+/// The same above which the normal is looked at along which they were stopped.
+const COARSE: f64 = 0.6;
+
+/// Looks at how deep an edge is between going in and coming out.
+const LOOKS: u32 = 4;
+
+impl<T: Real> EdgeToEdge<T> {
+    /// Refuses a step in which two edges have gone through each other, or were stopped apart.
+    pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        let moved = |node: usize| sub(self.nodes.vector(node, step.u[1]), self.nodes.vector(node, step.u[0]));
+        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| moved(node))));
+        let longest = motions[0].farthest(&motions[1]);
+        if self.edges.iter().any(Vec::is_empty) || longest <= FINE * self.finest {
+            return Ok(());
+        }
+        let mut ends = std::mem::take(&mut self.ends);
+        for (positions, u) in ends.iter_mut().zip(step.u) {
+            for &node in self.bodies.iter().flatten() {
+                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
+            }
+        }
+        let result = self.look_along(step, longest, &ends);
+        self.ends = ends;
+        result
+    }
+
+    fn look_along(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
+        let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
+        for (row, &index) in self.rows.pairs.iter().enumerate() {
+            if let Err((what, way, gap)) = self.look_at_row(row, step, &self.pair(index), (&start, &end)) {
+                return Err(step.refuse((index[0], index[1]), what, way, gap));
+            }
+        }
+        let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
+        let others = swept(&self.bodies[1]);
+        // Lists know what an edge may meet, unless it was faster than its velocity promised.
+        let listed = longest <= self.listed;
+        for (first, edge) in self.edges[0].iter().enumerate() {
+            let bounds = swept(&edge.nodes);
+            if !bounds.intersects(&others) {
+                continue;
+            }
+            let list = listed.then(|| self.neighborhood.of(first));
+            for k in 0..list.map_or(self.edges[1].len(), <[usize]>::len) {
+                let index = [first, list.map_or(k, |list| list[k])];
+                let pair = self.pair(index);
+                // What a spring stops goes in.
+                let springs = self.law.is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
+                if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
+                    continue;
+                }
+                if let Err((what, way, gap)) = self.look_at_way(&pair, (&start, &end)) {
+                    return Err(step.refuse((index[0], index[1]), what, way, gap));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Says what is wrong with where a row has stopped its edges.
+    fn look_at_row(
+        &self,
+        row: usize,
+        step: &Stride<'_, T>,
+        pair: &Pair<'_>,
+        (start, end): (&impl Fn(usize) -> Point, &impl Fn(usize) -> Point),
+    ) -> std::result::Result<(), (&'static str, f64, f64)> {
+        if step.closed[0][row] || !step.closed[1][row] {
+            return Ok(());
+        }
+        let normal = self.rows.crossings[row].normal;
+        let [before, after] = [pair.ends(start), pair.ends(end)];
+        let Some([from, to]) = Crossing::of(before).zip(Crossing::of(after)).map(<[Crossing; 2]>::from) else {
+            return Ok(());
+        };
+        let [from, to] = [from, to].map(|crossing| crossing.as_seen_along(normal));
+        let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
+        let way = norm(motion(by, to.shares));
+        if way <= FINE * self.finest {
+            return Ok(());
+        }
+        if !pair.is_about(&to, end) {
+            return Err(("was stopped where the edges do not meet", way, from.gap));
+        }
+        if (to.gap + self.rows.inside[row]).abs() > LARGEST_MISS * way {
+            return Err(("was stopped away from the other edge", way, from.gap));
+        }
+        let speed = motion(pair.ends(&|node| self.nodes.vector(node, step.v)), from.shares);
+        let size = norm(speed);
+        let shares = || [from.normal, to.normal].map(|normal| dot(normal, speed) / size);
+        if way > COARSE * self.finest && size > 0.0 && press_differently(shares()) {
+            return Err(("was stopped along a normal that is not the one where the edges met", way, from.gap));
+        }
+        Ok(())
+    }
+
+    /// Says whether the edges have gone into each other on their ways, and how deep.
+    fn look_at_way(
+        &self,
+        pair: &Pair<'_>,
+        (start, end): (&impl Fn(usize) -> Point, &impl Fn(usize) -> Point),
+    ) -> std::result::Result<(), (&'static str, f64, f64)> {
+        let before = pair.ends(start);
+        let after = pair.ends(end);
+        let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
+        let ways = Ways::new(before, by);
+        for share in ways.meetings() {
+            let then = |node: usize| add_scaled(start(node), share, sub(end(node), start(node)));
+            let Some(entry) = pair.meeting(&then) else { continue };
+            let along = motion(by, entry.shares);
+            let way = norm(along);
+            if dot(entry.normal, along) >= 0.0 || way <= FINE * self.finest {
+                continue;
+            }
+            let last = ways.meetings().find(|&next| next > share).unwrap_or(1.0);
+            let depth = (1..=LOOKS).filter_map(|look| {
+                let later = share + (last - share) * f64::from(look) / f64::from(LOOKS);
+                let crossing = Crossing::of(ways.at(later))?.as_seen_along(entry.normal);
+                crossing.excess().iter().all(|&excess| excess == 0.0).then_some(-crossing.gap)
+            });
+            if depth.fold(0.0, f64::max) > LARGEST_MISS * way {
+                let gap = Crossing::of(before).map_or(0.0, |start| start.as_seen_along(entry.normal).gap);
+                return Err(("went through another edge", way, gap));
+            }
+        }
+        Ok(())
+    }
+}
