@@ -62,7 +62,7 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// # Known failure
 ///
 /// - Blocks that fall across an edge of another block, or beside it, gain energy in some falls that gain none without
-///   edges (`docs/contact.md` has a table): nodes on facets find nodes inside there, and throw them out.
+///   edges, by up to a third (`docs/contact.md` has a table; the cause is not known yet).
 /// - An open rim is no edge: what is behind it is not known. Give the whole surface of a body.
 /// - Edges that are concave, or that turn by less than the angle, are seen by nodes and facets only.
 /// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is another contact:
