@@ -11,6 +11,7 @@
 /// | [`NodesOnObstacle`](crate::contact::NodesOnObstacle) | the node | 0 |
 /// | `NodeToFacet` | the node | the pass: 0 for nodes of `one`, 1 for those of `other` |
 /// | `Mortar` | the slave node | 0 |
+/// | `Tie` | the slave node | the axis |
 /// | `EdgeToEdge` | the edge of the first surface | the edge of the second |
 /// | of a host | what it says | what it says |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
