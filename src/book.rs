@@ -15,6 +15,8 @@ pages! {
     Readme = "README.md";
     Start = "docs/start.md";
     Choosing = "docs/choosing.md";
+    #[cfg(feature = "search")]
+    Contact = "docs/contact.md";
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";
     Performance = "docs/performance.md";
