@@ -7,9 +7,9 @@ mod passage;
 mod rows;
 
 use super::obstacle::across;
-use super::surface::{Bounds, Facet, Neighborhood, Nodes, Point, Surface, add_scaled, sub};
+use super::surface::{Facet, Neighborhood, Nodes, Point, Reach, Surface, add_scaled};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use edges::Edge;
 use lines::Crossing;
@@ -106,22 +106,15 @@ pub struct EdgeToEdge<T: Real> {
     edges: [Vec<Edge>; 2],
     /// Nodes of the edges, by edge.
     ends_of: [Vec<[usize; 2]>; 2],
-    /// Nodes of the edges and of the facets beside them.
-    bodies: [Vec<usize>; 2],
     /// For each dof whether an edge has it.
     acts: Vec<bool>,
     /// The shortest edge, in the reference coordinates.
     finest: f64,
     law: ContactLaw,
     friction: f64,
-    reach: f64,
-    skin: Option<f64>,
+    reach: Reach,
     /// Edges of the second surface near each of the first.
     neighborhood: Neighborhood,
-    /// How far from an edge the lists hold all others, where they were built.
-    listed: f64,
-    /// Positions when the lists were built, by node.
-    built_at: Vec<Point>,
     /// Positions at the start and at the end of a step, by node.
     ends: [Vec<Point>; 2],
     rows: Rows<T>,
@@ -150,26 +143,19 @@ impl<T: Real> EdgeToEdge<T> {
         one: impl IntoIterator<Item = F>,
         other: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        let mut nodes = Nodes::new(coordinates, dofs)?;
-        let one = Surface::of_facets(one, 3, &nodes.coordinates)?;
-        let other = Surface::of_facets(other, 3, &nodes.coordinates)?;
-        nodes.read_bodies(&[one.nodes().to_vec(), other.nodes().to_vec()])?;
+        let (nodes, surfaces) = Nodes::with_surfaces(coordinates, dofs, one, other)?;
         let mut contact = Self {
             ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
             nodes,
-            reach: one.typical().max(other.typical()),
-            surfaces: [one, other],
+            reach: Reach::new(surfaces[0].typical().max(surfaces[1].typical())),
+            surfaces,
             edges: [Vec::new(), Vec::new()],
             ends_of: [Vec::new(), Vec::new()],
-            bodies: [Vec::new(), Vec::new()],
             acts: Vec::new(),
             finest: f64::INFINITY,
             law: ContactLaw::Rigid,
             friction: 0.0,
-            skin: None,
             neighborhood: Neighborhood::default(),
-            listed: 0.0,
-            built_at: Vec::new(),
             rows: Rows::new(),
             found: Rows::new(),
         };
@@ -199,8 +185,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach = positive("the reach of a contact search", reach.value())?;
-        self.built_at.clear();
+        self.reach.set_least(reach)?;
         Ok(self)
     }
 
@@ -211,8 +196,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.skin = Some(positive("the skin of a contact search", skin.value())?);
-        self.built_at.clear();
+        self.reach.set_skin(skin)?;
         Ok(self)
     }
 
@@ -247,20 +231,20 @@ impl<T: Real> EdgeToEdge<T> {
             *edges = Edge::of(surface, angle, &nodes.coordinates);
         }
         self.ends_of = edges.each_ref().map(|edges| edges.iter().map(|edge| edge.nodes).collect());
-        for ((body, edges), surface) in self.bodies.iter_mut().zip(&*edges).zip(&*surfaces) {
-            body.clear();
+        let mut bodies = [Vec::new(), Vec::new()];
+        for ((body, edges), surface) in bodies.iter_mut().zip(&*edges).zip(&*surfaces) {
             body.extend(edges.iter().flat_map(|edge| edge.around(surface)));
             body.sort_unstable();
             body.dedup();
         }
-        nodes.read_bodies(&self.bodies)?;
+        nodes.read_bodies(bodies)?;
         self.acts.clear();
         self.acts.resize(nodes.dofs().len(), false);
         self.finest = edges.iter().flatten().map(|edge| edge.length).fold(f64::INFINITY, f64::min);
         for &[from, to] in self.ends_of.iter().flatten() {
             nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
         }
-        self.built_at.clear();
+        self.reach.forget();
         self.rows.clear();
         Ok(())
     }
@@ -269,24 +253,13 @@ impl<T: Real> EdgeToEdge<T> {
         pair(&self.edges, &self.surfaces, [first, second])
     }
 
-    /// Moves the nodes to where they are; returns the boxes of the two surfaces.
-    fn move_nodes(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
-        let [one, other] = &self.bodies;
-        Ok([self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?])
-    }
-
     /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
     fn update_lists(&mut self, range: f64) {
-        let moved = |&node: &usize| Some(sub(self.nodes.positions[node], *self.built_at.get(node)?));
-        let [one, other] = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().filter_map(moved)));
-        if !self.built_at.is_empty() && range + one.spread(&other) <= self.listed {
-            return;
-        }
-        self.listed = range + self.skin.unwrap_or(0.5 * range);
+        let motions = self.reach.motions(&self.nodes);
+        let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) else { return };
         let [one, other] =
             self.edges.each_ref().map(|edges| edges.iter().map(|edge| edge.bounds(&self.nodes.positions)));
-        self.neighborhood.build_among(one, other, self.listed);
-        self.built_at.clone_from(&self.nodes.positions);
+        self.neighborhood.build_among(one, other, listed);
     }
 
     fn find_rows(&mut self, u: &[T], v: &[T], ahead: f64) {
@@ -298,10 +271,10 @@ impl<T: Real> EdgeToEdge<T> {
             for &second in neighborhood.of(first) {
                 let pair = pair(edges, surfaces, [first, second]);
                 let way = ahead * pair.way(&velocity);
-                if !bounds.inflated(*reach + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
+                if !bounds.inflated(reach.least() + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
                     continue;
                 }
-                if let Some(crossing) = pair.near(*reach, way, &at) {
+                if let Some(crossing) = pair.near(reach.least(), way, &at) {
                     let names = (pair.nodes(), |node| nodes.places(node));
                     let row = pair.row(&crossing, &at);
                     // (A spring is to be compressed.)
@@ -351,12 +324,11 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
 
     fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        let boxes = self.move_nodes(u)?;
-        let speeds =
-            [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
+        let boxes = self.nodes.move_to(u)?;
+        let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
         if self.edges.iter().all(|edges| !edges.is_empty()) {
-            let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+            let range = self.reach.least() + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
                 self.update_lists(range);
                 self.find_rows(u, v, ahead);
@@ -371,7 +343,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
-        if self.rows.pairs.is_empty() || self.move_nodes(u).is_err() {
+        if self.rows.pairs.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
         let Self { nodes, edges, surfaces, rows, found, .. } = self;

@@ -6,9 +6,9 @@ mod passage;
 mod ramp;
 mod rows;
 
-use super::surface::{Bounds, Facet, Nodes, Point, Surface, sub};
+use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
 use super::{Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use integrals::{Integrals, Offsets};
 use pairs::Pairs;
@@ -91,18 +91,13 @@ pub struct Mortar<T: Real> {
     nodes: Nodes,
     slave: Surface,
     master: Surface,
-    /// All nodes of the two.
-    bodies: [Vec<usize>; 2],
     law: ContactLaw,
     friction: f64,
-    reach: f64,
+    reach: Reach,
     /// How far surfaces lie outside of their facets, by node; empty if they do not.
     offsets: Vec<f64>,
     ramp: Ramp,
-    skin: Option<f64>,
     pairs: Pairs,
-    /// Positions when the lists of pairs were built, by node.
-    built_at: Vec<Point>,
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
     integrals: Integrals,
@@ -133,24 +128,17 @@ impl<T: Real> Mortar<T> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        let mut nodes = Nodes::new(coordinates, dofs)?;
-        let slave = Surface::of_facets(slave, D, &nodes.coordinates)?;
-        let master = Surface::of_facets(master, D, &nodes.coordinates)?;
-        let bodies = [slave.nodes().to_vec(), master.nodes().to_vec()];
-        nodes.read_bodies(&bodies)?;
+        let (nodes, [slave, master]) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
         Ok(Self {
             nodes,
-            reach: slave.typical().max(master.typical()),
+            reach: Reach::new(slave.typical().max(master.typical())),
             slave,
             master,
-            bodies,
             law: ContactLaw::Rigid,
             friction: 0.0,
             offsets: Vec::new(),
             ramp: Ramp::default(),
-            skin: None,
             pairs: Pairs::default(),
-            built_at: Vec::new(),
             searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
             rows: Rows::new(),
@@ -207,7 +195,7 @@ impl<T: Real> Mortar<T> {
         if let Some((index, &value)) = self.offsets.iter().enumerate().find(|(_, offset)| !offset.is_finite()) {
             return Err(Error::NotFinite { what: "the list of offsets (by node)", index, value });
         }
-        self.pairs.forget();
+        self.reach.forget();
         Ok(self)
     }
 
@@ -234,8 +222,7 @@ impl<T: Real> Mortar<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach = positive("the reach of a contact search", reach.value())?;
-        self.pairs.forget();
+        self.reach.set_least(reach)?;
         Ok(self)
     }
 
@@ -246,8 +233,7 @@ impl<T: Real> Mortar<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.skin = Some(positive("the skin of a contact search", skin.value())?);
-        self.pairs.forget();
+        self.reach.set_skin(skin)?;
         Ok(self)
     }
 
@@ -262,27 +248,11 @@ impl<T: Real> Mortar<T> {
         if self.friction == 0.0 { 0 } else { self.nodes.dimension - 1 }
     }
 
-    /// Moves the nodes to where they are; returns the boxes of the two surfaces.
-    fn move_nodes(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
-        let [one, other] = &self.bodies;
-        Ok([self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?])
-    }
-
-    /// How far the surfaces have moved against each other since the lists of pairs were built.
-    fn moved(&self) -> f64 {
-        if self.built_at.is_empty() {
-            return f64::INFINITY;
-        }
-        let moved = |&node: &usize| sub(self.nodes.positions[node], self.built_at[node]);
-        let [one, other] = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(moved)));
-        one.spread(&other)
-    }
-
-    /// How far they have moved against each other since the last search.
+    /// How far the surfaces have moved against each other since the last search.
     fn moved_since_search(&self) -> f64 {
         let [one, other] = [0, 1].map(|body| {
             let moved = |(&node, &before): (&usize, &Point)| sub(self.nodes.positions[node], before);
-            Bounds::of_points(self.bodies[body].iter().zip(&self.searched_at[body]).map(moved))
+            Bounds::of_points(self.nodes.bodies()[body].iter().zip(&self.searched_at[body]).map(moved))
         });
         one.farthest(&other)
     }
@@ -297,22 +267,22 @@ impl<T: Real> Mortar<T> {
             let sizes = body.iter().map(|&node| factor * self.offsets[node]);
             sizes.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
         };
-        let [one, other] = self.bodies.each_ref().map(of);
+        let [one, other] = self.nodes.bodies().each_ref().map(of);
         [(one[0] + other[0]).min(0.0), (one[1] + other[1]).max(0.0)]
     }
 
     /// How deep surfaces may be in each other at t and be found.
     fn depth(&self, t: f64) -> f64 {
-        self.reach - self.thickest(t)[0]
+        self.reach.least() - self.thickest(t)[0]
     }
 
     /// Pairs of facets within `range`, of those that the surfaces make now, at t.
     fn find_pairs(&mut self, t: f64, range: f64) {
         let depth = self.depth(t);
         let surfaces = [&self.slave, &self.master];
-        if !self.pairs.are_sure_of(range, self.moved()) {
-            self.pairs.build(surfaces, &self.nodes.positions, range + self.skin.unwrap_or(0.5 * range));
-            self.built_at.clone_from(&self.nodes.positions);
+        let motions = self.reach.motions(&self.nodes);
+        if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
+            self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
         self.pairs.take_near(surfaces, &self.nodes.positions, range, depth);
     }
@@ -346,12 +316,11 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
 
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        let boxes = self.move_nodes(u)?;
-        let speeds =
-            [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))));
+        let boxes = self.nodes.move_to(u)?;
+        let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         let thickness = self.thickest(t)[1].max(self.thickest(t + ahead)[1]);
-        let range = self.reach + thickness + ahead * speeds[0].farthest(&speeds[1]);
-        for (places, body) in self.searched_at.iter_mut().zip(&self.bodies) {
+        let range = self.reach.least() + thickness + ahead * speeds[0].farthest(&speeds[1]);
+        for (places, body) in self.searched_at.iter_mut().zip(self.nodes.bodies()) {
             places.clear();
             places.extend(body.iter().map(|&node| self.nodes.positions[node]));
         }
@@ -373,7 +342,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
-        if self.rows.places.is_empty() || self.move_nodes(u).is_err() {
+        if self.rows.places.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
         self.integrate(t);
@@ -392,7 +361,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             // Nothing lies over it any more. What is open stays so, and what has just gone over the rim ends its step.
             let spot = &rows.spots[row];
             let gap = rows.affine.gap(row, u).value() - (made.factor - spot.factor) * spot.offset;
-            if !near && gap <= OPEN * *reach {
+            if !near && gap <= OPEN * reach.least() {
                 let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
                 return Err(Error::ContactLost { t, contact });
             }

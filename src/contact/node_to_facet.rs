@@ -5,9 +5,9 @@ mod passage;
 mod rows;
 
 use super::obstacle::across;
-use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Shape, Surface, add_scaled, overhang};
+use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surface, add_scaled, overhang};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use rows::Rows;
 
@@ -113,10 +113,6 @@ impl Pass {
 #[derive(Debug)]
 pub struct NodeToFacet<T: Real> {
     nodes: Nodes,
-    /// Positions when the lists were built, by node.
-    built_at: Vec<Point>,
-    /// How far from a node the lists hold all facets, where they were built.
-    listed: f64,
     /// Positions at the start and at the end of a step, by node.
     ends: [Vec<Point>; 2],
     /// Facets that the nodes meet.
@@ -126,13 +122,10 @@ pub struct NodeToFacet<T: Real> {
     /// What nodes do not meet of a surface against itself, and by how many rings it was found.
     kin: Option<Kin>,
     rings: usize,
-    /// All nodes of the two bodies: the one of the nodes, the one of the facets.
-    bodies: [Vec<usize>; 2],
     passes: Vec<Pass>,
     law: ContactLaw,
     friction: f64,
-    reach: f64,
-    skin: Option<f64>,
+    reach: Reach,
     rebuilds: usize,
     /// The node that a node of the first pass stands on exactly, where that one may stand on it.
     partners: Vec<Option<usize>>,
@@ -234,23 +227,17 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Of nodes (ascending) with a surface, before its memory is reserved.
     fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface) -> Self {
-        let reach = surface.typical();
-        let bodies = [nodes, surface.nodes().to_vec()];
         Self {
-            built_at: Vec::new(),
-            listed: 0.0,
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
             nodes: mesh,
+            reach: Reach::new(surface.typical()),
             surface,
             own_surface: None,
             kin: None,
             rings: 0,
-            passes: vec![Pass::new(bodies[0].clone())],
-            bodies,
+            passes: vec![Pass::new(nodes)],
             law: ContactLaw::Rigid,
             friction: 0.0,
-            reach,
-            skin: None,
             rebuilds: 0,
             partners: Vec::new(),
             rows: Rows::with_capacity(0, 0),
@@ -317,8 +304,8 @@ impl<T: Real> NodeToFacet<T> {
     }
 
     fn find_kin(&mut self) {
-        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, self.reach));
-        self.built_at.clear();
+        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, self.reach.least()));
+        self.reach.forget();
     }
 
     /// The law of all rows.
@@ -360,8 +347,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach = positive("the reach of a contact search", reach.value())?;
-        self.built_at.clear();
+        self.reach.set_least(reach)?;
         if self.kin.is_some() {
             self.find_kin();
         }
@@ -375,8 +361,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.skin = Some(positive("the skin of a contact search", skin.value())?);
-        self.built_at.clear();
+        self.reach.set_skin(skin)?;
         Ok(self)
     }
 
@@ -390,11 +375,6 @@ impl<T: Real> NodeToFacet<T> {
     /// As those of [`one_pass`](Self::one_pass) about facets.
     pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
         let own = Surface::of_facets(facets, self.nodes.dimension, &self.nodes.coordinates)?;
-        let body = &mut self.bodies[0];
-        body.clone_from(&self.passes[0].nodes);
-        body.extend(own.nodes());
-        body.sort_unstable();
-        body.dedup();
         self.own_surface = Some(own);
         self.passes.truncate(1);
         self.prepare()?;
@@ -413,16 +393,20 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Checks that the bodies share no node, and reserves memory for all rows there can be.
     fn prepare(&mut self) -> Result<()> {
+        let mut body = self.passes[0].nodes.clone();
+        body.extend(self.own_surface.iter().flat_map(Surface::nodes));
+        body.sort_unstable();
+        body.dedup();
         match self.kin {
-            None => self.nodes.read_bodies(&self.bodies)?,
-            Some(_) => self.nodes.read(self.bodies[0].iter().copied()),
+            None => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
+            Some(_) => self.nodes.read_body(body),
         }
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
         let meet = self.passes.len() > 1 || self.kin.is_some();
         self.partners = vec![None; if meet { self.nodes.coordinates.len() } else { 0 }];
-        self.built_at.clear();
+        self.reach.forget();
         Ok(())
     }
 
@@ -485,10 +469,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
-        let (boxes, motions) = self.move_nodes(u)?;
-        let speeds = self.speeds(v);
+        let boxes = self.nodes.move_to(u)?;
+        let motions = self.reach.motions(&self.nodes);
+        let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
-        let range = self.reach + ahead * speeds[0].farthest(&speeds[1]);
+        let range = self.reach.least() + ahead * speeds[0].farthest(&speeds[1]);
         // Facets go on a little beyond the rim.
         let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
         for pass in &mut self.passes {
@@ -510,9 +495,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
-        let Ok((_, motions)) = self.move_nodes(u) else { return Ok(Candidates::Unchanged) };
+        if self.nodes.move_to(u).is_err() {
+            return Ok(Candidates::Unchanged);
+        }
         self.found.clear();
-        self.move_rows(t, &motions, u)?;
+        self.move_rows(t, u)?;
         let same = self.rows.affine.jacobian == self.found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
         Ok(if same { Candidates::Unchanged } else { Candidates::Changed })

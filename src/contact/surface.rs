@@ -8,6 +8,7 @@ mod outer;
 mod output;
 mod overlap;
 mod projection;
+mod reach;
 mod search;
 mod shape;
 
@@ -16,6 +17,7 @@ pub(crate) use kin::Kin;
 pub(crate) use nodes::{Nodes, points};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand};
+pub(crate) use reach::Reach;
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 

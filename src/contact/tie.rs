@@ -73,8 +73,6 @@ pub struct Tie<T: Real> {
     master: Surface,
     reach: f64,
     joint: Joint,
-    /// The nodes of the joint: of the slave, of the master.
-    bodies: [Vec<usize>; 2],
     rows: AffineRows<T>,
     /// Those before.
     before: AffineRows<T>,
@@ -103,17 +101,13 @@ impl<T: Real> Tie<T> {
         /// Share of the mean facet of the coarser surface: more than a curved surface is off its facets that turn by
         /// 45° from one to the next.
         const REACH: f64 = 0.1;
-        let mut nodes = Nodes::new(coordinates, dofs)?;
-        let slave = Surface::of_facets(slave, D, &nodes.coordinates)?;
-        let master = Surface::of_facets(master, D, &nodes.coordinates)?;
-        nodes.read_bodies(&[slave.nodes().to_vec(), master.nodes().to_vec()])?;
+        let (nodes, [slave, master]) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
         let mut tie = Self {
             nodes,
             reach: REACH * slave.typical().max(master.typical()),
             slave,
             master,
             joint: Joint::default(),
-            bodies: [Vec::new(), Vec::new()],
             rows: AffineRows::with_capacity(0, 0),
             before: AffineRows::with_capacity(0, 0),
             directions: Vec::new(),
@@ -148,8 +142,7 @@ impl<T: Real> Tie<T> {
     /// Finds what meets, and the rows where nothing has moved.
     fn join(&mut self) -> Result<()> {
         self.joint = Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach);
-        self.bodies = [&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface));
-        self.nodes.read_bodies(&self.bodies)?;
+        self.nodes.read_bodies([&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface)))?;
         self.linearize(&vec![T::zero(); self.nodes.dofs().len()]);
         Ok(())
     }
@@ -214,14 +207,9 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
 
     fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        if !self.joint.turns {
+        // A trial state that is not finite: the gaps say so.
+        if !self.joint.turns || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
-        }
-        for body in &self.bodies {
-            // A trial state that is not finite: the gaps say so.
-            if self.nodes.move_to(body, u).is_err() {
-                return Ok(Candidates::Unchanged);
-            }
         }
         std::mem::swap(&mut self.rows, &mut self.before);
         self.linearize(u);

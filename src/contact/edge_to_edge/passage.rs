@@ -20,17 +20,14 @@ const LOOKS: u32 = 4;
 impl<T: Real> EdgeToEdge<T> {
     /// Refuses a step in which two edges have gone through each other, or were stopped apart.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        let moved = |node: usize| sub(self.nodes.vector(node, step.u[1]), self.nodes.vector(node, step.u[0]));
-        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| moved(node))));
+        let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
         let longest = motions[0].farthest(&motions[1]);
         if self.edges.iter().any(Vec::is_empty) || longest <= FINE * self.finest {
             return Ok(());
         }
         let mut ends = std::mem::take(&mut self.ends);
         for (positions, u) in ends.iter_mut().zip(step.u) {
-            for &node in self.bodies.iter().flatten() {
-                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
-            }
+            self.nodes.places_at(u, positions);
         }
         let result = self.look_along(step, longest, &ends);
         self.ends = ends;
@@ -45,9 +42,9 @@ impl<T: Real> EdgeToEdge<T> {
             }
         }
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
-        let others = swept(&self.bodies[1]);
+        let others = swept(&self.nodes.bodies()[1]);
         // Lists know what an edge may meet, unless it was faster than its velocity promised.
-        let listed = longest <= self.listed;
+        let listed = longest <= self.reach.listed();
         for (first, edge) in self.edges[0].iter().enumerate() {
             let bounds = swept(&edge.nodes);
             if !bounds.intersects(&others) {

@@ -6,36 +6,21 @@ use crate::contact::surface::{Base, Bounds, Neighborhood, Point, Surface};
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     lists: Neighborhood,
-    /// How far from a facet the lists hold all others, where they were built; none before.
-    listed: Option<f64>,
     starts: Vec<usize>,
     near: Vec<usize>,
 }
 
 impl Pairs {
-    /// Forgets the lists.
-    pub(super) fn forget(&mut self) {
-        self.listed = None;
-        self.clear();
-    }
-
     /// No pairs.
     pub(super) fn clear(&mut self) {
         self.near.clear();
         self.starts.clear();
     }
 
-    /// Whether the lists hold all facets within `range`, if the surfaces have moved by so much against each other since
-    /// they were built.
-    pub(super) fn are_sure_of(&self, range: f64, moved: f64) -> bool {
-        self.listed.is_some_and(|listed| range + moved <= listed)
-    }
-
     /// Lists anew what is within `range`.
     pub(super) fn build(&mut self, [slave, master]: [&Surface; 2], positions: &[Point], range: f64) {
         let boxes = slave.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
         self.lists.build(boxes, master, positions, range);
-        self.listed = Some(range);
     }
 
     /// Takes from the lists the pairs that face each other within `range`, and are not in each other by more than

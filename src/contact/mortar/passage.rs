@@ -29,8 +29,7 @@ pub(super) struct Look {
 impl<T: Real> Mortar<T> {
     /// Refuses a step in which the surfaces have gone into each other on their way, or have been stopped apart.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        let moved = |node: &usize| sub(self.nodes.vector(*node, step.u[1]), self.nodes.vector(*node, step.u[0]));
-        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(moved)));
+        let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
         let (way, finest) = (motions[0].farthest(&motions[1]), self.slave.finest().min(self.master.finest()));
         if way <= FINE * finest {
             return Ok(());
@@ -44,17 +43,14 @@ impl<T: Real> Mortar<T> {
     fn look_along(&self, step: &Stride<'_, T>, way: f64, fine: f64, look: &mut Look) -> Result<()> {
         let Look { ends, positions, pairs, integrals, outside } = look;
         for (positions, u) in ends.iter_mut().zip(step.u) {
-            positions.clone_from(&self.nodes.coordinates);
-            for &node in self.bodies.iter().flatten() {
-                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
-            }
+            self.nodes.places_at(u, positions);
         }
         let swept = [0, 1].map(|body| {
-            let places = self.bodies[body].iter().flat_map(|&node| [ends[0][node], ends[1][node]]);
+            let places = self.nodes.bodies()[body].iter().flat_map(|&node| [ends[0][node], ends[1][node]]);
             Bounds::of_points(places)
         });
         let [early, late] = step.t.map(|t| self.thickest(t)[1]);
-        let (reach, depth) = (self.reach + early.max(late), self.depth(step.t[0]).max(self.depth(step.t[1])));
+        let (reach, depth) = (self.reach.least() + early.max(late), self.depth(step.t[0]).max(self.depth(step.t[1])));
         if !swept[0].inflated(reach).intersects(&swept[1]) {
             return Ok(());
         }
@@ -70,7 +66,7 @@ impl<T: Real> Mortar<T> {
         let limit = -LARGEST_MISS * way;
         for look in 0..=looks {
             let share = f64::from(look) / f64::from(looks);
-            for &node in self.bodies.iter().flatten() {
+            for &node in self.nodes.bodies().iter().flatten() {
                 positions[node] = add_scaled(ends[0][node], share, sub(ends[1][node], ends[0][node]));
             }
             pairs.take_near(surfaces, positions, reach, depth);

@@ -2,40 +2,20 @@
 
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Kin, Point, Surface, sub};
+use crate::contact::surface::{Bounds, Ground, Kin, Point, Surface};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> NodeToFacet<T> {
-    /// Reads positions; returns the boxes of the two bodies, and of their motion since the lists were built.
-    pub(super) fn move_nodes(&mut self, u: &[T]) -> Result<([Bounds; 2], [Bounds; 2])> {
-        let [one, other] = &self.bodies;
-        let boxes = [self.nodes.move_to(one, u)?, self.nodes.move_to(other, u)?];
-        let motions = [0, 1].map(|body| {
-            let moved = |&node: &usize| Some(sub(self.nodes.positions[node], *self.built_at.get(node)?));
-            Bounds::of_points(self.bodies[body].iter().filter_map(moved))
-        });
-        Ok((boxes, motions))
-    }
-
-    /// The boxes of the velocities of the two bodies.
-    pub(super) fn speeds(&self, v: &[T]) -> [Bounds; 2] {
-        [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| self.nodes.vector(node, v))))
-    }
-
     /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
-    pub(super) fn update_lists(&mut self, [one, other]: &[Bounds; 2], range: f64) {
-        if !self.built_at.is_empty() && range + one.spread(other) <= self.listed {
-            return;
-        }
-        self.listed = range + self.skin.unwrap_or(0.5 * range);
+    pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
+        let Some(listed) = self.reach.renew(motions, range, &self.nodes.positions) else { return };
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
             let positions = &self.nodes.positions;
             let points = pass.nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
-            pass.neighborhood.build(points, surface, positions, self.listed);
+            pass.neighborhood.build(points, surface, positions, listed);
         }
-        self.built_at.clone_from(&self.nodes.positions);
         self.rebuilds += 1;
     }
 
@@ -65,7 +45,7 @@ impl<T: Real> NodeToFacet<T> {
                 continue;
             }
             let way = ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
-            let (distance, stand) = ground.clearance(place, *reach + way);
+            let (distance, stand) = ground.clearance(place, reach.least() + way);
             *clearance = distance;
             let Some(stand) = stand else { continue };
             let vertices = ground.surface.facets()[stand.facet].nodes();
@@ -85,21 +65,19 @@ impl<T: Real> NodeToFacet<T> {
         }
     }
 
-    /// The rows there are, where their nodes stand now; `motions` are those since the lists were built.
-    pub(super) fn move_rows(&mut self, t: f64, motions: &[Bounds; 2], u: &[T]) -> Result<()> {
+    /// The rows there are, where their nodes stand now.
+    pub(super) fn move_rows(&mut self, t: f64, u: &[T]) -> Result<()> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, kin, nodes, passes, rows, found, .. } = self;
+        let Self { surface, own_surface, kin, nodes, passes, reach, rows, found, .. } = self;
+        let motions = reach.motions(nodes);
         let positions = &nodes.positions;
         for (row, &(node, pass)) in rows.identities.iter().enumerate() {
             let old = rows.stands[row];
             let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
             let ground = ground(pass, passes, surfaces, positions, Self::rounding());
             // The list of the node has all facets as near as this.
-            let moved = self.built_at.get(node).map_or(f64::INFINITY, |&before| {
-                Bounds::of_points([sub(positions[node], before)]).spread(&motions[1 - pass])
-            });
-            let known = self.listed - moved;
+            let known = reach.known_around(node, positions[node], &motions[1 - pass]);
             let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
                 let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
                 Some((stand, ground.surface.facets()[stand.facet].nodes()))
@@ -112,7 +90,7 @@ impl<T: Real> NodeToFacet<T> {
                     None => found.keep(rows, row),
                 },
                 // There is nothing near that it could press on.
-                None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * self.reach => found.keep(rows, row),
+                None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * reach.least() => found.keep(rows, row),
                 None => {
                     let contact = ContactId { constraint: 0, feature: node, candidate: pass };
                     return Err(Error::ContactLost { t, contact });

@@ -40,17 +40,15 @@ impl<T: Real> NodeToFacet<T> {
     }
 
     fn look_along(&self, step: &Stride<'_, T>, ends: &mut [Vec<Point>; 2]) -> Result<()> {
-        let moved = |node: usize| sub(self.nodes.vector(node, step.u[1]), self.nodes.vector(node, step.u[0]));
-        let motions = [0, 1].map(|body| Bounds::of_points(self.bodies[body].iter().map(|&node| moved(node))));
+        let moved = |node: usize| self.nodes.way(node, step.u);
+        let motions = self.nodes.boxes_of(moved);
         let longest = motions[0].farthest(&motions[1]);
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         if longest <= FINE * surfaces.iter().flatten().map(|surface| surface.finest()).fold(f64::INFINITY, f64::min) {
             return Ok(());
         }
         for (positions, u) in ends.iter_mut().zip(step.u) {
-            for &node in self.bodies.iter().flatten() {
-                positions[node] = add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
-            }
+            self.nodes.places_at(u, positions);
         }
         let mut rows = self.rows.identities.iter().copied().enumerate().peekable();
         for (pass, (list, surface)) in self.passes.iter().zip(surfaces.into_iter().flatten()).enumerate() {
@@ -62,7 +60,7 @@ impl<T: Real> NodeToFacet<T> {
                     continue;
                 }
                 // Lists know what a node may meet, unless it was faster than its velocity promised.
-                let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.listed);
+                let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.reach.listed());
                 let [start, end] = [&ends[0], &ends[1]].map(|positions| Ground {
                     nodes: &list.nodes,
                     neighborhood,

@@ -1,7 +1,8 @@
 //! The nodes of surfaces: where they are, and which dofs move them.
 
 use super::search::Bounds;
-use super::shape::Point;
+use super::shape::{Point, add_scaled, sub};
+use super::{Facet, Surface};
 use crate::contact::dofs::DofList;
 use crate::contact::{check_coordinates, check_mesh};
 use crate::error::{Error, Result};
@@ -28,6 +29,8 @@ pub(crate) struct Nodes {
     /// Their places in the list of the constraint, for nodes of the two bodies.
     places: Vec<[usize; 3]>,
     list: DofList,
+    /// Nodes of the two bodies: the same list twice of a body that meets itself.
+    bodies: [Vec<usize>; 2],
     /// Where the nodes of the two bodies are now.
     pub(crate) positions: Vec<Point>,
 }
@@ -42,31 +45,57 @@ impl Nodes {
             system_dofs: dofs.iter().map(|d| std::array::from_fn(|i| d.get(i).copied().unwrap_or(0))).collect(),
             places: vec![[0; 3]; coordinates.len()],
             list: DofList::default(),
+            bodies: [Vec::new(), Vec::new()],
             positions: coordinates.clone(),
             coordinates,
         })
     }
 
+    /// Nodes of a mesh with two surfaces of it, of two bodies whose nodes are those of the surfaces.
+    pub(crate) fn with_surfaces<T: Real, F: Into<Facet>, G: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        one: impl IntoIterator<Item = F>,
+        other: impl IntoIterator<Item = G>,
+    ) -> Result<(Self, [Surface; 2])> {
+        let mut nodes = Self::new(coordinates, dofs)?;
+        let one = Surface::of_facets(one, D, &nodes.coordinates)?;
+        let other = Surface::of_facets(other, D, &nodes.coordinates)?;
+        nodes.read_bodies([one.nodes().to_vec(), other.nodes().to_vec()])?;
+        Ok((nodes, [one, other]))
+    }
+
     /// Takes the dofs of two bodies into the list of the constraint; refuses bodies that share a node (each sorted).
-    pub(crate) fn read_bodies(&mut self, bodies: &[Vec<usize>; 2]) -> Result<()> {
-        let [one, other] = bodies;
+    pub(crate) fn read_bodies(&mut self, bodies: [Vec<usize>; 2]) -> Result<()> {
+        let [one, other] = &bodies;
         if let Some(node) = one.iter().find(|node| other.binary_search(node).is_ok()) {
             let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it belongs to both surfaces" });
         }
-        self.read(bodies.iter().flatten().copied());
+        self.bodies = bodies;
+        self.list_dofs();
         Ok(())
     }
 
-    /// Takes the dofs of some nodes into the list of the constraint.
-    pub(crate) fn read(&mut self, nodes: impl Iterator<Item = usize>) {
-        let Self { list, places, system_dofs, dimension, .. } = self;
+    /// Takes the dofs of one body, which is the other one too.
+    pub(crate) fn read_body(&mut self, body: Vec<usize>) {
+        self.bodies = [body.clone(), body];
+        self.list_dofs();
+    }
+
+    fn list_dofs(&mut self) {
+        let Self { list, places, system_dofs, dimension, bodies, .. } = self;
         *list = DofList::default();
-        for node in nodes {
+        for &node in bodies.iter().flatten() {
             for (place, &dof) in places[node].iter_mut().zip(&system_dofs[node][..*dimension]) {
                 *place = list.place(dof);
             }
         }
+    }
+
+    /// The nodes of the two bodies, each ascending.
+    pub(crate) fn bodies(&self) -> &[Vec<usize>; 2] {
+        &self.bodies
     }
 
     /// The dofs of the constraint.
@@ -88,22 +117,42 @@ impl Nodes {
         vector
     }
 
-    /// Moves the nodes of a body to where they are with displacements u; returns their box.
-    pub(crate) fn move_to<T: Real>(&mut self, body: &[usize], u: &[T]) -> Result<Bounds> {
-        let Self { dimension, coordinates, system_dofs, places, positions, .. } = self;
-        let mut bounds = Bounds::EMPTY;
-        for &node in body {
-            let mut x = coordinates[node];
-            for (axis, (x, &place)) in x.iter_mut().zip(&places[node][..*dimension]).enumerate() {
-                *x += u[place].value();
-                if !x.is_finite() {
-                    let what = "the displacement of a contact surface (by dof)";
-                    return Err(Error::NotFinite { what, index: system_dofs[node][axis], value: u[place].value() });
-                }
-            }
-            positions[node] = x;
-            bounds.include(x);
+    /// The way of a node between two displacements.
+    pub(crate) fn way<T: Real>(&self, node: usize, u: [&[T]; 2]) -> Point {
+        sub(self.vector(node, u[1]), self.vector(node, u[0]))
+    }
+
+    /// The boxes of a vector of the nodes of either body: of their velocities, of their ways.
+    pub(crate) fn boxes_of(&self, vector: impl Fn(usize) -> Point) -> [Bounds; 2] {
+        self.bodies.each_ref().map(|body| Bounds::of_points(body.iter().map(|&node| vector(node))))
+    }
+
+    /// Puts the places of the nodes of both bodies with displacements u into a list by node.
+    pub(crate) fn places_at<T: Real>(&self, u: &[T], positions: &mut Vec<Point>) {
+        positions.resize(self.coordinates.len(), [0.0; 3]);
+        for &node in self.bodies.iter().flatten() {
+            positions[node] = add_scaled(self.coordinates[node], 1.0, self.vector(node, u));
         }
-        Ok(bounds)
+    }
+
+    /// Moves the nodes of both bodies to where they are with displacements u; returns the boxes of the bodies.
+    pub(crate) fn move_to<T: Real>(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
+        let Self { dimension, coordinates, system_dofs, places, positions, bodies, .. } = self;
+        let mut boxes = [Bounds::EMPTY; 2];
+        for (body, bounds) in bodies.iter().zip(&mut boxes) {
+            for &node in body {
+                let mut x = coordinates[node];
+                for (axis, (x, &place)) in x.iter_mut().zip(&places[node][..*dimension]).enumerate() {
+                    *x += u[place].value();
+                    if !x.is_finite() {
+                        let what = "the displacement of a contact surface (by dof)";
+                        return Err(Error::NotFinite { what, index: system_dofs[node][axis], value: u[place].value() });
+                    }
+                }
+                positions[node] = x;
+                bounds.include(x);
+            }
+        }
+        Ok(boxes)
     }
 }
