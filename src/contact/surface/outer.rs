@@ -63,20 +63,18 @@ impl Surface {
         cells: impl IntoIterator<Item = C>,
     ) -> Result<Self> {
         let coordinates = points(coordinates)?;
-        let cells: Vec<C> = cells.into_iter().collect();
+        let given: Vec<C> = cells.into_iter().collect();
+        let read = given.iter().enumerate().map(|(index, nodes)| Cell::new(index, nodes.as_ref(), D, &coordinates));
+        let cells = read.collect::<Result<Vec<_>>>()?;
         // (corners in ascending order, cell, side)
         let mut sides = Vec::new();
-        // Whether sides are to be turned, by cell.
-        let mut turned = Vec::with_capacity(cells.len());
-        for (index, cell) in cells.iter().enumerate() {
-            let cell = Cell::new(index, cell.as_ref(), D, &coordinates)?;
+        for cell in &cells {
             for (side, corners) in cell.sides.iter().enumerate() {
                 let mut key = [usize::MAX; 4];
                 key.iter_mut().zip(*corners).for_each(|(key, &corner)| *key = cell.nodes[corner]);
                 key.sort_unstable();
-                sides.push((key, index, side));
+                sides.push((key, cell.index, side));
             }
-            turned.push(cell.volume(&coordinates)? < 0.0);
         }
         sides.sort_unstable();
         let mut outer = Vec::new();
@@ -90,13 +88,8 @@ impl Surface {
         // In the order of the cells.
         outer.sort_unstable();
         let mut facets = Vec::new();
-        for (index, side) in outer {
-            Cell::new(index, cells[index].as_ref(), D, &coordinates)?.push_facets(
-                side,
-                turned[index],
-                &coordinates,
-                &mut facets,
-            )?;
+        for (cell, side) in outer {
+            cells[cell].push_facets(side, &coordinates, &mut facets)?;
         }
         Self::of_facets(facets, D, &coordinates)
     }
@@ -119,6 +112,8 @@ struct Cell<'c> {
     sides: Sides,
     /// Whether its quadrilateral sides have a node in the middle.
     centered: bool,
+    /// Whether it is numbered the other way around.
+    turned: bool,
 }
 
 impl<'c> Cell<'c> {
@@ -134,7 +129,9 @@ impl<'c> Cell<'c> {
             return Err(refuse(index, reason));
         };
         check_nodes("the nodes of a cell (at most)", nodes, coordinates.len())?;
-        Ok(Self { index, nodes, corners, sides, centered })
+        let cell = Self { index, nodes, corners, sides, centered, turned: false };
+        let turned = cell.volume(coordinates)? < 0.0;
+        Ok(Self { turned, ..cell })
     }
 
     /// The nodes of corners.
@@ -177,9 +174,9 @@ impl<'c> Cell<'c> {
     }
 
     /// Appends the facets that one of its sides is made of.
-    fn push_facets(&self, side: usize, turned: bool, coordinates: &[Point], facets: &mut Vec<Facet>) -> Result<()> {
+    fn push_facets(&self, side: usize, coordinates: &[Point], facets: &mut Vec<Facet>) -> Result<()> {
         let mut corners = self.at(self.sides[side]);
-        if turned {
+        if self.turned {
             corners.reverse();
         }
         let edges = if corners.len() == 2 { 1 } else { corners.len() };
