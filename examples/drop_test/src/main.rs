@@ -86,7 +86,8 @@ fn run(mut options: Options) -> Result<()> {
     let simulation = scene.simulation(&options, checkpoint)?;
     phases.done("order and factor");
     describe(&options, &scene);
-    let series = Series::new(&directory, &scene.mesh, scene.elements, std::mem::take(&mut pictures));
+    let shown = (&scene.mesh, scene.surface.as_slice());
+    let series = Series::new(&directory, shown, scene.elements, std::mem::take(&mut pictures))?;
     let first = history.0.len();
     let mut recording = Recording { options: &options, scene, simulation, series, history, phases, stress: 0.0 };
     let outcome = recording.advance();
@@ -190,7 +191,7 @@ impl Recording<'_> {
         let stress = self.scene.body.von_mises(u, self.options.model == Model::Linear);
         self.stress = stress.iter().copied().fold(self.stress, f64::max);
         let picture = Picture { displacement: u, velocity: state.velocity(), force, von_mises: &stress };
-        self.series.add(state.time(), &self.scene.mesh, &self.scene.surface, &picture)
+        self.series.add(state.time(), &self.scene.mesh, &picture)
     }
 }
 

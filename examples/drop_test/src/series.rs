@@ -28,11 +28,17 @@ pub struct Series {
     points: Vec<f32>,
     cells: Cells,
     part: Vec<u8>,
+    surface: Surface,
 }
 
 impl Series {
-    /// The first `elements` elements are the part's.
-    pub fn new(directory: &Path, mesh: &Mesh, elements: usize, list: Vec<(f64, String)>) -> Self {
+    /// The first `elements` elements are the part's; `surface` has the facets of all parts.
+    pub fn new(
+        directory: &Path,
+        (mesh, surface): (&Mesh, &[Vec<usize>]),
+        elements: usize,
+        list: Vec<(f64, String)>,
+    ) -> Result<Self> {
         let connectivity = mesh.elements.iter().flat_map(|e| e.nodes().iter().map(|&node| node as u64)).collect();
         let offsets = mesh.elements.iter().scan(0, |end, e| {
             *end += e.nodes().len() as u64;
@@ -42,7 +48,7 @@ impl Series {
             Shape::Tetrahedron => CellType::Tetra,
             Shape::Hexahedron => CellType::Hexahedron,
         };
-        Self {
+        Ok(Self {
             directory: directory.into(),
             list,
             points: narrow(mesh.nodes.as_flattened()),
@@ -51,12 +57,13 @@ impl Series {
                 types: mesh.elements.iter().map(|e| kind(e.shape)).collect(),
             },
             part: (0..mesh.elements.len()).map(|e| u8::from(e >= elements)).collect(),
-        }
+            surface: Surface::new(&mesh.nodes, surface.iter().map(|facet| scene::facet(facet)))?,
+        })
     }
 
     /// Writes a picture.
-    pub fn add(&mut self, time: f64, mesh: &Mesh, surface: &[Vec<usize>], picture: &Picture<'_>) -> Result<()> {
-        let pressure = pressure(mesh, surface, picture)?;
+    pub fn add(&mut self, time: f64, mesh: &Mesh, picture: &Picture<'_>) -> Result<()> {
+        let pressure = pressure(mesh, &self.surface, picture)?;
         let piece = UnstructuredGridPiece {
             points: self.points.clone().into(),
             cells: self.cells.clone(),
@@ -114,11 +121,10 @@ fn narrow(values: &[f64]) -> Vec<f32> {
 }
 
 /// Pressure (Pa) at each node of the mesh, where the surface is now.
-fn pressure(mesh: &Mesh, surface: &[Vec<usize>], picture: &Picture<'_>) -> Result<Vec<f64>> {
+fn pressure(mesh: &Mesh, surface: &Surface, picture: &Picture<'_>) -> Result<Vec<f64>> {
     let vectors = |x: &[f64]| x.chunks(3).map(|x| [x[0], x[1], x[2]]).collect::<Vec<_>>();
     let mut positions = vectors(picture.displacement);
     positions.iter_mut().zip(&mesh.nodes).for_each(|(u, x)| *u = [0, 1, 2].map(|i| x[i] + u[i]));
-    let surface = Surface::new(&mesh.nodes, surface.iter().map(|facet| scene::facet(facet)))?;
     let mut pressures = vec![0.0; mesh.nodes.len()];
     for (&node, pressure) in surface.nodes().iter().zip(surface.pressures(&positions, &vectors(picture.force))?) {
         pressures[node] = pressure;
@@ -149,8 +155,8 @@ mod tests {
             }
         }
         let picture = Picture { displacement: &zero, velocity: &vector, force: &force, von_mises: &stress };
-        let mut series = Series::new(&directory, &mesh, mesh.elements.len(), Vec::new());
-        series.add(0.25, &mesh, &surface, &picture).unwrap();
+        let mut series = Series::new(&directory, (&mesh, &surface), mesh.elements.len(), Vec::new()).unwrap();
+        series.add(0.25, &mesh, &picture).unwrap();
 
         let read = Vtk::import(directory.join("picture_0000.vtu")).unwrap();
         let DataSet::UnstructuredGrid { pieces, .. } = read.data else { panic!("an unstructured grid") };
