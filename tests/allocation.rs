@@ -1,7 +1,7 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
 use contact_dynamics::contact::{
-    ClosedSurface, ContactLaw, NodeToFacet, Obstacle, Plane, RigidMotion, Side, Sphere, Surface, Tie,
+    ClosedSurface, ContactLaw, NodeToFacet, Obstacle, Plane, RigidMotion, Side, Sphere, Surface,
 };
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
@@ -76,8 +76,8 @@ fn friction() {
     assert_steps_allocate_nothing(&mut run, 300, 8, "friction of a block");
 }
 
-/// A block that bounces on another one, weighted gaps with friction: rows are integrated again all the time.
-fn weighted_gaps() {
+/// A block just above another one that stands on the ground, and their system under gravity.
+fn falling_blocks() -> (Stack<2>, LinearSystem<'static, f64>) {
     let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
     let bodies = [3, 4].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], material));
     let stack = Stack::new(bodies, 1e-3, |x| x);
@@ -88,6 +88,12 @@ fn weighted_gaps() {
     for node in (0..stack.solid.nodes.len()).filter(|&node| stack.solid.nodes[node][1] == 0.0) {
         system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
     }
+    (stack, system)
+}
+
+/// A block that bounces on another one, weighted gaps with friction: rows are integrated again all the time.
+fn weighted_gaps() {
+    let (stack, system) = falling_blocks();
     let contact = stack.mortar(true).unwrap().friction(0.3);
     let mut run = Simulation::builder(system, Composite, 2e-3).constraint(contact).build().unwrap();
     for _ in 0..60 {
@@ -99,18 +105,10 @@ fn weighted_gaps() {
 /// Two rings that spin, tied on a circle where their facets do not fit: rows turn all the time.
 fn ties() {
     let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
-    let [inner, outer] = [([0.5, 1.0], 12), ([1.0, 1.5], 17)].map(|(radii, n)| Solid::ring(radii, [1, n], material));
-    let split = inner.nodes.len();
-    let rings = inner.with(outer);
-    let [one, other] = [true, false].map(|inside| {
-        let on_circle =
-            |&n: &usize| (n < split) == inside && (rings.nodes[n][0].hypot(rings.nodes[n][1]) - 1.0).abs() < 1e-9;
-        let facets = rings.boundary().into_iter().filter(|facet| facet.iter().all(on_circle));
-        facets.map(|facet| Stack::<2>::facet(&facet)).collect::<Vec<_>>()
-    });
-    let tie = Tie::new(&rings.nodes, &rings.node_dofs(), other, one).unwrap();
+    let stack = Stack::rings(material);
+    let (rings, tie) = (&stack.solid, stack.tie(true).unwrap());
     let velocity = rings.nodes.iter().flat_map(|[x, y]| [-y, *x]).collect();
-    let system = Hyperelastic::new(&rings, Law::NeoHookean);
+    let system = Hyperelastic::new(rings, Law::NeoHookean);
     let mut run = Simulation::builder(system, EnergyMomentum, 5e-3).velocity(velocity).constraint(tie).build().unwrap();
     for _ in 0..5 {
         run.step().unwrap();
@@ -120,20 +118,11 @@ fn ties() {
 
 /// Two blocks given as one surface, that bounce on each other.
 fn a_surface_against_itself() {
-    let material = Material { young: 1e3, poisson: 0.3, density: 1.0 };
-    let blocks = [3, 4].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], material));
-    let stack = Stack::new(blocks, 1e-3, |x| x);
+    let (stack, system) = falling_blocks();
     let surface = Surface::of_cells(&stack.solid.nodes, &stack.solid.elements).unwrap();
     let contact = NodeToFacet::of_itself(&stack.solid.nodes, &stack.solid.node_dofs(), &surface).unwrap();
     // (Lists that are never built again.)
     let contact = contact.skin(3.0).unwrap();
-    let mass = stack.solid.lumped_mass::<f64>();
-    let mut system = stack.solid.system().load(move |_, f| {
-        f.iter_mut().zip(&mass).skip(1).step_by(2).for_each(|(f, m)| *f = -10.0 * m);
-    });
-    for node in (0..stack.solid.nodes.len()).filter(|&node| stack.solid.nodes[node][1] == 0.0) {
-        system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
-    }
     let mut run = Simulation::builder(system, Composite, 2e-3).constraint(contact).build().unwrap();
     // (Until all nine rows have pressed at once.)
     for _ in 0..400 {

@@ -1,8 +1,6 @@
 //! Edges on edges: gaps and rows against closed forms, momentum, impacts, edges that slide, what is refused.
 
-use contact_dynamics::contact::{
-    ContactConstraint, ContactLaw, Contacts, EdgeToEdge, Facet, GapRates, NodeToFacet, Stride,
-};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, EdgeToEdge, GapRates, Stride};
 use contact_dynamics::{Composite, Error, Newmark, PersistencyCorrection, Real, Simulation, TimeIntegrator, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
@@ -372,46 +370,15 @@ const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 }
 
 /// Two square rods that stand on their edges, the upper one across the lower one, so far apart, and the edges of the
 /// upper one against those of the lower one.
-struct Rods {
-    solid: Solid<3>,
-    split: usize,
-    surfaces: [Vec<Facet>; 2],
-}
-
-impl Rods {
-    fn new(angle: f64, shift: [f64; 2], gap: f64) -> Self {
-        // (An odd number of elements: edges cross inside.)
-        let rod = || {
-            let block = Solid::block([2.0, 0.5, 0.5], [5, 1, 1], MATERIAL).moved([-1.0, -0.25, -0.25]);
-            block.rotated([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_4)
-        };
-        let below = rod();
-        let split = below.nodes.len();
-        let height = 0.5 * 2.0_f64.sqrt() + gap;
-        let above = rod().rotated([0.0, 0.0, 1.0], angle).moved([shift[0], shift[1], height]);
-        let solid = below.with(above);
-        let surfaces = [false, true].map(|lower| {
-            let inside = |facet: &&Vec<usize>| facet.iter().all(|&node| (node < split) == lower);
-            solid.boundary().iter().filter(inside).map(|facet| Stack::<3>::facet(facet)).collect()
-        });
-        Self { solid, split, surfaces }
-    }
-
-    fn edges(&self) -> EdgeToEdge<f64> {
-        let [one, other] = self.surfaces.clone();
-        EdgeToEdge::new(&self.solid.nodes, &self.solid.node_dofs(), one, other).unwrap()
-    }
-
-    fn nodes(&self) -> NodeToFacet<f64> {
-        let [one, other] = self.surfaces.clone();
-        NodeToFacet::new(&self.solid.nodes, &self.solid.node_dofs(), one, other).unwrap()
-    }
-
-    /// The upper rod's velocity.
-    fn velocity(&self, velocity: Vector) -> Vec<f64> {
-        let of = |dof: usize| if dof >= 3 * self.split { velocity[dof % 3] } else { 0.0 };
-        (0..self.solid.dofs()).map(of).collect()
-    }
+fn rods(angle: f64, shift: [f64; 2], gap: f64) -> Stack<3> {
+    // (An odd number of elements: edges cross inside.)
+    let rod = || {
+        let block = Solid::block([2.0, 0.5, 0.5], [5, 1, 1], MATERIAL).moved([-1.0, -0.25, -0.25]);
+        block.rotated([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_4)
+    };
+    let height = 0.5 * 2.0_f64.sqrt() + gap;
+    let above = rod().rotated([0.0, 0.0, 1.0], angle).moved([shift[0], shift[1], height]);
+    Stack::of_whole_surfaces([rod(), above])
 }
 
 #[test]
@@ -423,18 +390,18 @@ fn rods_that_fall_across_each_other_keep_momentum_and_gain_no_energy() {
                 let h = 0.2 / MATERIAL.wave_speed();
                 let speed = 0.5;
                 let gap = 0.004 + speed * h * f64::from(phase) / f64::from(phases);
-                let rods = Rods::new(angle, [0.03, -0.02], gap);
+                let rods = rods(angle, [0.03, -0.02], gap);
                 let mut run = Simulation::builder(rods.solid.system::<f64>(), make(), h)
-                    .velocity(rods.velocity([0.0, 0.0, -speed]))
-                    .constraint(rods.nodes())
-                    .constraint(rods.edges())
+                    .velocity(rods.velocity_of_upper([0.0, 0.0, -speed]))
+                    .constraint(rods.nodes_on_facets(2).unwrap())
+                    .constraint(rods.edges().unwrap())
                     .corrector(PersistencyCorrection::with_history_projection())
                     .build()
                     .unwrap();
                 let up: Vec<f64> = (0..rods.solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == 2))).collect();
                 let (energy, momentum) = (run.energy().total(), run.momentum(&up).unwrap());
                 let (mut highest, mut pressed) = (energy, 0);
-                let mut checker = rods.edges().with_law(ContactLaw::Penalty { stiffness: 1.0 });
+                let mut checker = rods.edges().unwrap().with_law(ContactLaw::Penalty { stiffness: 1.0 });
                 while run.time() < 1.0 {
                     run.step().unwrap();
                     highest = highest.max(run.energy().total());
@@ -466,15 +433,15 @@ fn rods_that_fall_across_each_other_keep_momentum_and_gain_no_energy() {
 
 #[test]
 fn without_edges_rods_go_through_each_other() {
-    let rods = Rods::new(1.57, [0.03, -0.02], 0.01);
+    let rods = rods(1.57, [0.03, -0.02], 0.01);
     let depth = |with_edges: bool| {
         let builder = Simulation::builder(rods.solid.system::<f64>(), Composite, 0.02)
-            .velocity(rods.velocity([0.0, 0.0, -0.5]))
-            .constraint(rods.nodes());
-        let builder = if with_edges { builder.constraint(rods.edges()) } else { builder };
+            .velocity(rods.velocity_of_upper([0.0, 0.0, -0.5]))
+            .constraint(rods.nodes_on_facets(2).unwrap());
+        let builder = if with_edges { builder.constraint(rods.edges().unwrap()) } else { builder };
         let mut run = builder.build().unwrap();
         let spring = ContactLaw::Penalty { stiffness: 1.0 };
-        let (mut checker, mut deepest) = (rods.edges().with_law(spring), 0.0_f64);
+        let (mut checker, mut deepest) = (rods.edges().unwrap().with_law(spring), 0.0_f64);
         while run.time() < 0.3 {
             run.step().unwrap();
             checker.search_on(run.time(), run.state().displacement(), run.state().velocity(), 0.0).unwrap();
@@ -491,7 +458,7 @@ fn without_edges_rods_go_through_each_other() {
 fn edges_that_slide_over_each_other_and_off_their_ends() {
     // The upper rod is drawn along, tilted to neither side, and pressed down lightly: over four of its nodes.
     for friction in [0.0, 0.2] {
-        let rods = Rods::new(std::f64::consts::FRAC_PI_2, [0.03, 0.45], 1e-6);
+        let rods = rods(std::f64::consts::FRAC_PI_2, [0.03, 0.45], 1e-6);
         let mass = rods.solid.lumped_mass::<f64>();
         let weight = 0.05;
         let upper = 3 * rods.split;
@@ -509,8 +476,8 @@ fn edges_that_slide_over_each_other_and_off_their_ends() {
             }
         }
         let mut run = Simulation::builder(system, Composite, 0.02)
-            .velocity(rods.velocity([0.0, -0.5, 0.0]))
-            .constraint(rods.edges().friction(friction))
+            .velocity(rods.velocity_of_upper([0.0, -0.5, 0.0]))
+            .constraint(rods.edges().unwrap().friction(friction))
             .build()
             .unwrap();
         let energy = run.energy().total();

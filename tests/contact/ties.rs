@@ -1,8 +1,9 @@
 //! Ties: constant tractions and linear displacements pass exactly, surfaces that do not fit turn freely, what is
 //! refused.
 
-use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Surface, Tie};
+use contact_dynamics::contact::{ContactConstraint, Surface, Tie};
 use contact_dynamics::{EnergyMomentum, Error, Newmark, Real, Simulation, verify};
+use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -12,11 +13,6 @@ const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 }
 
 fn tied<const D: usize>(stack: &Stack<D>, upper: bool) -> Tie<f64> {
     stack.tie(upper).unwrap()
-}
-
-/// Displacements by dof of the system as the constraint reads them.
-fn local(tie: &Tie<f64>, u: &[f64]) -> Vec<f64> {
-    tie.dofs().iter().map(|&dof| u[dof]).collect()
 }
 
 fn largest(x: impl IntoIterator<Item = f64>) -> f64 {
@@ -32,11 +28,10 @@ fn check_patch<const D: usize>(stack: &Stack<D>, upper: bool) {
     let linear =
         |x: &[f64; D]| -> [f64; D] { std::array::from_fn(|i| (0..D).map(|j| gradient[D * i + j] * x[j]).sum()) };
     let u: Vec<f64> = nodes.iter().flat_map(linear).collect();
-    let u = local(&tie, &u);
-    tie.search(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
-    let contacts = Contacts::of(&tie);
+    tie.search_on(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
+    let contacts = tie.found();
     let mut gaps = vec![1.0; contacts.len()];
-    tie.gaps(0.0, &u, &mut gaps).unwrap();
+    tie.gap(0.0, &u, &mut gaps);
     assert!(largest(gaps) < 1e-14);
 
     let traction: [f64; D] = std::array::from_fn(|_| random() - 0.5);
@@ -87,26 +82,10 @@ fn two_tied_blocks_are_compressed_as_one() {
     assert!(error < 1e-12, "{error:e}");
 }
 
-/// Two rings, one around the other, whose facets on the circle between them do not fit.
-fn rings() -> (Solid<2>, [Vec<Facet>; 2]) {
-    let inner = Solid::ring([0.5, 1.0], [1, 12], MATERIAL);
-    let outer = Solid::ring([1.0, 1.5], [1, 17], MATERIAL);
-    let split = inner.nodes.len();
-    let both = inner.with(outer);
-    let facets = |lower: bool| {
-        let on_circle =
-            |&n: &usize| (n < split) == lower && (both.nodes[n][0].hypot(both.nodes[n][1]) - 1.0).abs() < 1e-9;
-        let facets = both.boundary().into_iter().filter(|facet| facet.iter().all(on_circle));
-        facets.map(|facet| Stack::<2>::facet(&facet)).collect::<Vec<_>>()
-    };
-    let surfaces = [facets(true), facets(false)];
-    (both, surfaces)
-}
-
 fn tied_rings() -> (Solid<2>, Tie<f64>) {
-    let (rings, [inner, outer]) = rings();
-    let tie = Tie::new(&rings.nodes, &rings.node_dofs(), outer, inner).unwrap();
-    (rings, tie)
+    let rings = Stack::rings(MATERIAL);
+    let tie = tied(&rings, true);
+    (rings.solid, tie)
 }
 
 #[test]
@@ -116,12 +95,11 @@ fn surfaces_that_do_not_fit_turn_freely() {
         let (sine, cosine) = angle.sin_cos();
         let turned = |&[x, y]: &[f64; 2]| [cosine * x - sine * y - x + 7.0, sine * x + cosine * y - y];
         let u: Vec<f64> = rings.nodes.iter().flat_map(turned).collect();
-        let u = local(&tie, &u);
-        tie.search(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
-        let contacts = Contacts::of(&tie);
+        tie.search_on(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
+        let contacts = tie.found();
         assert_eq!(contacts.len(), 2 * 17);
         let mut gaps = vec![1.0; contacts.len()];
-        tie.gaps(0.0, &u, &mut gaps).unwrap();
+        tie.gap(0.0, &u, &mut gaps);
         assert!(largest(gaps) < 1e-14);
         // Forces keep momentum and angular momentum.
         let places: Vec<[f64; 2]> =

@@ -108,9 +108,8 @@ fn impacts_of_blocks_keep_momentum_with_one_pass_and_with_two() {
 pub(super) fn check_impact(stack: &Stack<3>, contact: impl ContactConstraint<f64> + 'static, what: &str) {
     let solid = &stack.solid;
     let speed = [0.02, 0.01, -0.1];
-    let v: Vec<f64> = (0..solid.dofs()).map(|dof| if dof >= 3 * stack.split { speed[dof % 3] } else { 0.0 }).collect();
     let mut run = Simulation::builder(solid.system(), Composite, 0.25 / MATERIAL.wave_speed())
-        .velocity(v)
+        .velocity(stack.velocity_of_upper(speed))
         .constraint(contact)
         .corrector(PersistencyCorrection::with_history_projection())
         .build()

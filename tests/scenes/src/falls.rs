@@ -4,7 +4,7 @@ use crate::OnSystem;
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, EdgeToEdge, Facet, Mortar, NodeToFacet};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, EdgeToEdge, Mortar, NodeToFacet};
 use contact_dynamics::{PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -35,11 +35,8 @@ pub enum Keeps {
 
 /// Two blocks of hex8 elements.
 pub struct Fall {
-    pub solid: Solid<3>,
-    /// Number of nodes of the lower block.
-    pub split: usize,
-    /// Surfaces of the lower block and of the upper one.
-    pub facets: [Vec<Facet>; 2],
+    /// With the whole surfaces of both.
+    pub stack: Stack<3>,
     pub speed: f64,
     /// Length of the elements, and the time in which a wave crosses one.
     pub element: f64,
@@ -76,7 +73,6 @@ impl Fall {
         let speed = 0.12 + signed(0.1);
         let turn = 1.5 + signed(1.5);
         let lower = Solid::block([1.5, 1.5, 1.0], [4, 4, 3], MATERIAL).moved([-0.75, -0.75, -1.0]);
-        let split = lower.nodes.len();
         let cube = Solid::block([1.0; 3], [3; 3], MATERIAL).moved([-0.5; 3]);
         let vertical = [0.0, 0.0, 1.0];
         let quarter = std::f64::consts::FRAC_PI_4;
@@ -98,32 +94,24 @@ impl Fall {
             Landing::Beside => [0.75 + 0.3 * along + 0.1, y, 0.0],
         };
         let upper = tilted.lifted(0.02).moved(beside);
-        let solid = lower.with(upper);
-        let surface = |below: bool| {
-            let inside = |facet: &&Vec<usize>| facet.iter().all(|&node| (node < split) == below);
-            solid.boundary().iter().filter(inside).map(|facet| Stack::<3>::facet(facet)).collect()
-        };
-        let facets = [surface(true), surface(false)];
+        let stack = Stack::of_whole_surfaces([lower, upper]);
         let element = 1.0 / 3.0;
-        Self { facets, split, speed, element, crossing: element / MATERIAL.wave_speed(), solid }
+        Self { stack, speed, element, crossing: element / MATERIAL.wave_speed() }
     }
 
     /// Nodes on facets in two passes.
     pub fn two_passes(&self) -> Result<NodeToFacet<f64>> {
-        let Self { solid, facets: [below, above], .. } = self;
-        NodeToFacet::new(&solid.nodes, &solid.node_dofs(), above.clone(), below.clone())?.reach(0.2)
+        self.stack.nodes_on_facets(2)?.reach(0.2)
     }
 
     /// Weighted gaps, the upper block being the slave.
     pub fn mortar(&self) -> Result<Mortar<f64>> {
-        let Self { solid, facets: [below, above], .. } = self;
-        Mortar::new(&solid.nodes, &solid.node_dofs(), above.clone(), below.clone())?.reach(0.2)
+        self.stack.mortar(true)?.reach(0.2)
     }
 
     /// Edges on edges.
     pub fn edges(&self) -> Result<EdgeToEdge<f64>> {
-        let Self { solid, facets: [below, above], .. } = self;
-        EdgeToEdge::new(&solid.nodes, &solid.node_dofs(), above.clone(), below.clone())?.reach(0.2)
+        self.stack.edges()?.reach(0.2)
     }
 
     /// Lets the block fall until t = `until`, by steps of a Courant number.
@@ -134,15 +122,14 @@ impl Fall {
         courant: f64,
         until: f64,
     ) -> Result<FallFigures> {
-        let Self { solid, split, speed, crossing, .. } = self;
-        let h = courant * crossing;
-        let falls = |dof: usize| dof % 3 == 2 && dof >= 3 * split;
+        let Self { stack, speed, crossing, .. } = self;
+        let (solid, h) = (&stack.solid, courant * crossing);
         let contact: Box<dyn ContactConstraint<f64>> = match keeps {
             Keeps::TwoPasses => Box::new(self.two_passes()?),
             Keeps::Mortar => Box::new(self.mortar()?),
         };
         let builder = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, h)
-            .velocity((0..solid.dofs()).map(|dof| if falls(dof) { -speed } else { 0.0 }).collect())
+            .velocity(stack.velocity_of_upper([0.0, 0.0, -speed]))
             .corrector(PersistencyCorrection::with_history_projection())
             .step_control(StepControl::halving(h / 256.0)?)
             .constraint(contact);

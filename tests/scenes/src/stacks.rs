@@ -1,7 +1,7 @@
 //! Two bodies upon each other whose meshes need not match, and the patch test on them.
 
-use crate::solids::Solid;
-use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet, Tie};
+use crate::solids::{Material, Solid};
+use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, Tie};
 use contact_dynamics::{Newmark, Result, Simulation, System};
 
 /// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
@@ -24,6 +24,21 @@ impl<const D: usize> Stack<D> {
         };
         let facets = [at(1.0, true), at(1.0 + gap, false)];
         Self { solid: solid.mapped(map), split, facets }
+    }
+
+    /// Two bodies as they are, with their whole surfaces.
+    pub fn of_whole_surfaces([below, above]: [Solid<D>; 2]) -> Self {
+        let split = below.nodes.len();
+        let solid = below.with(above);
+        let is_lower = |facet: &Vec<usize>| facet.iter().all(|&node| node < split);
+        let facets = solid.boundary().into_iter().partition(is_lower).into();
+        Self { solid, split, facets }
+    }
+
+    /// Velocities with which the upper body flies.
+    pub fn velocity_of_upper(&self, velocity: [f64; D]) -> Vec<f64> {
+        let of = |dof: usize| if dof >= D * self.split { velocity[dof % D] } else { 0.0 };
+        (0..self.solid.dofs()).map(of).collect()
     }
 
     /// The facets of the lower body and of the upper one, as segments or quadrilaterals.
@@ -135,5 +150,28 @@ impl<const D: usize> Stack<D> {
         let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();
         Ok(run.state().displacement().iter().zip(&exact).map(deviation).fold(0.0, f64::max) / scale)
+    }
+}
+
+impl Stack<2> {
+    /// Two rings, one around the other, whose facets on the circle between them do not fit.
+    pub fn rings(material: Material) -> Self {
+        let inner = Solid::ring([0.5, 1.0], [1, 12], material);
+        let split = inner.nodes.len();
+        let solid = inner.with(Solid::ring([1.0, 1.5], [1, 17], material));
+        let facets = [true, false].map(|inside| {
+            let radius = |n: usize| solid.nodes[n][0].hypot(solid.nodes[n][1]);
+            let on_circle = |&n: &usize| (n < split) == inside && (radius(n) - 1.0).abs() < 1e-9;
+            solid.boundary().into_iter().filter(|facet| facet.iter().all(on_circle)).collect()
+        });
+        Self { solid, split, facets }
+    }
+}
+
+impl Stack<3> {
+    /// The edges of the upper body on those of the lower one.
+    pub fn edges(&self) -> Result<EdgeToEdge<f64>> {
+        let [lower, above] = self.surfaces();
+        EdgeToEdge::new(&self.solid.nodes, &self.solid.node_dofs(), above, lower)
     }
 }
