@@ -28,7 +28,7 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
             (first(frequencies, false) / bending - 1.0, first(frequencies, true) * SIZE[0] / PI - 1.0);
         writeln!(table, "| {bar} | {elements} | {:.2} % | {:.2} % |", 100.0 * bends, 100.0 * stretches)
     };
-    for cells in [[8, 2], [12, 4], [16, 4]] {
+    for cells in [[8, 2], [8, 4], [12, 3], [12, 4], [16, 3], [16, 6]] {
         let bar = Solid::rectangle(SIZE, cells, MATERIAL);
         row("one piece", &format!("{} × {}", cells[0], cells[1]), &frequencies(&bar, None)?)?;
     }
