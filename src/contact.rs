@@ -2,6 +2,7 @@
 
 #[cfg(feature = "search")]
 mod affine_rows;
+mod bond;
 mod constraint;
 mod contacts;
 mod dofs;
@@ -26,6 +27,7 @@ mod tangents;
 #[cfg(feature = "search")]
 mod tie;
 
+pub use bond::{BondStrength, BrokenBond};
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub use contacts::{Contact, Contacts};
 #[cfg(feature = "search")]

@@ -20,6 +20,7 @@ pub use contacts::{ContactState, ContactStatus};
 pub use history::History;
 pub(crate) use history::Trail;
 
+use crate::contact::BrokenBond;
 use crate::real::Real;
 
 /// Stored values of one state: displacement, velocity and acceleration at its time.
@@ -87,6 +88,8 @@ pub struct State<T> {
     /// Velocity and acceleration at the time of the state; empty where the stored ones live there.
     pub(crate) shown: [Vec<T>; 2],
     pub(crate) contacts: ContactState<T>,
+    /// In the order in which they broke.
+    pub(crate) broken: Vec<BrokenBond>,
 }
 
 impl<T: Real> State<T> {
@@ -126,5 +129,21 @@ impl<T: Real> State<T> {
     /// Contacts, one entry a candidate.
     pub fn contacts(&self) -> &ContactState<T> {
         &self.contacts
+    }
+
+    /// The bonds that have broken since the start, in the order in which they did.
+    pub fn broken_bonds(&self) -> &[BrokenBond] {
+        &self.broken
+    }
+
+    /// Those of them that the last step has broken.
+    pub fn newly_broken_bonds(&self) -> &[BrokenBond] {
+        self.broken_at(self.time())
+    }
+
+    /// Those that the last step has broken that ended at t.
+    pub(crate) fn broken_at(&self, t: f64) -> &[BrokenBond] {
+        let count = self.broken.iter().rev().take_while(|bond| bond.time.to_bits() == t.to_bits()).count();
+        &self.broken[self.broken.len() - count..]
     }
 }

@@ -458,7 +458,7 @@ fn other_files_and_formats_are_refused_in_words() {
     let [files, _] = samples();
     let read = |text: &str| serde_json::from_str::<Checkpoint<f64>>(text).unwrap_err().to_string();
     for (written, words) in [
-        (files.text.replace("checkpoint 2", "checkpoint 7"), ["format 7", "reads format 2"]),
+        (files.text.replace("checkpoint 3", "checkpoint 7"), ["format 7", "reads format 3"]),
         (files.text.replace("contact-dynamics checkpoint", "results"), ["no checkpoint", "contact-dynamics"]),
         (files.text.replace("\"f64\"", "\"f16\""), ["f16", "f64"]),
         ("7".to_owned(), ["a checkpoint of contact-dynamics", "integer"]),
@@ -477,7 +477,7 @@ fn other_files_and_formats_are_refused_in_words() {
 fn another_layout_is_another_format() {
     let [files, _] = samples();
     let document: Value = serde_json::from_str(&files.text).unwrap();
-    assert_eq!(document["format"], "contact-dynamics checkpoint 2");
+    assert_eq!(document["format"], "contact-dynamics checkpoint 3");
     // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
     for (path, names) in [
         ("", "format history rows scalar scheme state"),

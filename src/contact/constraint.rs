@@ -178,6 +178,36 @@ pub trait ContactConstraint<T: Real>: Send {
         true
     }
 
+    /// Which of its bonds do not stand the forces at the end of a step: rows that hold both ways until their force is
+    /// too large. `forces` has one entry a candidate, after correction (compression positive). Appends the
+    /// [feature](super::ContactId::feature) of each bond that breaks, and how many times as large as its strength the
+    /// force is. Asked once for each step that is accepted, after everything that may refuse it. Default: there is no
+    /// bond.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{BondStrength, ContactConstraint, LinearRows};
+    ///
+    /// // Two dofs that hold together up to a pull of 3.
+    /// let bonded = LinearRows::new().bond(3.0, &[(0, -1.0), (1, 1.0)], 0.0);
+    /// let mut broken = Vec::new();
+    /// bonded.overloads(&[-2.9], &mut broken);
+    /// assert!(broken.is_empty());
+    /// bonded.overloads(&[-6.0], &mut broken);
+    /// assert_eq!(broken, [(0, 2.0)]);
+    /// ```
+    fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {
+        let _ = (forces, broken);
+    }
+
+    /// Is told which of its bonds are broken: their features, ascending, of all that have broken so far. Rows change
+    /// with the next search. Called when a run is built, before its first search, with what the state that it continues
+    /// from knows (nothing at a start), and after each step that has broken one. That the constraint remembers this is
+    /// no state of its own: it is that of the run ([`State::broken_bonds`](crate::State::broken_bonds)). Default:
+    /// nothing, as there is no bond.
+    fn set_broken(&mut self, features: &[usize]) {
+        let _ = features;
+    }
+
     /// When rows may change, asked after the first search: a run in which none follows saves the looking. Default:
     /// nothing is known.
     fn variation(&self) -> Variation {
@@ -227,6 +257,12 @@ macro_rules! forward {
             }
             fn inspects(&self) -> bool {
                 (**self).inspects()
+            }
+            fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {
+                (**self).overloads(forces, broken);
+            }
+            fn set_broken(&mut self, features: &[usize]) {
+                (**self).set_broken(features);
             }
             fn variation(&self) -> Variation {
                 (**self).variation()

@@ -6,7 +6,6 @@ mod pairs;
 mod passage;
 mod rows;
 
-use super::obstacle::across;
 use super::surface::{Facet, Neighborhood, Nodes, Point, Reach, Surface, add_scaled};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::{Error, Result};
@@ -312,7 +311,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
                 continue;
             }
             contact.friction(self.friction);
-            for tangent in across(crossing.normal) {
+            for tangent in self.nodes.tangents(crossing.normal) {
                 let entries = pair.nodes().into_iter().zip(crossing.weights()).flat_map(|(node, share)| {
                     let places = self.nodes.places(node);
                     places.iter().zip(tangent).map(move |(&place, along)| (place, T::of(share * along)))

@@ -3,7 +3,7 @@
 use super::dofs::DofList;
 use super::obstacle::{across, unit};
 use super::{Candidates, ContactConstraint, ContactJacobian, ContactLaw, Contacts, GapRates, Rates, Variation};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use faer::sparse::SparseRowMatRef;
 use std::ops::Range;
@@ -27,6 +27,14 @@ impl<T> std::fmt::Debug for Friction<'_, T> {
             .field("coefficient", &self.coefficient)
             .finish_non_exhaustive()
     }
+}
+
+/// A row that holds both ways as long as it is pulled by no more than a force.
+#[derive(Debug)]
+struct Bond {
+    row: usize,
+    strength: f64,
+    is_broken: bool,
 }
 
 /// The part g0 of a gap that does not depend on u: constant, or a function of time with its first two derivatives.
@@ -82,6 +90,8 @@ pub struct LinearRows<'a, T: Real> {
     jacobian: ContactJacobian<T>,
     laws: Vec<ContactLaw>,
     offsets: Vec<GapOffset<'a, T>>,
+    /// Rows that hold both ways until they are pulled by more than a force, in their order.
+    bonds: Vec<Bond>,
     /// In places of the list too.
     tangents: ContactJacobian<T>,
     /// In the order of their rows.
@@ -102,8 +112,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
     pub fn new() -> Self {
         let (dofs, jacobian) = (DofList::default(), ContactJacobian::default());
         let (tangents, frictions) = (ContactJacobian::default(), Vec::new());
-        let (laws, offsets, coordinates) = (Vec::new(), Vec::new(), T::zero());
-        Self { dofs, jacobian, laws, offsets, tangents, frictions, coordinates, checked: false }
+        let (laws, offsets, bonds, coordinates) = (Vec::new(), Vec::new(), Vec::new(), T::zero());
+        Self { dofs, jacobian, laws, offsets, bonds, tangents, frictions, coordinates, checked: false }
     }
 
     /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
@@ -131,6 +141,31 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// Adds a row with `G u + g0 = 0`.
     #[must_use]
     pub fn equality(self, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        self.row(ContactLaw::Equality, entries, offset)
+    }
+
+    /// Adds a row with `G u + g0 = 0` as long as it is pulled by no more than `strength` (force), which is looked at
+    /// after each step; from then on it is a unilateral one. [`friction`](Self::friction) acts once it is broken.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    ///
+    /// // A mass that is glued to a wall is pulled with a force that grows by 10 a second.
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let mass = LinearSystem::lumped(vec![1.0], free)?.load(|t, f| f[0] = 10.0 * t);
+    /// let mut run = Simulation::builder(mass, Newmark::trapezoidal(), 0.01)
+    ///     .constraint(LinearRows::new().bond(4.999, &[(0, 1.0)], 0.0))
+    ///     .build()?;
+    /// run.run_until(1.0, &mut ())?;
+    /// let broken = run.state().broken_bonds()[0];
+    /// assert!((broken.time - 0.5).abs() < 1e-12 && broken.load >= 1.0);
+    /// assert!(run.state().velocity()[0] > 3.7); // 5 (1 − 0.5²)
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn bond(mut self, strength: f64, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        self.bonds.push(Bond { row: self.laws.len(), strength, is_broken: false });
         self.row(ContactLaw::Equality, entries, offset)
     }
 
@@ -254,6 +289,9 @@ impl<'a, T: Real> LinearRows<'a, T> {
 
     /// Refuses numbers that are none.
     fn check(&self) -> Result<()> {
+        for bond in &self.bonds {
+            positive("the strength of a bond", bond.strength)?;
+        }
         let weights = &self.jacobian.weights;
         if let Some(index) = weights.iter().position(|weight| !weight.is_finite()) {
             let value = weights[index].value();
@@ -294,10 +332,14 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
         let mut frictions = self.frictions.iter().peekable();
+        let mut bonds = self.bonds.iter().peekable();
         for (row, &law) in self.laws.iter().enumerate() {
+            let bond = bonds.next_if(|bond| bond.row == row);
+            let law = if bond.is_some_and(|bond| bond.is_broken) { ContactLaw::Rigid } else { law };
             let mut contact = contacts.push_row((row, 0), law, (&self.jacobian, row));
             contact.magnitude(self.coordinates);
-            if let Some(friction) = frictions.next_if(|friction| friction.row == row) {
+            let friction = frictions.next_if(|friction| friction.row == row);
+            if let Some(friction) = friction.filter(|_| bond.is_none_or(|bond| bond.is_broken)) {
                 contact.friction(friction.coefficient);
                 for tangent in friction.tangents.clone() {
                     contact.tangent_row((&self.tangents, tangent));
@@ -345,7 +387,9 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
             return Ok(Rates::Zero);
         }
         let mut rates = rates.iter_mut();
-        for friction in &mut self.frictions {
+        let Self { frictions, bonds, .. } = self;
+        let holds = |row: usize| bonds.iter().any(|bond| bond.row == row && !bond.is_broken);
+        for friction in frictions.iter_mut().filter(|friction| !holds(friction.row)) {
             let drag = friction.drag.as_mut().map_or([[T::zero(); 2]; 2], |drag| drag(t));
             for (rates, dragged) in rates.by_ref().take(friction.tangents.len()).zip(GapRates::dragged(drag)) {
                 *rates = dragged;
@@ -359,7 +403,23 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
         false
     }
 
+    fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {
+        for bond in self.bonds.iter().filter(|bond| !bond.is_broken) {
+            let load = -forces[bond.row].value() / bond.strength;
+            if load >= 1.0 {
+                broken.push((bond.row, load));
+            }
+        }
+    }
+
+    fn set_broken(&mut self, features: &[usize]) {
+        for bond in &mut self.bonds {
+            bond.is_broken = features.binary_search(&bond.row).is_ok();
+        }
+    }
+
     fn variation(&self) -> Variation {
-        Variation::Never
+        // (A broken bond is another law, and may have friction.)
+        if self.bonds.is_empty() { Variation::Never } else { Variation::BySearch }
     }
 }

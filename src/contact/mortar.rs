@@ -1,5 +1,6 @@
 //! Contact of two deforming surfaces by weighted gaps: segment to segment.
 
+mod bonds;
 mod integrals;
 mod pairs;
 mod passage;
@@ -7,9 +8,10 @@ mod ramp;
 mod rows;
 
 use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
-use super::{Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
+use super::{BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use bonds::Bonds;
 use integrals::{Integrals, Offsets};
 use pairs::Pairs;
 use ramp::Ramp;
@@ -66,7 +68,7 @@ const BEYOND: f64 = 0.25;
 ///
 /// # Identity
 ///
-/// (number of the slave node, 0).
+/// (number of the slave node, 0); of [bonds](Self::bonded) (number of the slave node, axis), the normal being axis 0.
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -97,6 +99,7 @@ pub struct Mortar<T: Real> {
     /// How far surfaces lie outside of their facets, by node; empty if they do not.
     offsets: Vec<f64>,
     ramp: Ramp,
+    bonds: Option<Bonds<T>>,
     pairs: Pairs,
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
@@ -138,6 +141,7 @@ impl<T: Real> Mortar<T> {
             friction: 0.0,
             offsets: Vec::new(),
             ramp: Ramp::default(),
+            bonds: None,
             pairs: Pairs::default(),
             searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
@@ -160,6 +164,57 @@ impl<T: Real> Mortar<T> {
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
+    }
+
+    /// Bonds the surfaces to each other where they lie upon each other in the reference configuration, within a tenth
+    /// of a facet: each slave node there has the rows of a [`Tie`](super::Tie), along the normal of the slave (outward,
+    /// in the mean over its area) and across it, until the traction in the mean over its area reaches the strength.
+    /// That is looked at after each step, with the forces that it reports; from the next one on the node is in contact
+    /// like any other. Nodes that touch later are not bonded.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{BondStrength, ContactConstraint, ContactLaw, Contacts, Mortar};
+    ///
+    /// // Two segments upon each other, of length 2; each node has half of it.
+    /// let coordinates = [[2.0, 0.0], [0.0, 0.0], [0.0, 0.0], [2.0, 0.0]];
+    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    /// let glue = BondStrength::new(10.0, 20.0)?;
+    /// let mut contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])?.bonded(glue)?;
+    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
+    /// // Normal and tangential force of either node; the second one is pulled by 11.
+    /// let mut broken = Vec::new();
+    /// contact.overloads(&[-9.0, 0.0, -11.0, 0.0], &mut broken);
+    /// assert_eq!(broken, [(3, 1.1)]);
+    /// contact.set_broken(&[3]);
+    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
+    /// let contacts = Contacts::of(&contact);
+    /// let laws: Vec<_> = (0..contacts.len()).map(|row| (contacts.name(row), contacts.law(row))).collect();
+    /// let (contact, tie) = (ContactLaw::Rigid, ContactLaw::Equality);
+    /// assert_eq!(laws, [((3, 0), contact), ((2, 0), tie), ((2, 1), tie)]);
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// Known failure: a crack runs by one node a step at most, and how far it runs from a notch depends on the mesh,
+    /// for a strength is no energy.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Incompatible`] with [`offsets`](Self::offsets). That nothing lies upon the other surface is an error of
+    /// the first search ([`Error::Empty`]).
+    pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
+        self.bonds = Some(Bonds::new(self.nodes.clone(), [self.slave.clone(), self.master.clone()], strength));
+        self.without_bonds_and_offsets()
+    }
+
+    /// Refuses bonds of surfaces with offsets: what lies upon what is found for facets.
+    fn without_bonds_and_offsets(self) -> Result<Self> {
+        match self.bonds.is_some() && !self.offsets.is_empty() {
+            true => Err(Error::Incompatible {
+                part: "bonds between surfaces with offsets".into(),
+                reason: "what is bonded is found where facets lie upon each other; give facets on the surfaces",
+            }),
+            false => Ok(self),
+        }
     }
 
     /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the thickness
@@ -185,7 +240,8 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node);
+    /// [`Error::Incompatible`] with [bonds](Self::bonded).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         let (expected, found) = (self.nodes.coordinates.len(), offsets.len());
         if found != expected {
@@ -196,7 +252,7 @@ impl<T: Real> Mortar<T> {
             return Err(Error::NotFinite { what: "the list of offsets (by node)", index, value });
         }
         self.reach.forget();
-        Ok(self)
+        self.without_bonds_and_offsets()
     }
 
     /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
@@ -312,6 +368,9 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
                 (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
             }
         }
+        if let Some(bonds) = &self.bonds {
+            bonds.tie().contacts(contacts);
+        }
     }
 
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
@@ -330,20 +389,30 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             self.find_pairs(t, range);
             self.integrate(t);
             let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.ramp.at(t), u };
-            for place in 0..self.slave.nodes().len() {
+            let is_bonded = |place: usize| self.bonds.as_ref().is_some_and(|bonds| bonds.hold(place));
+            for place in (0..self.slave.nodes().len()).filter(|&place| !is_bonded(place)) {
                 self.found.push(place, &self.integrals, &made);
             }
         }
+        let Self { bonds, slave, .. } = self;
+        let tied = match bonds {
+            Some(bonds) => bonds.search(slave, (t, u, v), ahead)?,
+            None => Candidates::Unchanged,
+        };
         let same = self.rows.places == self.found.places && self.rows.affine.jacobian == self.found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(Candidates::changed_if(!same))
+        Ok(Candidates::changed_if(!same || tied == Candidates::Changed))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
+        let tied = match &mut self.bonds {
+            Some(bonds) => bonds.tie_mut().follow(t, u)?,
+            None => Candidates::Unchanged,
+        };
         // A trial state that is not finite: the gaps say so.
         if self.rows.places.is_empty() || self.nodes.move_to(u).is_err() {
-            return Ok(Candidates::Unchanged);
+            return Ok(tied);
         }
         self.integrate(t);
         self.found.clear();
@@ -369,15 +438,28 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         }
         let same = rows.affine.jacobian == found.affine.jacobian;
         std::mem::swap(rows, found);
-        Ok(Candidates::changed_if(!same))
+        Ok(Candidates::changed_if(!same || tied == Candidates::Changed))
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
         let factor = self.ramp.at(t);
-        for (row, (gap, spot)) in gaps.iter_mut().zip(&self.rows.spots).enumerate() {
+        let (own, tied) = gaps.split_at_mut(self.rows.spots.len());
+        for (row, (gap, spot)) in own.iter_mut().zip(&self.rows.spots).enumerate() {
             *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);
         }
-        Ok(())
+        self.bonds.as_mut().map_or(Ok(()), |bonds| bonds.tie_mut().gaps(t, u, tied))
+    }
+
+    fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {
+        if let Some(bonds) = &self.bonds {
+            bonds.overloads(&forces[self.rows.spots.len()..], self.nodes.dimension, broken);
+        }
+    }
+
+    fn set_broken(&mut self, features: &[usize]) {
+        if let Some(bonds) = &mut self.bonds {
+            bonds.set_broken(&self.slave, features);
+        }
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {

@@ -4,7 +4,6 @@ mod candidates;
 mod passage;
 mod rows;
 
-use super::obstacle::across;
 use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surface, add_scaled, overhang};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
@@ -262,7 +261,8 @@ impl<T: Real> NodeToFacet<T> {
     /// // Two columns of two elements on a beam: their inner sides face each other, 0.5 apart.
     /// let coordinates: Vec<[f64; 2]> = (0..4).flat_map(|j| [0.0, 1.0, 1.5, 2.5].map(|x| [x, f64::from(j)])).collect();
     /// let dofs: Vec<[usize; 2]> = (0..16).map(|node| [2 * node, 2 * node + 1]).collect();
-    /// let cells = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [4, 5, 9, 8], [6, 7, 11, 10], [8, 9, 13, 12], [10, 11, 15, 14]];
+    /// let cells =
+    ///     [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [4, 5, 9, 8], [6, 7, 11, 10], [8, 9, 13, 12], [10, 11, 15, 14]];
     /// let surface = Surface::of_cells(&coordinates, cells)?;
     /// let mut contact = NodeToFacet::of_itself(&coordinates, &dofs, &surface)?;
     /// contact.search(0.0, &vec![0.0; contact.dofs().len()], &vec![0.0; contact.dofs().len()], 0.0)?;
@@ -451,12 +451,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             contact.friction(self.friction);
             let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
             let vertices = surface.facets()[stand.facet].nodes();
-            let [x, y, _] = stand.normal;
-            let tangents = match self.nodes.dimension {
-                2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
-                _ => across(stand.normal),
-            };
-            for tangent in tangents.into_iter().take(self.nodes.dimension - 1) {
+            for tangent in self.nodes.tangents(stand.normal) {
                 let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
                 let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
                     let dofs = self.nodes.places(node);

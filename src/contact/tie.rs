@@ -9,6 +9,10 @@ use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use joint::Joint;
 
+/// Share of the mean facet of the coarser surface within which surfaces are tied: more than a curved surface is off its
+/// facets that turn by 45° from one to the next.
+const REACH: f64 = 0.1;
+
 /// Two surfaces that are tied to each other where they meet in the reference configuration; their nodes need not match.
 /// Segments in two dimensions, triangles and bilinear quadrilaterals in three.
 ///
@@ -19,9 +23,9 @@ use joint::Joint;
 /// g_k = ∫ N (u_m − u_s)_k dA / ∫ N dA = 0 (length),
 ///
 /// with u_m at the point of the master that lies over the point of the slave along its facet's normal (mesh tying by
-/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Any linear displacement
-/// passes exactly, whatever the meshes. The force of a row acts along k, positive on the master and negative on the
-/// slave, and ∫ N dA is the node's [`area`](Self::area).
+/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Where the surfaces lie on
+/// each other any linear displacement passes, whatever the meshes. The force of a row acts along k, positive on the
+/// master and negative on the slave, and ∫ N dA is the node's [`area`](Self::area).
 ///
 /// # Surfaces that do not fit
 ///
@@ -76,8 +80,8 @@ pub struct Tie<T: Real> {
     rows: AffineRows<T>,
     /// Those before.
     before: AffineRows<T>,
-    /// For each row the direction in which its gap opens.
-    directions: Vec<Point>,
+    /// For each row its tied node, by place, and its axis.
+    listed: Vec<(usize, usize)>,
 }
 
 impl<T: Real> Tie<T> {
@@ -98,9 +102,6 @@ impl<T: Real> Tie<T> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        /// Share of the mean facet of the coarser surface: more than a curved surface is off its facets that turn by
-        /// 45° from one to the next.
-        const REACH: f64 = 0.1;
         let (nodes, [slave, master]) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
         let mut tie = Self {
             nodes,
@@ -110,7 +111,7 @@ impl<T: Real> Tie<T> {
             joint: Joint::default(),
             rows: AffineRows::with_capacity(0, 0),
             before: AffineRows::with_capacity(0, 0),
-            directions: Vec::new(),
+            listed: Vec::new(),
         };
         tie.join()?;
         Ok(tie)
@@ -139,27 +140,50 @@ impl<T: Real> Tie<T> {
         T::of(self.joint.areas[place])
     }
 
+    /// Ties of bonds, which may break: rows are along the normal of the slave and across it, turn with the facets, and
+    /// act on places of the dofs of `nodes` as these are.
+    pub(super) fn of_bonds(nodes: Nodes, [slave, master]: [Surface; 2]) -> Self {
+        let reach = REACH * slave.typical().max(master.typical());
+        let mut joint = Joint::new(&slave, &master, &nodes.coordinates, reach);
+        joint.align(&nodes);
+        let [rows, before] = [0, 1].map(|_| AffineRows::with_capacity(0, 0));
+        let mut tie = Self { nodes, slave, master, reach, joint, rows, before, listed: Vec::new() };
+        tie.list_rows(|_| true);
+        tie.linearize(&vec![T::zero(); tie.nodes.dofs().len()]);
+        tie
+    }
+
+    /// The row of the first axis of each node that has rows, and the node by its place among those that are tied.
+    pub(super) fn listed(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.listed.iter().enumerate().filter(|(_, (_, axis))| *axis == 0).map(|(row, &(place, _))| (row, place))
+    }
+
     /// Finds what meets, and the rows where nothing has moved.
     fn join(&mut self) -> Result<()> {
         self.joint = Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach);
         self.nodes.read_bodies([&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface)))?;
+        self.list_rows(|_| true);
         self.linearize(&vec![T::zero(); self.nodes.dofs().len()]);
         Ok(())
     }
 
     /// Makes the rows with the nodes where they are, at displacements u.
     fn linearize(&mut self, u: &[T]) {
-        let Self { nodes, joint, rows, directions, .. } = self;
+        let Self { nodes, joint, rows, listed, .. } = self;
         joint.turn(&nodes.positions);
         rows.clear();
-        directions.clear();
-        for place in 0..joint.tied.len() {
-            for axis in 0..nodes.dimension {
-                let on_axes = |(node, weight): (usize, Point)| nodes.places(node).iter().copied().zip(weight);
-                rows.push(joint.gap(place, axis), joint.row(place, axis).flat_map(on_axes), u);
-                directions.push(joint.direction(place, axis));
-            }
+        for &(place, axis) in listed.iter() {
+            let entries = joint.row(place, axis).flat_map(|entry| on_axes(nodes, entry));
+            rows.push(joint.gap(place, axis), entries, u);
         }
+    }
+
+    /// Lists the rows of the tied nodes that hold, by place.
+    pub(super) fn list_rows(&mut self, holds: impl Fn(usize) -> bool) {
+        let Self { nodes, joint, listed, .. } = self;
+        let places = (0..joint.tied.len()).filter(|&place| holds(place));
+        listed.clear();
+        listed.extend(places.flat_map(|place| (0..nodes.dimension).map(move |axis| (place, axis))));
     }
 }
 
@@ -169,25 +193,24 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let dimension = self.nodes.dimension;
-        for (row, &direction) in self.directions.iter().enumerate() {
-            let node = self.joint.tied[row / dimension];
-            let position = self.nodes.positions[node];
+        let Self { nodes, joint, rows, listed, .. } = self;
+        for (row, &(place, axis)) in listed.iter().enumerate() {
+            let node = joint.tied[place];
+            let position = nodes.positions[node];
             let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            let mut contact =
-                contacts.push_row((node, row % dimension), ContactLaw::Equality, (&self.rows.jacobian, row));
+            let mut contact = contacts.push_row((node, axis), ContactLaw::Equality, (&rows.jacobian, row));
             contact.position(position.map(T::of));
-            if self.joint.turns {
+            if joint.turns {
                 contact.magnitude(T::of(size));
             }
-            if let Some(direction) = unit(direction) {
+            if let Some(direction) = unit(joint.direction(place, axis)) {
                 contact.normal(direction.map(T::of));
             }
         }
     }
 
     fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        for (row, gap) in gaps.iter_mut().enumerate().take(self.directions.len()) {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.listed.len()) {
             *gap = self.rows.gap(row, u);
         }
         Ok(())
@@ -224,4 +247,9 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
     fn variation(&self) -> Variation {
         if self.joint.turns { Variation::Follows } else { Variation::Never }
     }
+}
+
+/// The weights of a node on its dofs.
+fn on_axes(nodes: &Nodes, (node, weight): (usize, Point)) -> impl Iterator<Item = (usize, f64)> + use<'_> {
+    nodes.places(node).iter().copied().zip(weight)
 }

@@ -337,13 +337,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let follows = check_massless(&scheme, massless.first())?;
         let fits = |resumed: Resumed<T>| resumed.checked(&scheme, (self.control, h), [dofs, massless.len()]);
         let resumed = self.resumed.map(fits).transpose()?;
-        let begin = if let Some((state, _)) = &resumed {
-            (state.motion.t, &state.motion.u[..], &state.motion.v[..])
+        let (begin, broken) = if let Some((state, _)) = &resumed {
+            ((state.motion.t, &state.motion.u[..], &state.motion.v[..]), &state.broken[..])
         } else {
             put_initial_supports(&mut *system, t, &mut u, &mut v)?;
-            (t, &u[..], &v[..])
+            ((t, &u[..], &v[..]), &[][..])
         };
-        let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), admitted)?;
+        let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), broken, admitted)?;
         if self.stability == Stability::Checked {
             stability::check_scheme(&scheme)?;
         }

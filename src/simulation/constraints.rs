@@ -6,8 +6,8 @@ use super::laws::Laws;
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
 use crate::contact::{
-    Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride, Tangents,
-    Variation,
+    BrokenBond, Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride,
+    Tangents, Variation,
 };
 use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
@@ -43,6 +43,9 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// How far the last search looks ahead.
     pub(super) ahead: f64,
     pub(super) differences: RateDifferences<T>,
+    /// Bonds that break in a step, and features of all that are broken of a constraint.
+    overloads: Vec<(usize, f64)>,
+    features: Vec<usize>,
     /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
     pub(super) overclosures: Option<Overclosures<T>>,
     pub(super) added: Vec<T>,
@@ -58,18 +61,24 @@ impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
 }
 
 impl<'a, T: Real> Constraints<'a, T> {
-    /// The constraints after a search at (t, u, v), and room for the rows of their G (kept apart: corrections read G
-    /// while they evaluate gaps), which the next search reads.
+    /// The constraints after a search at (t, u, v), with bonds that are broken there, and room for the rows of their G
+    /// (kept apart: corrections read G while they evaluate gaps), which the next search reads.
     pub(crate) fn new(
         parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
         (t, u, v): (f64, &[T], &[T]),
         prescribed: &[usize],
+        broken: &[BrokenBond],
         admitted: Admitted,
     ) -> Result<(Self, ContactJacobian<T>)> {
         let dofs = u.len();
+        if let Some(bond) = broken.iter().find(|bond| bond.constraint >= parts.len()) {
+            let part = format!("a broken bond of constraint {}", bond.constraint);
+            return Err(Error::Incompatible { part, reason: "the run that is continued had more constraints" });
+        }
         let mut places = vec![UNKNOWN; dofs];
         let (mut seen, mut local) = (vec![usize::MAX; dofs], Local::default());
         let (mut own, mut interface, mut room) = (Vec::with_capacity(parts.len()), Vec::new(), 0);
+        let mut features = Vec::new();
         let mut scratch = Contacts::new();
         for (number, mut constraint) in parts.into_iter().enumerate() {
             let list = constraint.dofs().to_vec();
@@ -84,6 +93,8 @@ impl<'a, T: Real> Constraints<'a, T> {
             }
             let (u, v) = (gather(&list, u, &mut local.u), gather(&list, v, &mut local.v));
             local.other.reserve(list.len());
+            list_features(number, broken, &mut features);
+            constraint.set_broken(&features);
             constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
             interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
             let contacts = Contacts::of(&constraint);
@@ -132,6 +143,8 @@ impl<'a, T: Real> Constraints<'a, T> {
             room,
             ahead: 0.0,
             differences: RateDifferences::default(),
+            overloads: Vec::new(),
+            features,
             overclosures: None,
             added: Vec::new(),
         };
@@ -196,6 +209,26 @@ impl<'a, T: Real> Constraints<'a, T> {
             part.constraint.inspect(&step).map_err(|error| of(number, error))?;
         }
         Ok(())
+    }
+
+    /// Breaks the bonds that do not stand the forces of a step that ends at t, and appends them to those that are
+    /// broken.
+    pub(crate) fn break_bonds(&mut self, forces: &[T], t: f64, broken: &mut Vec<BrokenBond>) {
+        let Self { parts, overloads, features, stale, .. } = self;
+        let mut rest = forces;
+        for (number, part) in parts.iter_mut().enumerate() {
+            let (own, others) = rest.split_at(part.contacts.len());
+            rest = others;
+            overloads.clear();
+            part.constraint.overloads(own, overloads);
+            if overloads.is_empty() {
+                continue;
+            }
+            broken.extend(overloads.iter().map(|&overload| BrokenBond::new(number, overload, t)));
+            list_features(number, broken, features);
+            part.constraint.set_broken(features);
+            (part.stale, *stale) = (true, true);
+        }
     }
 
     /// Moves the linearization of the rows to u.
@@ -434,6 +467,13 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         Ok(())
     }
+}
+
+/// Lists the features of the bonds of a constraint that are broken, ascending.
+fn list_features(constraint: usize, broken: &[BrokenBond], features: &mut Vec<usize>) {
+    features.clear();
+    features.extend(broken.iter().filter(|bond| bond.constraint == constraint).map(|bond| bond.feature));
+    features.sort_unstable();
 }
 
 /// Refuses (place, weight) pairs of a row that are not of the dofs that its constraint has listed, and weights that are

@@ -169,7 +169,7 @@ impl<T: Real> Simulation<'_, T> {
         let (system, contact_solver) = (&mut **system, &mut **contact_solver);
         let start =
             Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme, h, t, massless, is_smooth };
-        let Begun { state: begun, history: past, .. } =
+        let Begun { state: mut begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
         work.contact.rows.reserved = constraints.room().min(FORESEEN);
         contact_solver.reserve(work.contact.rows.reserved);
@@ -187,6 +187,7 @@ impl<T: Real> Simulation<'_, T> {
         if let Some(ledger) = &mut self.ledger {
             ledger.restart(system, &begun, (constraints, g))?;
         }
+        begun.broken = std::mem::take(&mut state.broken);
         let (pace, clock) = (history.pace, history.clock);
         (*state, *history) = (begun, past);
         (history.pace, history.clock) = (pace, clock);

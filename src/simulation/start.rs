@@ -135,7 +135,7 @@ impl<T: Real> Start<'_, T> {
             scheme: scheme.integrator.name(),
             overclosures: constraints.overclosures().cloned(),
         };
-        let state = State { motion, shown, contacts };
+        let state = State { motion, shown, contacts, broken: Vec::new() };
         check_state(h, &state)?;
         Ok(Begun { state, history, adjustment })
     }

@@ -81,6 +81,8 @@ impl<T: Real> Simulation<'_, T> {
         let flags = work.contact.trial.closed.iter().zip(&work.contact.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
+        // (What a bond has let go at the end of the last step is open in this one.)
+        let changes = changes.max(state.broken_at(past[stages - 1].t).len());
         let finite =
             scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
@@ -129,6 +131,7 @@ impl<T: Real> Simulation<'_, T> {
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
+        constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;
         history.known = (history.known + 1).min(depth);
         history.smooth = if changes > 0 { 1 } else { history.smooth + 1 };

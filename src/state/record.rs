@@ -6,7 +6,7 @@ use super::contacts::{ContactState, Names};
 use super::history::{History, Trail};
 use super::read::{COUNT, count, length, number, optional, vector};
 use super::{Motion, State};
-use crate::contact::Tangents;
+use crate::contact::{BrokenBond, Tangents};
 use crate::contact_id::ContactId;
 use crate::error::Result;
 use crate::real::Real;
@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// The format that is written, and the only one that is read.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// How every file begins.
 const KIND: &str = "contact-dynamics checkpoint";
@@ -51,6 +51,7 @@ struct StateRecord<'r, T: Real> {
     /// v and a at the time of the state, where the stored ones live elsewhere.
     shown: [Cow<'r, [T]>; 2],
     contacts: ContactsRecord<'r, T>,
+    broken_bonds: Cow<'r, [BrokenBond]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -139,27 +140,38 @@ impl<T: Real> TryFrom<String> for ScalarName<T> {
 
 impl<'r, T: Real> Record<'r, T> {
     pub(super) fn of(state: &'r State<T>, history: &'r History<T>, rows: u32) -> Self {
-        let State { motion, shown, contacts } = state;
+        let State { motion, shown, contacts, broken } = state;
         let motion = MotionRecord::of(motion);
         Self {
             format: Format,
             scalar: ScalarName(PhantomData),
             scheme: (&history.scheme).into(),
             rows,
-            state: StateRecord { motion, shown: both(shown), contacts: ContactsRecord::of(contacts) },
+            state: StateRecord {
+                motion,
+                shown: both(shown),
+                contacts: ContactsRecord::of(contacts),
+                broken_bonds: broken.into(),
+            },
             history: HistoryRecord::of(history, is_shifted(state)),
         }
     }
 
     /// State, history and the fingerprint of the rows, if a run may have left them.
     pub(super) fn checked(self) -> Result<(State<T>, History<T>, u32)> {
-        let Self { format: _, scalar: _, scheme, rows, state: StateRecord { motion, shown, contacts }, history } = self;
+        let Self { format: _, scalar: _, scheme, rows, state, history } = self;
+        let StateRecord { motion, shown, contacts, broken_bonds } = state;
         let dofs = motion.displacement.len();
         let motion = motion.checked(dofs)?;
         let [v, a] = shown;
         let shown = [optional("a velocity shown", v, dofs)?, optional("an acceleration shown", a, dofs)?];
         let contacts = contacts.checked()?;
-        let state = State { motion, shown, contacts };
+        let broken = broken_bonds.into_owned();
+        for bond in &broken {
+            number("the time at which a bond of a checkpoint broke", bond.time, "finite", f64::is_finite)?;
+            number("the load of a broken bond of a checkpoint", bond.load, "1 or more", |load| load >= 1.0)?;
+        }
+        let state = State { motion, shown, contacts, broken };
         let history = history.checked(scheme.into_owned(), dofs, is_shifted(&state))?;
         Ok((state, history, rows))
     }

@@ -3,7 +3,6 @@
 use super::integrals::{Entry, Integrals};
 use crate::contact::ContactJacobian;
 use crate::contact::affine_rows::AffineRows;
-use crate::contact::obstacle::across;
 use crate::contact::surface::{Nodes, Point};
 use crate::real::Real;
 
@@ -67,12 +66,7 @@ impl<T: Real> Rows<T> {
         let (position, offset) = (sums.position(), sums.offset());
         self.spots.push(Spot { position, normal, area: sums.area, offset, factor });
         if rubs {
-            let [x, y, _] = normal;
-            let directions = match nodes.dimension {
-                2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
-                _ => across(normal),
-            };
-            for direction in directions.into_iter().take(nodes.dimension - 1) {
+            for direction in nodes.tangents(normal) {
                 let slip = |entry: &Entry| direction.map(|x| entry.share / sums.area * x);
                 let along = entries.iter().flat_map(|entry| on_axes(nodes, entry, slip(entry)));
                 self.tangents.push_entries(along.map(|(place, weight)| (place, T::of(weight))));

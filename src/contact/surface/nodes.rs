@@ -4,6 +4,7 @@ use super::search::Bounds;
 use super::shape::{Point, add_scaled, sub};
 use super::{Facet, Surface};
 use crate::contact::dofs::DofList;
+use crate::contact::obstacle::across;
 use crate::contact::{check_coordinates, check_mesh};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -19,7 +20,7 @@ pub(crate) fn points<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<
 }
 
 /// The nodes of a mesh, some of which two surfaces read.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     pub(crate) dimension: usize,
     /// Reference coordinates, by node.
@@ -115,6 +116,16 @@ impl Nodes {
             *component = x[place].value();
         }
         vector
+    }
+
+    /// Orthonormal directions across a normal: one in the plane, two in space.
+    pub(crate) fn tangents(&self, normal: Point) -> impl Iterator<Item = Point> + use<> {
+        let [x, y, _] = normal;
+        let directions = match self.dimension {
+            2 => across([x, y]).map(|[x, y]| [x, y, 0.0]),
+            _ => across(normal),
+        };
+        directions.into_iter().take(self.dimension - 1)
     }
 
     /// The way of a node between two displacements.

@@ -2,7 +2,7 @@
 //! and the rows that they make in axes that turn with the facets.
 
 use crate::contact::surface::{
-    Base, Bounds, Facet, Neighborhood, Point, Sample, Surface, add_scaled, cross, dot, norm, sub,
+    Base, Bounds, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
 };
 use std::ops::Range;
 
@@ -11,6 +11,9 @@ const LEAST: f64 = 1e-6;
 
 /// Share of a facet within which surfaces lie upon each other: rows are then the same for ever.
 const FITS: f64 = 1e-8;
+
+/// The axes of space.
+const SPACE: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The tied nodes and what their rows are made of.
 #[derive(Debug, Default)]
@@ -27,6 +30,9 @@ pub(super) struct Joint {
     columns: Vec<usize>,
     /// The gaps at the start by tied node, in axes of space.
     initial: Vec<Point>,
+    /// For each tied node the axes of its rows in the reference configuration: those of space, or its normal and
+    /// directions across it.
+    frames: Vec<[Point; 3]>,
     /// For each of `columns` what the rows of the three axes have of it.
     weights: Vec<[Point; 3]>,
     gaps: Vec<Point>,
@@ -124,6 +130,7 @@ impl Joint {
         let tied = self.tied.len();
         (self.initial, self.gaps) = (vec![[0.0; 3]; tied], vec![[0.0; 3]; tied]);
         self.directions = vec![[[0.0; 3]; 3]; tied];
+        self.frames = vec![SPACE; tied];
         self.weights = vec![[[0.0; 3]; 3]; self.columns.len()];
         for piece in &self.pieces {
             let size = piece.facet.shape(positions).size();
@@ -133,6 +140,25 @@ impl Joint {
                     self.initial[place] = add_scaled(self.initial[place], 1.0, apart);
                 }
             }
+        }
+    }
+
+    /// Lets axes turn, and the first one be the normal of the slave, in the mean over a node's share of it.
+    pub(super) fn align(&mut self, nodes: &Nodes) {
+        self.turns = true;
+        let mut normals = vec![[0.0; 3]; self.tied.len()];
+        for piece in &self.pieces {
+            for term in &self.terms[piece.terms.clone()] {
+                if let Some((place, _)) = piece.rows[term.corner].filter(|_| piece.is_of_master(term)) {
+                    normals[place] = add_scaled(normals[place], term.weight, piece.frame[2]);
+                }
+            }
+        }
+        for (frame, normal) in self.frames.iter_mut().zip(normals) {
+            // (A sum that vanishes is that of a sheet that is folded flat: any direction is as good.)
+            let normal = unit(normal).unwrap_or(SPACE[0]);
+            frame[0] = normal;
+            frame[1..].iter_mut().zip(nodes.tangents(normal)).for_each(|(axis, tangent)| *axis = tangent);
         }
     }
 
@@ -153,26 +179,27 @@ impl Joint {
         self.gaps.fill([0.0; 3]);
         for piece in &self.pieces {
             let base = Base::new(&piece.facet, positions).filter(|_| self.turns);
-            let axes = match (&base, self.turns) {
+            let space = match (&base, self.turns) {
                 (Some(base), _) => turned(&piece.frame, &base.frame()),
-                (None, false) => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                (None, false) => SPACE,
                 // A facet that has lost its area: gaps that are no numbers are refused.
                 (None, true) => [[f64::NAN; 3]; 3],
             };
+            let axes = piece.rows.map(|row| row.map_or(space, |(place, _)| within(&space, &self.frames[place])));
             let apart = self.apart(piece, positions);
             for term in &self.terms[piece.terms.clone()] {
-                let Some((place, corners)) = piece.rows[term.corner] else { continue };
-                let is_master = !corners[..piece.facet.count].contains(&term.slot);
-                for (k, axis) in axes.iter().enumerate() {
+                let Some((place, _)) = piece.rows[term.corner] else { continue };
+                let is_of_master = piece.is_of_master(term);
+                for (k, axis) in axes[term.corner].iter().enumerate() {
                     let weight = &mut self.weights[term.slot][k];
                     *weight = add_scaled(*weight, term.weight, *axis);
-                    if is_master {
+                    if is_of_master {
                         let direction = &mut self.directions[place][k];
                         *direction = add_scaled(*direction, term.weight, *axis);
                     }
                 }
             }
-            for (apart, row) in apart.into_iter().zip(piece.rows) {
+            for ((apart, row), axes) in apart.into_iter().zip(piece.rows).zip(axes) {
                 let (Some((place, corners)), true) = (row, self.turns) else { continue };
                 for (k, &axis) in axes.iter().enumerate() {
                     self.gaps[place][k] += dot(apart, axis);
@@ -188,7 +215,10 @@ impl Joint {
 
     /// The gap of a tied node along an axis where the rows were made.
     pub(super) fn gap(&self, place: usize, axis: usize) -> f64 {
-        if self.turns { self.gaps[place][axis] - self.initial[place][axis] } else { 0.0 }
+        match self.turns {
+            true => self.gaps[place][axis] - dot(self.initial[place], self.frames[place][axis]),
+            false => 0.0,
+        }
     }
 
     /// Its row: nodes, and what their displacements are multiplied by.
@@ -210,6 +240,19 @@ impl Joint {
         nodes.retain(|node| surface.nodes().binary_search(node).is_ok());
         nodes
     }
+}
+
+impl Piece {
+    /// Whether a term is that of a node of the master.
+    fn is_of_master(&self, term: &Term) -> bool {
+        !self.facet.nodes().contains(&term.node)
+    }
+}
+
+/// The vectors that a frame has, for axes of space where these are now.
+fn within(space: &[Point; 3], frame: &[Point; 3]) -> [Point; 3] {
+    let vector = |v: Point| v.iter().zip(space).fold([0.0; 3], |sum, (&v, &axis)| add_scaled(sum, v, axis));
+    frame.map(vector)
 }
 
 /// Where the axes of space are that have turned as a frame has.

@@ -1,0 +1,78 @@
+//! Bonds: equality rows that hold until their force is too large.
+
+use crate::error::{Error, Result};
+
+/// What a bond between two surfaces bears: stresses (force/area; force/length in two dimensions) in tension, along the
+/// normal, and in shear, across it.
+///
+/// A bond breaks where the tension σ and the shear τ that it holds together reach
+///
+/// √((⟨σ⟩/σ_max)² + (τ/τ_max)²) = 1, ⟨σ⟩ = max(σ, 0),
+///
+/// the quadratic criterion of stresses that is usual for cohesive interfaces (Camanho and Dávila, NASA/TM-2002-211737,
+/// eq. 8). Compression breaks nothing. It breaks as a whole and at once: no energy is held by it, and none is needed to
+/// open what is broken (`docs/contact.md`, bonds).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BondStrength {
+    tension: f64,
+    shear: f64,
+}
+
+impl BondStrength {
+    /// σ_max and τ_max. Infinite where tension, or shear, never breaks it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless both are positive, and one of them finite.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::BondStrength;
+    /// let mortar_joint = BondStrength::new(2e5, 4e5)?;
+    /// assert!((mortar_joint.load([1.2e5, 3.2e5]) - 1.0).abs() < 1e-15);
+    /// assert!(BondStrength::new(0.0, 1.0).is_err());
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    pub fn new(tension: f64, shear: f64) -> Result<Self> {
+        for value in [tension, shear] {
+            if !(value > 0.0 && value.recip().is_finite()) {
+                let range = "positive, and infinite for one of them at most";
+                return Err(Error::Parameter { name: "the strength of a bond", value, range });
+            }
+        }
+        match tension.min(shear) {
+            least if least.is_finite() => Ok(Self { tension, shear }),
+            value => {
+                let range = "finite for one of them: tie what never breaks";
+                Err(Error::Parameter { name: "the strength of a bond", value, range })
+            }
+        }
+    }
+
+    /// How many times as large as the strength stresses are, tension (negative in compression) and shear: it breaks at
+    /// 1.
+    pub fn load(&self, [tension, shear]: [f64; 2]) -> f64 {
+        (tension.max(0.0) / self.tension).hypot(shear / self.shear)
+    }
+}
+
+/// A bond that a run has broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BrokenBond {
+    /// The constraint, by its place in the order in which they were given.
+    pub constraint: usize,
+    /// The bond: the [feature](super::ContactId::feature) of its rows.
+    pub feature: usize,
+    /// The end of the last step in which it held.
+    pub time: f64,
+    /// The force at that time over the strength, from 1: by how much more the step has taken it past its strength.
+    pub load: f64,
+}
+
+impl BrokenBond {
+    pub(crate) fn new(constraint: usize, (feature, load): (usize, f64), time: f64) -> Self {
+        Self { constraint, feature, time, load }
+    }
+}
