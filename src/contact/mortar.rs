@@ -5,10 +5,13 @@ mod integrals;
 mod pairs;
 mod passage;
 mod ramp;
+mod rates;
 mod rows;
 
 use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
-use super::{BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, Stride, check_local};
+use super::{
+    BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
+};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use bonds::Bonds;
@@ -52,8 +55,8 @@ const BEYOND: f64 = 0.25;
 /// # Linearization
 ///
 /// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
-/// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are found by differences. What is close
-/// enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
+/// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are differences of gaps along the motion.
+/// What is close enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
 /// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the
 /// search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
 /// through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a smaller step
@@ -109,6 +112,9 @@ pub struct Mortar<T: Real> {
     found: Rows<T>,
     /// What looking at a step needs.
     look: passage::Look,
+    /// What rates need, and how far the last search looks ahead.
+    rates: rates::Rates,
+    ahead: f64,
 }
 
 impl<T: Real> Mortar<T> {
@@ -148,6 +154,8 @@ impl<T: Real> Mortar<T> {
             rows: Rows::new(),
             found: Rows::new(),
             look: passage::Look::default(),
+            rates: rates::Rates::default(),
+            ahead: 0.0,
         })
     }
 
@@ -375,6 +383,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
 
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
+        self.ahead = ahead;
         let boxes = self.nodes.move_to(u)?;
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         let thickness = self.thickest(t)[1].max(self.thickest(t + ahead)[1]);
@@ -448,6 +457,17 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);
         }
         self.bonds.as_mut().map_or(Ok(()), |bonds| bonds.tie_mut().gaps(t, u, tied))
+    }
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let (own, tied) = rates.split_at_mut(self.rows.spots.len());
+        if !own.is_empty() {
+            self.rates_along((t, u, v), own);
+        }
+        if let Some(bonds) = &mut self.bonds {
+            bonds.tie_mut().rates(t, u, v, tied)?;
+        }
+        Ok(Rates::Given)
     }
 
     fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {

@@ -10,6 +10,7 @@ mod overlap;
 mod projection;
 mod reach;
 mod search;
+mod second_difference;
 mod shape;
 
 pub use facet::Facet;
@@ -19,6 +20,7 @@ pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand};
 pub(crate) use reach::Reach;
 pub(crate) use search::{Bounds, Neighborhood, overhang};
+pub(crate) use second_difference::SecondDifference;
 pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;

@@ -3,7 +3,7 @@
 mod joint;
 
 use super::affine_rows::AffineRows;
-use super::surface::{Facet, Nodes, Point, Surface, unit};
+use super::surface::{Facet, Nodes, Point, SecondDifference, Surface, unit};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Variation, check_local};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -44,7 +44,7 @@ const REACH: f64 = 0.1;
 /// # Known failure
 ///
 /// - Over quadrilaterals that are no parallelograms integrals are those of a quadrature (1e-7 in the patch test).
-/// - Rates of rows that turn are found by differences.
+/// - Rates of rows that turn are differences of gaps along the motion.
 /// - Facets that see each other at more than 60° are not tied.
 ///
 /// # Identity
@@ -82,6 +82,9 @@ pub struct Tie<T: Real> {
     before: AffineRows<T>,
     /// For each row its tied node, by place, and its axis.
     listed: Vec<(usize, usize)>,
+    /// What rates need, and how far the last search looks ahead.
+    differences: SecondDifference,
+    ahead: f64,
 }
 
 impl<T: Real> Tie<T> {
@@ -112,6 +115,8 @@ impl<T: Real> Tie<T> {
             rows: AffineRows::with_capacity(0, 0),
             before: AffineRows::with_capacity(0, 0),
             listed: Vec::new(),
+            differences: SecondDifference::default(),
+            ahead: 0.0,
         };
         tie.join()?;
         Ok(tie)
@@ -147,7 +152,9 @@ impl<T: Real> Tie<T> {
         let mut joint = Joint::new(&slave, &master, &nodes.coordinates, reach);
         joint.align(&nodes);
         let [rows, before] = [0, 1].map(|_| AffineRows::with_capacity(0, 0));
-        let mut tie = Self { nodes, slave, master, reach, joint, rows, before, listed: Vec::new() };
+        let differences = SecondDifference::default();
+        let mut tie =
+            Self { nodes, slave, master, reach, joint, rows, before, listed: Vec::new(), differences, ahead: 0.0 };
         tie.list_rows(|_| true);
         tie.linearize(&vec![T::zero(); tie.nodes.dofs().len()]);
         tie
@@ -216,11 +223,24 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
         Ok(())
     }
 
-    fn rates(&mut self, _t: f64, _u: &[T], _v: &[T], _rates: &mut [GapRates<T>]) -> Result<Rates> {
-        Ok(if self.joint.turns { Rates::Differences } else { Rates::Zero })
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let Self { nodes, slave, master, joint, listed, differences, ahead, .. } = self;
+        if !joint.turns {
+            return Ok(Rates::Zero);
+        }
+        rates.fill(GapRates::default());
+        let gaps = |_: f64, positions: &[Point], list: &mut Vec<f64>| {
+            joint.gaps_at(positions);
+            list.extend(listed.iter().map(|&(place, axis)| joint.gap(place, axis)));
+        };
+        differences.find(nodes, (t, u, v), (*ahead, slave.finest().min(master.finest())), gaps, |row, acceleration| {
+            rates[row].acceleration = T::of(acceleration);
+        });
+        Ok(Rates::Given)
     }
 
-    fn search(&mut self, t: f64, u: &[T], _v: &[T], _ahead: f64) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], _v: &[T], ahead: f64) -> Result<Candidates> {
+        self.ahead = ahead;
         if self.joint.tied.is_empty() {
             let remedy = "bring the surfaces within the reach of the tie, face to face, or give a larger one";
             return Err(Error::Empty { what: "the list of tied nodes", remedy });

@@ -27,9 +27,21 @@ pub(super) struct Offsets<'a> {
 }
 
 impl Offsets<'_> {
-    /// At the corners of a facet, without the factor.
-    fn of(&self, facet: &Facet) -> [f64; 4] {
-        facet.nodes.map(|node| self.by_node.get(node).copied().unwrap_or(0.0))
+    /// At the corners of a slave facet and of a master facet, without the factor.
+    fn between(&self, slave: &Facet, master: &Facet) -> Outside {
+        let of = |facet: &Facet| facet.nodes.map(|node| self.by_node.get(node).copied().unwrap_or(0.0));
+        Outside([of(slave), of(master)])
+    }
+}
+
+/// Offsets at the corners of two facets.
+struct Outside([[f64; 4]; 2]);
+
+impl Outside {
+    /// Their sum where the shape functions are these.
+    fn at(&self, slave: &[f64; 4], master: &[f64; 4]) -> f64 {
+        let Self([own, others]) = self;
+        (0..4).map(|k| slave[k] * own[k] + master[k] * others[k]).sum()
     }
 }
 
@@ -49,6 +61,21 @@ pub(super) struct Sums {
 }
 
 impl Sums {
+    /// Adds the whole of a slave facet to the sums of its nodes; returns their places.
+    fn begin(sums: &mut [Self], slave: &Surface, facet: &Facet, base: &Base) -> [usize; 4] {
+        let (places, count) = (facet.nodes.map(|node| slave.place(node)), base.count());
+        let whole = norm(base.product) * [1.0, 0.5, 4.0][count - 2] / count as f64;
+        places[..count].iter().for_each(|&place| sums[place].whole += whole);
+        places
+    }
+
+    /// Adds a point.
+    fn add(&mut self, weight: f64, gap: f64, offset: f64) {
+        self.area += weight;
+        self.moment += weight * gap;
+        self.offset += weight * offset;
+    }
+
     /// Whether enough is covered for a row.
     pub(super) fn is_covered(&self) -> bool {
         self.area > LEAST * self.whole
@@ -57,6 +84,11 @@ impl Sums {
     /// The mean of the gap with the weights of the node.
     pub(super) fn gap(&self) -> f64 {
         self.moment / self.area
+    }
+
+    /// The same; NaN unless enough is covered.
+    pub(super) fn gap_if_covered(&self) -> f64 {
+        if self.is_covered() { self.gap() } else { f64::NAN }
     }
 
     /// The mean of the offsets of both surfaces, where they have their full size.
@@ -166,6 +198,32 @@ impl Integrals {
         &self.merged[self.starts[place]..self.starts[place + 1]]
     }
 
+    /// Integrates as [`integrate`](Self::integrate) does, without what derivatives need: areas and gaps.
+    pub(super) fn sum<'p>(
+        &mut self,
+        [slave, master]: [&Surface; 2],
+        positions: &[Point],
+        offsets: Offsets<'_>,
+        partners: impl Fn(usize) -> &'p [usize],
+    ) {
+        let sums = &mut self.sums;
+        sums.clear();
+        sums.resize(slave.nodes().len(), Sums::default());
+        for (index, facet) in slave.facets().iter().enumerate() {
+            let Some(base) = Base::new(facet, positions) else { continue };
+            let places = Sums::begin(sums, slave, facet, &base);
+            for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
+                let outside = offsets.between(facet, other);
+                base.each_sample(other, positions, &mut |sample: &Sample| {
+                    let offset = outside.at(&sample.slave, &sample.master);
+                    for (&place, share) in places.iter().zip(sample.slave).take(base.count()) {
+                        sums[place].add(sample.area * share, sample.gap - offsets.factor * offset, offset);
+                    }
+                });
+            }
+        }
+    }
+
     /// Integrates over all facets of the slave surface what the master facets listed for each cover.
     pub(super) fn integrate<'p>(
         &mut self,
@@ -180,10 +238,7 @@ impl Integrals {
         self.entries.clear();
         for (index, facet) in slave.facets().iter().enumerate() {
             let Some(base) = Base::new(facet, positions) else { continue };
-            let nodes = facet.nodes();
-            let places: [usize; 4] = facet.nodes.map(|node| slave.place(node));
-            let whole = norm(base.product) * [1.0, 0.5, 4.0][nodes.len() - 2] / nodes.len() as f64;
-            places[..nodes.len()].iter().for_each(|&place| self.sums[place].whole += whole);
+            let places = Sums::begin(&mut self.sums, slave, facet, &base);
             let mut block = Block::default();
             let mut touched = false;
             for &partner in partners(index) {
@@ -192,7 +247,7 @@ impl Integrals {
             }
             if touched {
                 block.turn(&base);
-                self.push_all(&places, nodes.len(), facet, &block);
+                self.push_all(&places, base.count(), facet, &block);
             }
         }
         self.merge();
@@ -208,11 +263,7 @@ impl Integrals {
         block: &mut Block,
     ) -> bool {
         let count = base.count();
-        let [own, others] = [facet, other].map(|facet| offsets.of(facet));
-        let product_of = |weights: &[f64; 4], values: &[f64; 4]| -> f64 {
-            weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
-        };
-        let offset_at = |slave: &[f64; 4], master: &[f64; 4]| product_of(slave, &own) + product_of(master, &others);
+        let outside = offsets.between(facet, other);
         let mut onto = Block::default();
         let mut touched = false;
         base.each_sample(other, positions, &mut |sample: &Sample| {
@@ -220,9 +271,9 @@ impl Integrals {
             let Sample { area, slave, master, gap: distance, direction: normal } = *sample;
             let (mut gap, mut direction, mut offset) = (distance, normal, 0.0);
             if !offsets.by_node.is_empty() {
-                offset = offset_at(&slave, &master);
+                offset = outside.at(&slave, &master);
                 gap -= offsets.factor * offset;
-                direction = add_scaled(normal, offsets.factor, base.slope(other, positions, &master, &others));
+                direction = add_scaled(normal, offsets.factor, base.slope(other, positions, &master, &outside.0[1]));
             }
             let point = base.shape.point(&slave);
             // (Of a segment the second tangent is the unit vector out of the plane, and this its length times n.)
@@ -233,9 +284,7 @@ impl Integrals {
             for a in 0..count {
                 let weight = area * slave[a];
                 let sums = &mut self.sums[places[a]];
-                sums.area += weight;
-                sums.moment += weight * gap;
-                sums.offset += weight * offset;
+                sums.add(weight, gap, offset);
                 sums.position = add_scaled(sums.position, weight, point);
                 sums.normal = add_scaled(sums.normal, -weight, normal);
                 let by_area = omega * slave[a];
@@ -258,7 +307,7 @@ impl Integrals {
         });
         if touched {
             base.each_rim_sample(other, open, positions, &mut |sample: &RimSample| {
-                let offset = offsets.factor * offset_at(&sample.slave, &sample.master);
+                let offset = offsets.factor * outside.at(&sample.slave, &sample.master);
                 block.add_rim(sample, offset, count, &mut onto);
             });
             self.push_all(places, count, other, &onto);

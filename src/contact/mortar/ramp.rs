@@ -32,10 +32,20 @@ impl Ramp {
         Ok(Self { times, factors })
     }
 
+    /// How far from the beginning to the end t is, from 0 to 1.
+    fn place(&self, t: f64) -> f64 {
+        ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0)
+    }
+
+    /// How the factor changes in time.
+    pub(super) fn rate(&self, t: f64) -> f64 {
+        let ([from, to], s) = (self.factors, self.place(t));
+        30.0 * (to - from) / (self.times[1] - self.times[0]) * (s * (1.0 - s)).powi(2)
+    }
+
     /// The factor at t.
     pub(super) fn at(&self, t: f64) -> f64 {
-        let [from, to] = self.factors;
-        let s = ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0);
+        let ([from, to], s) = (self.factors, self.place(t));
         // Its first two derivatives are zero at both ends.
         from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
     }

@@ -172,20 +172,39 @@ impl Joint {
         apart
     }
 
+    /// The axes of the rows of a piece's corners, if its facet lies like this (none if it has lost its area: gaps that are
+    /// no numbers are refused).
+    fn axes(&self, piece: &Piece, base: Option<&Base>) -> [[Point; 3]; 4] {
+        let space = match (base, self.turns) {
+            (Some(base), true) => turned(&piece.frame, &base.frame()),
+            (None, true) => [[f64::NAN; 3]; 3],
+            (_, false) => SPACE,
+        };
+        piece.rows.map(|row| row.map_or(space, |(place, _)| within(&space, &self.frames[place])))
+    }
+
+    /// Finds the [gaps](Self::gap) for nodes at these positions, and leaves the rows as they are.
+    pub(super) fn gaps_at(&mut self, positions: &[Point]) {
+        let mut gaps = std::mem::take(&mut self.gaps);
+        gaps.fill([0.0; 3]);
+        for piece in self.pieces.iter().filter(|_| self.turns) {
+            let axes = self.axes(piece, Base::new(&piece.facet, positions).as_ref());
+            for ((apart, row), axes) in self.apart(piece, positions).into_iter().zip(piece.rows).zip(axes) {
+                let Some((place, _)) = row else { continue };
+                gaps[place].iter_mut().zip(axes).for_each(|(gap, axis)| *gap += dot(apart, axis));
+            }
+        }
+        self.gaps = gaps;
+    }
+
     /// Makes the rows for nodes at these positions.
     pub(super) fn turn(&mut self, positions: &[Point]) {
+        self.gaps_at(positions);
         self.weights.fill([[0.0; 3]; 3]);
         self.directions.fill([[0.0; 3]; 3]);
-        self.gaps.fill([0.0; 3]);
         for piece in &self.pieces {
             let base = Base::new(&piece.facet, positions).filter(|_| self.turns);
-            let space = match (&base, self.turns) {
-                (Some(base), _) => turned(&piece.frame, &base.frame()),
-                (None, false) => SPACE,
-                // A facet that has lost its area: gaps that are no numbers are refused.
-                (None, true) => [[f64::NAN; 3]; 3],
-            };
-            let axes = piece.rows.map(|row| row.map_or(space, |(place, _)| within(&space, &self.frames[place])));
+            let axes = self.axes(piece, base.as_ref());
             let apart = self.apart(piece, positions);
             for term in &self.terms[piece.terms.clone()] {
                 let Some((place, _)) = piece.rows[term.corner] else { continue };
@@ -200,10 +219,8 @@ impl Joint {
                 }
             }
             for ((apart, row), axes) in apart.into_iter().zip(piece.rows).zip(axes) {
-                let (Some((place, corners)), true) = (row, self.turns) else { continue };
+                let (Some((_, corners)), Some(base)) = (row, &base) else { continue };
                 for (k, &axis) in axes.iter().enumerate() {
-                    self.gaps[place][k] += dot(apart, axis);
-                    let Some(base) = &base else { continue };
                     let by_corner = base.rotated(cross(axis, apart));
                     for (&slot, by) in corners[..piece.facet.count].iter().zip(by_corner) {
                         self.weights[slot][k] = add_scaled(self.weights[slot][k], 1.0, by);

@@ -1,0 +1,66 @@
+//! Second differences of gaps along a straight motion of the nodes: what a gap's acceleration has of its own.
+
+use super::{Nodes, Point, add_scaled, norm};
+use crate::real::Real;
+use crate::state::resolution;
+
+/// Share of the time ahead by which gaps are differenced: as for gaps whose rates the run finds itself
+/// (`simulation/rate_differences.rs`).
+const SHARE: f64 = 1.0 / 16.0;
+
+/// Share of the smallest facet that nodes go where nothing is known of a step.
+const WAY: f64 = 1e-3;
+
+/// Roundings of the numbers that a gap is summed from within which a difference is none.
+const ROUNDINGS: f64 = 32.0;
+
+/// Gaps before, now and after, and where nodes are there.
+#[derive(Debug, Default)]
+pub(crate) struct SecondDifference {
+    positions: Vec<Point>,
+    gaps: [Vec<f64>; 3],
+}
+
+impl SecondDifference {
+    /// d²g/ds² of the gaps at time t + s and displacements u + s v, for s = 0, by row: calls `gaps` three times, with a
+    /// time and where the nodes of both bodies are then, for a list of gaps (NaN where there is none). `ahead` is the
+    /// time that the last search looks ahead, and `finest` the smallest facet, of which nodes go a share if that is zero.
+    /// Differences that are rounding are zero.
+    pub(crate) fn find<T: Real>(
+        &mut self,
+        nodes: &Nodes,
+        (t, u, v): (f64, &[T], &[T]),
+        (ahead, finest): (f64, f64),
+        mut gaps: impl FnMut(f64, &[Point], &mut Vec<f64>),
+        mut act: impl FnMut(usize, f64),
+    ) {
+        let speeds = nodes.bodies().iter().flatten().map(|&node| norm(nodes.vector(node, v)));
+        let fastest = speeds.fold(0.0, f64::max);
+        let step = match (ahead > 0.0, fastest > 0.0) {
+            (true, _) => SHARE * ahead,
+            (false, true) => WAY * finest / fastest,
+            (false, false) => 0.0,
+        };
+        // A time that t can tell apart.
+        let delta = (t + step.max(resolution(t))) - t;
+        let mut size = 0.0_f64;
+        for (s, list) in [-delta, 0.0, delta].into_iter().zip(&mut self.gaps) {
+            self.positions.resize(nodes.coordinates.len(), [0.0; 3]);
+            for &node in nodes.bodies().iter().flatten() {
+                let moved = add_scaled(nodes.vector(node, u), s, nodes.vector(node, v));
+                let position = add_scaled(nodes.coordinates[node], 1.0, moved);
+                size = position.iter().fold(size, |most, x| most.max(x.abs()));
+                self.positions[node] = position;
+            }
+            list.clear();
+            gaps(t + s, &self.positions, list);
+        }
+        let [before, now, after] = &self.gaps;
+        for (row, ((before, now), after)) in before.iter().zip(now).zip(after).enumerate() {
+            let change = (after - now) - (now - before);
+            let most = before.abs().max(now.abs()).max(after.abs());
+            let rounded = ROUNDINGS * f64::EPSILON * (size + most);
+            act(row, if change.abs() > rounded { change / (delta * delta) } else { 0.0 });
+        }
+    }
+}
