@@ -15,8 +15,8 @@ pub enum AdmissibleSet {
     NonNegative,
     /// A row with y = 0, and λ of either sign.
     Free,
-    /// A contact with Coulomb's friction in a plane: a normal row with 0 ≤ y_n ⊥ p ≥ 0, and a tangential one. |f| ≤ μ p,
-    /// and y_t, the slip, is zero or opposes f, which is then on the rim of the cone: y_t = −γ f, γ ≥ 0,
+    /// A contact with Coulomb's friction in a plane: a normal row with 0 ≤ y_n ⊥ p ≥ 0, and a tangential one.
+    /// |f| ≤ μ p, and y_t, the slip, is zero or opposes f, which is then on the rim of the cone: y_t = −γ f, γ ≥ 0,
     /// γ (μ p − |f|) = 0. (This is no condition of a minimum: where it slides y_n is zero, not −μ |y_t|.)
     Cone2 {
         /// μ, from 0.

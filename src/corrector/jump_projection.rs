@@ -14,8 +14,9 @@ use crate::sparse;
 ///
 /// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the mass
 /// norm: momentum is conserved (rows of G that sum to zero), kinetic energy falls by `½ jumpᵀ S⁻¹ jump`, never rises.
-/// For a lumped mass everything is local to the contact nodes; for a consistent one all dofs around them change, found by
-/// conjugate gradients on M (by a factor, if M is a chain or badly conditioned). Rows that share nodes or dofs are projected together. Prescribed dofs are not moved.
+/// For a lumped mass everything is local to the contact nodes; for a consistent one all dofs around them change, found
+/// by conjugate gradients on M (by a factor, if M is a chain or badly conditioned). Rows that share nodes or dofs are
+/// projected together. Prescribed dofs are not moved.
 ///
 /// The correction of Zhang et al. (Eng. Mech. 40 (Suppl.), 2023, eqs. (12), (13), in the form derived in
 /// `docs/theory.md`), in a loop of one's own, after the contact problem of a step gave u, v, a and the raw multiplier

@@ -19,8 +19,9 @@ use std::ops::Range;
 /// Partial sums of a dot product.
 const LANES: usize = 8;
 
-/// Columns of a heavy panel that are swept before threads share out what lies below them; the fewest rows that are worth
-/// a share forward, and columns of a share backward. (Multiples of eight: groups of columns are the same in all parts.)
+/// Columns of a heavy panel that are swept before threads share out what lies below them; the fewest rows that are
+/// worth a share forward, and columns of a share backward. (Multiples of eight: groups of columns are the same in all
+/// parts.)
 const BLOCK: usize = 128;
 const ROWS: usize = 256;
 const SHARE: usize = 16;
@@ -247,8 +248,8 @@ impl<T: Scalar> Panel<'_, T> {
         (fours..columns.end).for_each(|column| self.subtract_group::<1>(arch, column, x, from, y));
     }
 
-    /// Products of the columns from `first` on, one for each of the `sums`, and the solution `x` on the rows from `from`
-    /// on.
+    /// Products of the columns from `first` on, one for each of the `sums`, and the solution `x` on the rows from
+    /// `from` on.
     fn dots(&self, arch: Arch, first: usize, from: usize, x: &[T], sums: &mut [T]) {
         let mut column = first;
         let (eights, rest) = sums.as_chunks_mut();

@@ -45,8 +45,8 @@ use faer::sparse::linalg::cholesky::{
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Ordering {
-    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has fewer
-    /// entries in the factor (zeros that faer adds where columns are much alike are not counted).
+    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has
+    /// fewer entries in the factor (zeros that faer adds where columns are much alike are not counted).
     #[default]
     Automatic,
     /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and

@@ -38,9 +38,9 @@ pub(super) fn factor<T: Real>(
 /// The inverse of a consistent mass, applied to forces on few dofs at a time.
 ///
 /// A mass matrix is well conditioned once its diagonal is scaled, whatever the mesh: conjugate gradients need no more
-/// than some twenty iterations to rounding, and the memory of half of M. Entries of M⁻¹ decay fast with the distance (by
-/// 0.27 an element of linear shape functions), so that they work on the layers of dofs around the forces alone. What
-/// they do not serve has a factor: chains, whose factor is as small as M, and matrices on which a trial is slow.
+/// than some twenty iterations to rounding, and the memory of half of M. Entries of M⁻¹ decay fast with the distance
+/// (by 0.27 an element of linear shape functions), so that they work on the layers of dofs around the forces alone.
+/// What they do not serve has a factor: chains, whose factor is as small as M, and matrices on which a trial is slow.
 #[derive(Debug)]
 pub(crate) struct ConsistentInverse<T: Real> {
     /// Dofs without response, ascending.
@@ -439,7 +439,8 @@ mod tests {
                 left[dof] -= 1.0;
                 left[9] = 0.0;
                 assert!(x[9] == 0.0 && left.iter().all(|x| x.abs() < 4e-15), "{beside} {dof}");
-                // (Dof 9 is on the line of dof 1 and shields all behind it: M is a product of one along and one across.)
+                // (Dof 9 is on the line of dof 1 and shields all behind it: M is a product of one along and one
+                // across.)
                 assert_eq!(x[4 * 50] == 0.0, is_local || dof == 1, "{beside} {dof}");
                 // The same alone, and among others.
                 assert_eq!(responses(&mut inverse, &[dof])[0], *x);

@@ -98,7 +98,8 @@ struct Part<T> {
 }
 
 impl<T: Real> Supervariables<T> {
-    /// Columns together at most: a kernel is compiled for each number. (The six dofs of a shell's node are two of them.)
+    /// Columns together at most: a kernel is compiled for each number. (The six dofs of a shell's node are two of
+    /// them.)
     const WIDEST: usize = 3;
     /// Below so many columns a supervariable, on average, rows are as fast.
     const WORTHWHILE: f64 = 1.5;

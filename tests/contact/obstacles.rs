@@ -163,8 +163,9 @@ fn capsules_and_cuboids_have_their_distances() {
 
 #[test]
 fn a_particle_slides_over_a_cuboid_and_a_capsule_and_falls_off() {
-    // Where the end of the box begins to turn it leaves along a parabola, too fast for the edge; around the end of the rod it stays until gravity does not hold
-    // it, at a height of two thirds of the radius above the middle less v²/(3 g).
+    // Where the end of the box begins to turn it leaves along a parabola, too fast for the edge; around the end of the
+    // rod it stays until gravity does not hold it, at a height of two thirds of the radius above the middle less
+    // v²/(3 g).
     let run = |obstacle: Box<dyn Obstacle<f64, 2>>, start: [f64; 2]| {
         let mut run = Simulation::builder(particles::<2>(1, 10.0), Newmark::trapezoidal(), 1e-3)
             .displacement(start.to_vec())

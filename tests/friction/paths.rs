@@ -148,8 +148,8 @@ fn modes_couple_above_the_threshold() {
     }
 }
 
-/// A contact node without mass, pulled along a floor by its spring at the start: it stays where friction can hold it, or
-/// slides until it can, and the run goes on from there.
+/// A contact node without mass, pulled along a floor by its spring at the start: it stays where friction can hold it,
+/// or slides until it can, and the run goes on from there.
 #[test]
 fn dofs_without_mass_begin_with_friction() {
     for (friction, rests) in [(0.0, 0.5), (0.6, 0.0), (0.3, 0.2)] {

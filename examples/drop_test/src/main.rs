@@ -155,8 +155,8 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Adds the state to the history; `friction` was lost by friction before this run. Returns the contact forces on all
-    /// dofs.
+    /// Adds the state to the history; `friction` was lost by friction before this run. Returns the contact forces on
+    /// all dofs.
     fn record(&mut self, friction: f64) -> Vec<f64> {
         let forces = self.forces();
         let mut force = [0.0; 3];

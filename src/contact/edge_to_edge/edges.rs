@@ -9,7 +9,8 @@ pub(super) struct Edge {
     pub(super) nodes: [usize; 2],
     /// Its length in the reference coordinates.
     pub(super) length: f64,
-    /// The facet that has them in this order, and which of its sides that is; then the facet that has them in the other.
+    /// The facet that has them in this order, and which of its sides that is; then the facet that has them in the
+    /// other.
     sides: [(usize, usize); 2],
 }
 

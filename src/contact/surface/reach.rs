@@ -70,7 +70,8 @@ impl Reach {
         Some(self.listed)
     }
 
-    /// Up to which distance from a node lists hold all now, with the motion of the other body; below zero without lists.
+    /// Up to which distance from a node lists hold all now, with the motion of the other body; below zero without
+    /// lists.
     pub(crate) fn known_around(&self, node: usize, position: Point, other: &Bounds) -> f64 {
         let moved = self
             .built_at
