@@ -3,6 +3,7 @@
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
 mod corners;
+mod hertz;
 mod ironing;
 mod patch;
 mod rings;
@@ -17,6 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tables = [
         patch::table(quick)?,
         ties::table(quick)?,
+        hertz::table(quick)?,
         ironing::table(quick)?,
         rings::table(quick)?,
         corners::table(quick)?,
