@@ -6,6 +6,7 @@ mod corners;
 mod hertz;
 mod ironing;
 mod patch;
+mod rebound;
 mod rings;
 mod ties;
 
@@ -21,6 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         hertz::table(quick)?,
         ironing::table(quick)?,
         rings::table(quick)?,
+        rebound::table(quick)?,
         corners::table(quick)?,
     ]
     .join("\n");
