@@ -3,8 +3,10 @@
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
 mod corners;
+mod hertz;
 mod ironing;
 mod patch;
+mod rebound;
 mod rings;
 mod ties;
 
@@ -17,8 +19,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tables = [
         patch::table(quick)?,
         ties::table(quick)?,
+        hertz::table(quick)?,
         ironing::table(quick)?,
         rings::table(quick)?,
+        rebound::table(quick)?,
         corners::table(quick)?,
     ]
     .join("\n");

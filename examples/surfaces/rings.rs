@@ -12,7 +12,13 @@ const MATERIAL: Material = Material { young: 1.0, poisson: 0.4, density: 1e-3 };
 /// Between the centers, along and across.
 const APART: [f64; 2] = [80.5, 20.0];
 
-const SPEED: f64 = 2.0;
+pub(crate) const SPEED: f64 = 2.0;
+
+/// When the rings have left each other.
+pub(crate) const END: f64 = 120.0;
+
+/// What [`Rings::contact`] knows.
+pub(crate) const CONTACTS: [&str; 3] = ["one pass", "two passes", "mortar"];
 
 /// Energies, momenta and the work of Newton's method, by contact and scheme.
 pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
@@ -24,10 +30,10 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let meshes = if quick { &[[32, 24]][..] } else { &[[64, 64], [64, 90]] };
-    let until = if quick { 20.0 } else { 120.0 };
+    let until = if quick { 20.0 } else { END };
     for &around in meshes {
-        let rings = Rings::new(around);
-        for name in ["one pass", "two passes", "mortar"] {
+        let rings = Rings::new(3, around);
+        for name in CONTACTS {
             for scheme in [|| Box::new(Composite) as Box<dyn TimeIntegrator>, || Box::new(EnergyMomentum) as _] {
                 let line = match rings.run(rings.contact(name)?, scheme(), until) {
                     Ok([highest, last, linear, angular, iterations, refused]) => format!(
@@ -43,17 +49,18 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     Ok(table)
 }
 
-struct Rings {
-    solid: Solid<2>,
+pub(crate) struct Rings {
+    pub(crate) solid: Solid<2>,
     /// Number of nodes of the first one.
-    split: usize,
+    pub(crate) split: usize,
     /// Outer surfaces.
     facets: [Vec<Facet>; 2],
 }
 
 impl Rings {
-    fn new(around: [usize; 2]) -> Self {
-        let ring = |k: usize, angle: f64| Solid::ring([30.0, 40.0], [3, around[k]], MATERIAL).rotated(angle);
+    /// So many elements across both, and around each.
+    pub(crate) fn new(across: usize, around: [usize; 2]) -> Self {
+        let ring = |k: usize, angle: f64| Solid::ring([30.0, 40.0], [across, around[k]], MATERIAL).rotated(angle);
         let left = ring(0, 0.02);
         let split = left.nodes.len();
         let solid = left.with(ring(1, 0.031).moved(APART));
@@ -70,7 +77,7 @@ impl Rings {
         Self { solid, split, facets }
     }
 
-    fn contact(&self, name: &str) -> Result<Box<dyn ContactConstraint<f64>>, Box<dyn Error>> {
+    pub(crate) fn contact(&self, name: &str) -> Result<Box<dyn ContactConstraint<f64>>, Box<dyn Error>> {
         let Self { solid, facets: [first, second], .. } = self;
         let (nodes, dofs) = (&solid.nodes, &solid.node_dofs());
         Ok(match name {
@@ -84,6 +91,25 @@ impl Rings {
         })
     }
 
+    /// The rings on their way to each other.
+    pub(crate) fn thrown(
+        &self,
+        contact: Box<dyn ContactConstraint<f64>>,
+        scheme: Box<dyn TimeIntegrator>,
+        h: f64,
+    ) -> Result<Simulation<'static, f64>, Box<dyn Error>> {
+        let Self { solid, split, .. } = self;
+        let toward = |dof: usize| if dof < 2 * split { SPEED } else { -SPEED };
+        let velocity = (0..solid.dofs()).map(|dof| if dof % 2 == 0 { toward(dof) } else { 0.0 }).collect();
+        let run = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, h)
+            .velocity(velocity)
+            .constraint(contact)
+            .corrector(PersistencyCorrection::with_history_projection())
+            .step_control(StepControl::halving(h / 64.0)?)
+            .build()?;
+        Ok(run)
+    }
+
     fn run(
         &self,
         contact: Box<dyn ContactConstraint<f64>>,
@@ -91,14 +117,7 @@ impl Rings {
         until: f64,
     ) -> Result<[f64; 6], Box<dyn Error>> {
         let Self { solid, split, .. } = self;
-        let toward = |dof: usize| if dof < 2 * split { SPEED } else { -SPEED };
-        let velocity = (0..solid.dofs()).map(|dof| if dof % 2 == 0 { toward(dof) } else { 0.0 }).collect();
-        let mut run = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, 0.5)
-            .velocity(velocity)
-            .constraint(contact)
-            .corrector(PersistencyCorrection::with_history_projection())
-            .step_control(StepControl::halving(0.5 / 64.0)?)
-            .build()?;
+        let mut run = self.thrown(contact, scheme, 0.5)?;
         let mass = solid.lumped_mass::<f64>();
         let scale = (0..2 * split).step_by(2).map(|dof| mass[dof] * SPEED).sum::<f64>();
         let momenta = |u: &[f64], v: &[f64]| {

@@ -190,7 +190,8 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Contact of `nodes` with `facets` in one pass: facets do not meet the nodes' own surface, and may pass between
     /// its nodes. For single nodes, beams and cables, and where the nodes are finer than the facets; on two meshes that
-    /// do not match pressure errs by some percent to a half ([`new`](Self::new) is exact there).
+    /// do not match pressure errs by some percent to a half, however fine they are ([`new`](Self::new) is exact there
+    /// where surfaces are flat).
     ///
     /// `coordinates`, `dofs` and facets are those of [`new`](Self::new); `nodes` names nodes by their index.
     ///

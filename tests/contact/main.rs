@@ -6,6 +6,7 @@ mod constraints;
 mod curved;
 mod edges;
 mod gap_function;
+mod hertz;
 mod itself;
 mod laws;
 mod mortar;

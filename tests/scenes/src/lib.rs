@@ -12,6 +12,7 @@ pub mod drops;
 pub mod falls;
 pub mod frames;
 pub mod ground;
+pub mod hertz;
 pub mod hosts;
 pub mod hyperelastic;
 pub mod large;
