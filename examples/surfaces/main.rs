@@ -3,6 +3,7 @@
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
 mod corners;
+mod folding;
 mod hertz;
 mod ironing;
 mod patch;
@@ -23,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ironing::table(quick)?,
         rings::table(quick)?,
         rebound::table(quick)?,
+        folding::table(quick)?,
         corners::table(quick)?,
     ]
     .join("\n");

@@ -1,33 +1,13 @@
 //! Surfaces against themselves: what is met and what is not, hairpins whose arms meet, units.
 
-use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, NodeToFacet, Surface};
+use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet, Surface};
 use contact_dynamics::{Composite, EnergyMomentum, PersistencyCorrection, Simulation, StepControl};
 use contact_dynamics_scenes::OnSystem;
+use contact_dynamics_scenes::folding::Folding;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use std::f64::consts::PI;
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };
-
-/// A hairpin of thickness 0.2: an arm of length 2 below, a half circle on the right, and an arm above, with a slot of
-/// `slot` between, a fifth shorter; `shift` moves its nodes along it, so that nodes do not face each other.
-fn bend([s, t]: [f64; 2], slot: f64, shift: f64) -> [f64; 2] {
-    let (radius, arc) = (0.5 * slot, 1.0);
-    // s from 0 to 2 along the lower arm, over the bend, and back along the upper one; t from the inside to the outside.
-    if s < 2.0 {
-        [s, -radius - t]
-    } else if s < 2.0 + arc {
-        let angle = PI * (s - 2.0) / arc;
-        [2.0 + (radius + t) * angle.sin(), -(radius + t) * angle.cos()]
-    } else {
-        let back = s - 2.0 - arc;
-        [2.0 - 0.8 * back * (1.0 - shift * (2.0 - back)), radius + t]
-    }
-}
-
-fn hairpin(slot: f64, shift: f64) -> Solid<2> {
-    Solid::rectangle([5.0, 0.2], [40, 2], MATERIAL).mapped(|[s, t]| bend([s, 0.2 - t], slot, shift))
-}
 
 fn surface<const D: usize>(solid: &Solid<D>) -> Surface {
     Surface::of_cells(&solid.nodes, &solid.elements).unwrap()
@@ -69,12 +49,40 @@ fn bodies_that_do_not_fold_do_not_meet_themselves() {
 }
 
 #[test]
+fn bodies_that_bend_do_not_meet_their_own_sides() {
+    // A sheet of two layers rolled up to half a circle, either way: its sides turn toward the nodes of its ends.
+    let sheet = Solid::block([1.0, 0.5, 0.1], [16, 4, 2], MATERIAL);
+    for radius in [0.3, -0.3] {
+        let rolled = |[x, _, z]: [f64; 3]| {
+            let (s, c) = (x / radius).sin_cos();
+            [(radius - z) * s - x, 0.0, radius - (radius - z) * c - z]
+        };
+        let u: Vec<f64> = sheet.nodes.iter().flat_map(|&x| rolled(x)).collect();
+        for reach in [0.05, 0.1, 0.2] {
+            let mut contact = of_itself(&sheet).reach(reach).unwrap();
+            contact.search_on(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
+            assert_eq!(contact.candidates(), 0, "radius {radius}, reach {reach}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_inside_where_nothing_was() {
+    // (Facets a sheet's width long, so that all of a bend is within reach.)
+    for wide in [1, 2, 4] {
+        let sheet = Folding::sheet(wide, 0.2, 0.0).solid;
+        let found = rows(of_itself(&sheet));
+        assert!(found.len() > 60 && found.iter().all(|&(_, gap)| gap > 0.0), "{wide}: {found:?}");
+    }
+}
+
+#[test]
 fn arms_of_a_hairpin_face_each_other() {
     let slot = 0.1;
-    let found = rows(of_itself(&hairpin(slot, 0.06)));
+    let pin = Folding::hairpin(slot, 0.0).solid;
+    let found = rows(of_itself(&pin));
     // All inner nodes of the arms, up to the bend, and no outer one.
     assert!(found.len() > 30, "{}", found.len());
-    let pin = hairpin(slot, 0.06);
     for (node, gap) in found {
         let [x, y] = pin.nodes[node];
         assert!(y.abs() < 0.5 * slot + 1e-12 && gap > 0.0, "{x} {y}: {gap}");
@@ -82,60 +90,27 @@ fn arms_of_a_hairpin_face_each_other() {
     }
 }
 
-/// The facets of the inner side of each arm.
-fn arms(pin: &Solid<2>, slot: f64) -> [Vec<Facet>; 2] {
-    let inner = |sign: f64| {
-        let on =
-            move |&node: &usize| (pin.nodes[node][1] - 0.5 * sign * slot).abs() < 1e-9 && pin.nodes[node][0] < 1.99;
-        let facets = pin.boundary().into_iter().filter(move |facet| facet.iter().all(on));
-        facets.map(|facet| Facet::from([facet[0], facet[1]])).collect()
-    };
-    [inner(-1.0), inner(1.0)]
-}
-
-/// Both arms thrown at each other.
-fn thrown(pin: &Solid<2>, speed: f64) -> Vec<f64> {
-    pin.nodes
-        .iter()
-        .flat_map(|&[x, y]| [0.0, if x < 2.0 { -y.signum() * speed * (1.0 - 0.5 * x) } else { 0.0 }])
-        .collect()
-}
-
 #[test]
 fn arms_meet_as_two_surfaces_do() {
-    let slot = 0.1;
-    let pin = hairpin(slot, 0.06);
+    let folding = Folding::hairpin(0.1, 1.0);
     let run = |contact: NodeToFacet<f64>| {
-        let mut run = Simulation::builder(pin.system::<f64>(), Composite, 2e-3)
-            .velocity(thrown(&pin, 1.0))
-            .constraint(contact.reach(0.09).unwrap())
-            .corrector(PersistencyCorrection::default())
-            .build()
-            .unwrap();
-        let mut pressed = 0;
-        while run.time() < 0.3 {
-            run.step().unwrap();
-            pressed = pressed.max(run.state().contacts().forces().iter().filter(|force| **force > 0.0).count());
-        }
-        (run.state().displacement().to_vec(), pressed)
+        let (system, contact) = (folding.solid.system::<f64>(), contact.reach(0.09).unwrap());
+        folding.run(system, contact, Composite, (2e-3, 0.3)).unwrap()
     };
-    let (own, pressed) = run(of_itself(&pin));
-    let [lower, upper] = arms(&pin, slot);
-    let (two, as_two) = run(NodeToFacet::new(&pin.nodes, &pin.node_dofs(), upper, lower).unwrap());
-    assert!(pressed > 2 && pressed == as_two, "{pressed} {as_two}");
-    let largest = own.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    let (own, two) = (run(folding.of_itself().unwrap()), run(folding.of_two_surfaces().unwrap()));
+    assert!(own.pressed > 2 && own.pressed == two.pressed, "{} {}", own.pressed, two.pressed);
+    let largest = own.displacement.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     assert!(largest > 0.04);
-    for (x, y) in own.iter().zip(&two) {
+    for (x, y) in own.displacement.iter().zip(&two.displacement) {
         assert!((x - y).abs() < 1e-6 * largest, "{x} {y}");
     }
 }
 
 #[test]
 fn a_hairpin_that_snaps_shut_gains_no_energy() {
-    let pin = hairpin(0.2, 0.06);
+    let Folding { solid: pin, velocity, .. } = Folding::hairpin(0.2, 3.0);
     let system = Hyperelastic::new(&pin, Law::NeoHookean);
     let particles = system.particles.clone();
-    let velocity = thrown(&pin, 3.0);
     let momentum = |v: &[f64]| -> [f64; 2] {
         let mass = pin.lumped_mass::<f64>();
         [0, 1].map(|axis| v.iter().zip(&mass).skip(axis).step_by(2).map(|(v, m)| m * v).sum())

@@ -8,6 +8,10 @@ use super::shape::{Point, dot, sub};
 /// (102°): across a convex edge of a right angle they do not.
 pub(crate) const FACING: f64 = -0.2;
 
+/// The same up to which a facet that a node is behind of in the reference configuration tells how much material is
+/// there: sides across a right angle among them, which face the node once the body bends.
+const INSIDE: f64 = 0.5;
+
 /// Share of the thickness of the material behind a node that another part of the surface may be inside of it.
 const DEPTH: f64 = 0.5;
 
@@ -55,8 +59,8 @@ impl Kin {
         self.depths[place]
     }
 
-    /// Behind a node that faces a facet there is material, as nothing is inside of itself in the reference
-    /// configuration: a share of the least distance.
+    /// Behind a node, as far as a facet that it is behind of, there is material, as nothing is inside of itself in the
+    /// reference configuration: a share of the least distance.
     fn depths(&self, surface: &Surface, positions: &[Point], reach: f64) -> Vec<f64> {
         let mut lists = Neighborhood::default();
         let points = surface.nodes().iter().map(|&node| Bounds::of_points([positions[node]]));
@@ -68,7 +72,7 @@ impl Kin {
                     let (shape, foot) = surface.project(facet, positions[node], positions)?;
                     let normal = shape.normal(&foot.weights)?;
                     let is_behind = dot(normal, sub(positions[node], foot.point)) < 0.0;
-                    (is_behind && dot(own, normal) <= FACING).then_some(foot.distance)
+                    (is_behind && dot(own, normal) <= INSIDE).then_some(foot.distance)
                 });
             DEPTH * behind.fold(reach / DEPTH, f64::min)
         };

@@ -3,7 +3,7 @@
 use super::Surface;
 use super::kin::{FACING, Kin};
 use super::search::{Bounds, Neighborhood, overhang};
-use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
+use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
 
 /// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
 /// look to the same side.
@@ -81,12 +81,13 @@ impl Ground<'_> {
         if self.kin.is_some() { FACING } else { SAME_SIDE }
     }
 
-    /// Whether a facet is behind a node of its own surface by more than there can be of it inside.
-    fn is_beyond(&self, place: usize, (shape, foot): &(Shape, Foot)) -> bool {
+    /// Whether a facet is behind a node of its own surface by more than there can be of it inside. (By the normal that
+    /// the gap would have: on a side or a vertex a node may be in front of the one facet and behind the other.)
+    fn is_beyond(&self, place: usize, facet: usize, projected: &(Shape, Foot)) -> bool {
         self.kin.is_some_and(|kin| {
             let p = self.positions[self.nodes[place]];
-            let is_behind = shape.normal(&foot.weights).is_some_and(|normal| dot(normal, sub(p, foot.point)) < 0.0);
-            is_behind && foot.distance > kin.depth(place)
+            let direction = || self.surface.direction(facet, p, projected, self.rounding, self.positions);
+            projected.1.distance > kin.depth(place) && direction().is_some_and(|(_, gap)| gap < 0.0)
         })
     }
 
@@ -121,7 +122,7 @@ impl Ground<'_> {
             if foot.distance > reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
                 continue;
             }
-            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, &projected) {
+            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, index, &projected) {
                 best = Some((index, projected));
             }
         }

@@ -169,7 +169,7 @@ impl Fall {
 }
 
 /// The deepest of the gaps that a constraint finds where a run is.
-fn depth(constraint: &mut impl ContactConstraint<f64>, run: &Simulation<'_, f64>) -> Result<f64> {
+pub(crate) fn depth(constraint: &mut impl ContactConstraint<f64>, run: &Simulation<'_, f64>) -> Result<f64> {
     let (time, state) = (run.time(), run.state());
     constraint.search_on(time, state.displacement(), state.velocity(), 0.0)?;
     let mut gaps = vec![0.0; constraint.candidates()];

@@ -10,6 +10,7 @@ pub mod decks;
 pub mod disc;
 pub mod drops;
 pub mod falls;
+pub mod folding;
 pub mod frames;
 pub mod ground;
 pub mod hertz;
