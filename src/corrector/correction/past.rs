@@ -5,6 +5,9 @@ use super::{Buffers, Correction};
 use crate::error::Result;
 use crate::real::Real;
 
+/// How much farther than by the rows that hold now, in the norm of the mass, a projection may move the past.
+const FARTHEST: f64 = 2.0;
+
 impl<T: Real> Correction<'_, T> {
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
     /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
@@ -48,11 +51,12 @@ impl<T: Real> Correction<'_, T> {
     /// Projects one field of past state k onto the engaged rows.
     fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, energy, .. } = self;
-        let Buffers { gaps, rates, jump, tolerance: before, .. } = &mut **buffers;
+        let Buffers { gaps, rates, jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
         // Of the past motion on its own part of a curved surface: u, v and a fit each other.
         constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
+        constraints.0.rates(new.t, &new.u, &new.v, rates)?;
         // Where a gap is held, under a law that reads it where a stage starts.
         let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
             true => contacts.gap[row],
@@ -63,6 +67,28 @@ impl<T: Real> Correction<'_, T> {
         before.clear();
         before.extend_from_slice(jump);
         projection.solve(jump);
+        // The same by the rows that hold now. Rows that are nearly the same, but turned in between, may see pasts that
+        // contradict each other: together they would throw it far. By rows that hold now it goes no farther than the
+        // bodies have come.
+        let since = T::of(new.t - motion.t);
+        let by_rows = |row: usize| match field {
+            0 => {
+                let way = g.product(row, &new.u) - g.product(row, &motion.u);
+                contacts.gap[row] - held(row) - way - since * rates[row].rate
+            }
+            1 => g.product(row, &motion.v) + rates[row].rate,
+            _ => g.product(row, &motion.a) + rates[row].acceleration,
+        };
+        straight.clear();
+        straight.extend(rows.iter().map(|&row| by_rows(row)));
+        by_straight.clear();
+        by_straight.extend_from_slice(straight);
+        projection.solve(by_straight);
+        let square = |jumps: &[T], by: &[T]| jumps.iter().zip(by).map(|(&jump, &by)| jump * by).sum::<T>();
+        if square(before, jump) > T::of(FARTHEST * FARTHEST) * square(straight, by_straight) {
+            std::mem::swap(before, straight);
+            std::mem::swap(jump, by_straight);
+        }
         // In a stage before the last the state that the step starts from loses what the later stages do not see any
         // more.
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
