@@ -60,8 +60,8 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 ///
 /// # Known failure
 ///
-/// - Blocks that fall across an edge of another block, or beside it, gain energy in some falls that gain none without
-///   edges, by up to a third (`docs/contact.md` has a table; the cause is not known yet).
+/// - Where a block comes down by a corner beside an edge of another one, edges still get into each other in some falls,
+///   by up to a fifth of an element (`docs/contact.md` has a table).
 /// - An open rim is no edge: what is behind it is not known. Give the whole surface of a body.
 /// - Edges that are concave, or that turn by less than the angle, are seen by nodes and facets only.
 /// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is another contact:

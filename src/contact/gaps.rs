@@ -8,6 +8,9 @@ use crate::real::Real;
 pub(crate) trait Gaps<T: Real> {
     fn law(&self, row: usize) -> ContactLaw;
 
+    /// Whether any rows turn with u.
+    fn turn(&self) -> bool;
+
     /// What of a gap is rounding, if the terms of G u have this magnitude.
     fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T;
 

@@ -8,6 +8,7 @@ use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surfa
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use candidates::pass_of;
 use rows::Rows;
 
 /// One direction of contact: nodes against a surface.
@@ -63,19 +64,26 @@ impl Pass {
 ///
 /// # Which facet, which normal
 ///
-/// A node has at most one row a pass, from the closest facet. Inside of a facet n is the facet's normal. If the closest
-/// point is on a side or a vertex that facets share, n is the direction between it and the node, so that the gap is
-/// continuous when a node passes from one facet to the next; if the node is closer to it than √ε of the facet's longest
-/// side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind a convex edge the closest
-/// facet changes at the bisector, and with it the normal, not the gap. A node that stands beyond the rim of an open
-/// surface has no row; by 1e-3 of the facet the surface goes on beyond its rim.
+/// A node has one row a pass, from the closest facet, and in a dent one for each side of it. Inside of a facet n is the
+/// facet's normal. If the closest point is on a side or a vertex that facets share, n is the direction between it and
+/// the node, so that the gap is continuous when a node passes from one facet to the next; if the node is closer to it
+/// than √ε of the facet's longest side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind
+/// a convex edge the closest facet changes at the bisector, and with it the normal, not the gap. A node that stands
+/// beyond the rim of an open surface has no row; by 1e-3 of the facet the surface goes on beyond its rim.
+///
+/// A node at the bottom of a dent presses on all sides of it. With one row it would come to rest on one side and be
+/// inside of another, and energy would rise when it is let out. So a node that is as near to the bottom as a quarter of
+/// a facet and its way of the step has rows on the other facets around the vertices of the closest one that rise from
+/// there by more than 2.9° (sine 0.05). Within the step rows of a dent stay on their facets, each along its own normal,
+/// as if the facet went on beyond the bottom.
 ///
 /// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
 /// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing).
 ///
 /// # Identity
 ///
-/// (number of the node, pass). A node that slides from one facet to the next keeps its multiplier;
+/// (number of the node, pass), passes being 0 and 1; in a dent the others are (number of the node, pass + 2 (1 + facet)),
+/// with the index of their facet in its list. A node that slides from one facet to the next keeps its multiplier;
 /// [`facet`](Self::facet) tells the facet.
 ///
 /// # Search
@@ -392,7 +400,7 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds
     }
 
-    /// Checks that the bodies share no node, and reserves memory for all rows there can be.
+    /// Checks that the bodies share no node, and reserves memory for rows.
     fn prepare(&mut self) -> Result<()> {
         let mut body = self.passes[0].nodes.clone();
         body.extend(self.own_surface.iter().flat_map(Surface::nodes));
@@ -411,15 +419,16 @@ impl<T: Real> NodeToFacet<T> {
         Ok(())
     }
 
-    /// The largest numbers of rows and of their entries.
+    /// Room for rows and for their entries: for two a node, as some are in dents.
     fn most(&self) -> (usize, usize) {
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         let entries = |(pass, surface): (&Pass, &Surface)| {
             let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
             pass.nodes.len() * self.nodes.dimension * (1 + vertices)
         };
-        let rows = self.passes.iter().map(|pass| pass.nodes.len()).sum();
-        (rows, self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum())
+        let rows: usize = self.passes.iter().map(|pass| pass.nodes.len()).sum();
+        let entries: usize = self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum();
+        (2 * rows, 2 * entries)
     }
 
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
@@ -441,10 +450,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
         let Rows { identities, stands, affine, .. } = &self.rows;
-        for (row, (&(node, pass), stand)) in identities.iter().zip(stands).enumerate() {
+        for (row, (&(node, candidate), stand)) in identities.iter().zip(stands).enumerate() {
+            let pass = pass_of(candidate);
             let position = self.nodes.positions[node];
             let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
-            let mut contact = contacts.push_row((node, pass), self.law, (&affine.jacobian, row));
+            let mut contact = contacts.push_row((node, candidate), self.law, (&affine.jacobian, row));
             contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
             if self.friction == 0.0 {
                 continue;
@@ -514,8 +524,8 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let Rows { identities, stands, .. } = &self.rows;
-        for ((out, &(node, pass)), stand) in rates.iter_mut().zip(identities).zip(stands) {
-            let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
+        for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(stands) {
+            let surface = self.own_surface.as_ref().filter(|_| pass_of(candidate) > 0).unwrap_or(&self.surface);
             let facet = &surface.facets()[stand.facet];
             let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
             let [x, speed] = self.moving(node, u, v);

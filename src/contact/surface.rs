@@ -1,6 +1,7 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
 mod closed;
+mod dent;
 mod facet;
 mod kin;
 mod nodes;
@@ -291,6 +292,18 @@ impl Surface {
     ) -> Option<(Shape, Foot)> {
         let shape = self.facets[facet].shape(positions);
         shape.project(p, Rim { beyond, ..self.rims[facet] }).map(|foot| (shape, foot))
+    }
+
+    /// As `project`, on a facet that goes on beyond all of its sides for a share of itself.
+    pub(crate) fn project_on_plane(
+        &self,
+        facet: usize,
+        p: Point,
+        beyond: f64,
+        positions: &[Point],
+    ) -> Option<(Shape, Foot)> {
+        let shape = self.facets[facet].shape(positions);
+        shape.project(p, Rim { sides: [true; 4], vertices: [true; 4], beyond }).map(|foot| (shape, foot))
     }
 
     /// Sum of the normals on both sides of a side, at its share `s`.

@@ -24,6 +24,9 @@ pub(crate) struct Buffers<T> {
     pub(super) sets: Vec<AdmissibleSet>,
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
+    /// Jumps of the past by the rows that hold now, and what removes these.
+    pub(super) straight: Vec<T>,
+    pub(super) by_straight: Vec<T>,
     /// Impulses that remove the velocity jumps, one a closed row.
     pub(super) impulses: Vec<T>,
     /// Forces that remove the acceleration jumps, one an engaged row.
@@ -60,6 +63,8 @@ impl<T: Real> Buffers<T> {
             sets: Vec::with_capacity(rows),
             jump: reals(rows),
             tolerance: reals(rows),
+            straight: reals(rows),
+            by_straight: reals(rows),
             impulses: reals(rows),
             forces: reals(rows),
             group: GroupProblem::new(rows),
@@ -79,11 +84,25 @@ impl<T: Real> Buffers<T> {
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.rates.resize(rows, GapRates::default());
         self.gaps.resize(rows, T::zero());
-        let Self { closed, engaged, opened, released, reported, sets, jump, tolerance, impulses, forces, .. } = self;
+        let Self {
+            closed,
+            engaged,
+            opened,
+            released,
+            reported,
+            sets,
+            jump,
+            tolerance,
+            straight,
+            by_straight,
+            impulses,
+            forces,
+            ..
+        } = self;
         for list in [closed, engaged, opened, released] {
             list.reserve(rows.saturating_sub(list.len()));
         }
-        for values in [reported, jump, tolerance, impulses, forces] {
+        for values in [reported, jump, tolerance, straight, by_straight, impulses, forces] {
             values.reserve(rows.saturating_sub(values.len()));
         }
         sets.reserve(rows.saturating_sub(sets.len()));

@@ -148,6 +148,10 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
         self.laws[row]
     }
 
+    fn turn(&self) -> bool {
+        !self.is_affine()
+    }
+
     fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
         rounding(magnitude + gap.abs() + self.magnitudes[row])
     }

@@ -227,8 +227,8 @@ fn rings_at_large_strains_collide_in_few_iterations() {
                     let g = checker.jacobian();
                     for row in 0..checker.candidates() {
                         let contacts = state.contacts();
-                        let feature = checker.identity(row).0;
-                        let at = contacts.ids().iter().position(|id| id.feature == feature);
+                        let identity = checker.identity(row);
+                        let at = contacts.ids().iter().position(|id| (id.feature, id.candidate) == identity);
                         if at.is_some_and(|at| contacts.raw_forces()[at] > 0.0) {
                             let rate = g.product(row, state.velocity());
                             assert!(rate.abs() < 1e-8 * speed, "{name}: {rate:e}");
@@ -373,7 +373,7 @@ fn every_scheme_lets_blocks_fall() {
     for scheme in all() {
         let law = if scheme.takes_multipliers() { ContactLaw::Rigid } else { ContactLaw::Penalty { stiffness: 1.0 } };
         let courant = if scheme.critical.is_some() { 0.2 } else { 0.8 };
-        let refused = Fall::new(&mut xorshift(5), 1, law).run((scheme.make)(), courant, scheme.takes_corrections());
+        let refused = Fall::new(&mut xorshift(4), 1, law).run((scheme.make)(), courant, scheme.takes_corrections());
         assert!(refused <= 12, "{}: {refused}", scheme.name());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Kin, Point, Surface};
+use crate::contact::surface::{Bounds, Ground, Kin, Point, Stand, Surface};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -47,7 +47,7 @@ impl<T: Real> NodeToFacet<T> {
             let way = ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
             let (distance, stand) = ground.clearance(place, reach.least() + way);
             *clearance = distance;
-            let Some(stand) = stand else { continue };
+            let Some(stand) = stand.map(|stand| ground.first_side(stand, way)) else { continue };
             let vertices = ground.surface.facets()[stand.facet].nodes();
             if !partners.is_empty() {
                 let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
@@ -61,7 +61,13 @@ impl<T: Real> NodeToFacet<T> {
                     _ => {}
                 }
             }
-            found.push((node, pass), stand, vertices, |node| nodes.places(node), u);
+            let mut beside = ground.beside(&stand, way).peekable();
+            let first = if beside.peek().is_some() { ground.first_in_dent(stand) } else { stand };
+            let others = beside.map(|stand| (beside_of(pass, stand.facet), stand));
+            for (candidate, stand) in std::iter::once((pass, first)).chain(others) {
+                let vertices = ground.surface.facets()[stand.facet].nodes();
+                found.push((node, candidate), stand, vertices, |node| nodes.places(node), u);
+            }
         }
     }
 
@@ -72,33 +78,56 @@ impl<T: Real> NodeToFacet<T> {
         let Self { surface, own_surface, kin, nodes, passes, reach, rows, found, .. } = self;
         let motions = reach.motions(nodes);
         let positions = &nodes.positions;
-        for (row, &(node, pass)) in rows.identities.iter().enumerate() {
-            let old = rows.stands[row];
-            let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+        let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+        let mut next = 0;
+        for group in rows.identities.chunk_by(|x, y| (x.0, pass_of(x.1)) == (y.0, pass_of(y.1))) {
+            let (node, pass) = (group[0].0, pass_of(group[0].1));
+            let first = next;
+            next += group.len();
+            let stands = &rows.stands[first..next];
             let ground = ground(pass, passes, surfaces, positions, Self::rounding());
             // The list of the node has all facets as near as this.
             let known = reach.known_around(node, positions[node], &motions[1 - pass]);
-            let stand = ground.filter(|_| known > 0.0).and_then(|ground| {
-                let stand = ground.closest(old.place, known).or_else(|| ground.last(old.place, old.facet, known))?;
-                Some((stand, ground.surface.facets()[stand.facet].nodes()))
-            });
-            match stand {
-                Some((stand, vertices)) => match old.followed_by(stand, t) {
-                    Some(stand) => {
-                        found.push((node, pass), stand, vertices, |node| nodes.places(node), u);
+            let ground = ground.filter(|_| known > 0.0);
+            let Stand { place, facet, .. } = stands[0];
+            let closest =
+                ground.and_then(|ground| ground.closest(place, known).or_else(|| ground.last(place, facet, known)));
+            for (k, &old) in stands.iter().enumerate() {
+                let row = first + k;
+                let stand = ground.and_then(|ground| {
+                    let stand = ground.followed(stands, k, closest)?;
+                    Some((stand, ground.surface.facets()[stand.facet].nodes()))
+                });
+                match stand {
+                    Some((stand, vertices)) => match old.followed_by(stand, t) {
+                        Some(stand) => found.push(group[k], stand, vertices, |node| nodes.places(node), u),
+                        None => found.keep(rows, row),
+                    },
+                    // There is nothing near that it could press on.
+                    None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * reach.least() => {
+                        found.keep(rows, row);
                     }
-                    None => found.keep(rows, row),
-                },
-                // There is nothing near that it could press on.
-                None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * reach.least() => found.keep(rows, row),
-                None => {
-                    let contact = ContactId { constraint: 0, feature: node, candidate: pass };
-                    return Err(Error::ContactLost { t, contact });
+                    // (The first stands for all.)
+                    None if k > 0 => found.keep(rows, row),
+                    None => {
+                        let contact = ContactId { constraint: 0, feature: node, candidate: pass };
+                        return Err(Error::ContactLost { t, contact });
+                    }
                 }
             }
         }
         Ok(())
     }
+}
+
+/// The candidate of a row beside the one that a node has in a pass.
+fn beside_of(pass: usize, facet: usize) -> usize {
+    pass + 2 * (1 + facet)
+}
+
+/// The pass of a candidate.
+pub(super) fn pass_of(candidate: usize) -> usize {
+    candidate % 2
 }
 
 /// What the nodes of a pass stand on.

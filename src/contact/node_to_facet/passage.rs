@@ -1,6 +1,7 @@
 //! What nodes have passed through in a step: their ways against facets that move.
 
 use super::NodeToFacet;
+use super::candidates::pass_of;
 use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, norm, sub};
 use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
 use crate::error::Result;
@@ -50,7 +51,9 @@ impl<T: Real> NodeToFacet<T> {
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        let mut rows = self.rows.identities.iter().copied().enumerate().peekable();
+        // (Of the rows of a node in a dent the first one tells.)
+        let rows = self.rows.identities.iter().copied().enumerate();
+        let mut rows = rows.filter(|&(_, (_, candidate))| candidate == pass_of(candidate)).peekable();
         for (pass, (list, surface)) in self.passes.iter().zip(surfaces.into_iter().flatten()).enumerate() {
             let own = if pass == 0 { self.own_surface.as_ref() } else { Some(&self.surface) };
             for (place, &node) in list.nodes.iter().enumerate() {

@@ -161,6 +161,17 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
+    /// On a facet along its own normal.
+    pub(super) fn inside(place: usize, facet: usize, foot: &Foot, normal: Point, gap: f64) -> Self {
+        let (location, weights) = (Location::Inside, foot.weights);
+        Self { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] }
+    }
+
+    /// Whether the node stands on the facet along its own normal, not over a side or a vertex.
+    pub(super) fn is_inside(&self) -> bool {
+        self.location == Location::Inside
+    }
+
     /// The stand that takes the place of this one when the node is found as in `next` at t; none if this one stays.
     ///
     /// It stays if the node has jumped too often: between two facets, or around an edge that it touches, there is no

@@ -99,6 +99,11 @@ impl Shape {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
+    /// Its corners.
+    pub(crate) fn corners(&self) -> &[Point] {
+        &self.corners[..self.count]
+    }
+
     /// A corner.
     pub(crate) fn corner(&self, k: usize) -> Point {
         self.corners[k]

@@ -5,6 +5,9 @@ use super::{Buffers, Correction};
 use crate::error::Result;
 use crate::real::Real;
 
+/// How much farther than by the rows that hold now, in the norm of the mass, a projection may move the past.
+const FARTHEST: f64 = 2.0;
+
 impl<T: Real> Correction<'_, T> {
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
     /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
@@ -47,8 +50,8 @@ impl<T: Real> Correction<'_, T> {
 
     /// Projects one field of past state k onto the engaged rows.
     fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, new, energy, .. } = self;
-        let Buffers { gaps, rates, jump, tolerance: before, .. } = &mut **buffers;
+        let Self { past, constraints, buffers, projection, contacts, scheme, h, new, .. } = self;
+        let Buffers { gaps, jump, tolerance: before, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
         // Of the past motion on its own part of a curved surface: u, v and a fit each other.
@@ -63,6 +66,12 @@ impl<T: Real> Correction<'_, T> {
         before.clear();
         before.extend_from_slice(jump);
         projection.solve(jump);
+        if constraints.0.turn() {
+            self.see_straight((k, field), rows)?;
+        }
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, .. } = self;
+        let Buffers { rates, jump, tolerance: before, .. } = &mut **buffers;
+        let motion = &mut past[k - 1];
         // In a stage before the last the state that the step starts from loses what the later stages do not see any
         // more.
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
@@ -81,6 +90,37 @@ impl<T: Real> Correction<'_, T> {
         projection.push(g, (rows, jump), -T::one(), values)?;
         for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
             contacts.impulse[row] -= T::of(unit) * multiplier;
+        }
+        Ok(())
+    }
+
+    /// Takes the jumps of one field of past state k as the rows that hold now see them, where by those of the past it
+    /// would move much farther. Rows that are nearly the same, but turned in between, may see pasts that contradict each
+    /// other: together they would throw it far. By rows that hold now it goes no farther than the bodies have come.
+    fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, projection, g, contacts, new, .. } = self;
+        let Buffers { rates, jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
+        let motion = &past[k - 1];
+        constraints.0.rates(new.t, &new.u, &new.v, rates)?;
+        let since = T::of(new.t - motion.t);
+        let by_rows = |row: usize| match field {
+            0 => {
+                let way = g.product(row, &new.u) - g.product(row, &motion.u);
+                let held = if constraints.0.law(row).reads_start() { T::zero() } else { contacts.gap[row] };
+                held - way - since * rates[row].rate
+            }
+            1 => g.product(row, &motion.v) + rates[row].rate,
+            _ => g.product(row, &motion.a) + rates[row].acceleration,
+        };
+        straight.clear();
+        straight.extend(rows.iter().map(|&row| by_rows(row)));
+        by_straight.clear();
+        by_straight.extend_from_slice(straight);
+        projection.solve(by_straight);
+        let square = |jumps: &[T], by: &[T]| jumps.iter().zip(by).map(|(&jump, &by)| jump * by).sum::<T>();
+        if square(before, jump) > T::of(FARTHEST * FARTHEST) * square(straight, by_straight) {
+            std::mem::swap(before, straight);
+            std::mem::swap(jump, by_straight);
         }
         Ok(())
     }

@@ -35,10 +35,17 @@ fn check_follow(contact: &mut NodeToFacet<f64>, fresh: &mut NodeToFacet<f64>, fr
     assert_eq!(found, gaps_now(contact, to));
 
     let expected = gaps(fresh, to);
+    let fresh_names: Vec<_> = expected.iter().map(|row| row.0).collect();
     let g = rows(fresh);
     let mut count = [0, 0];
     for (row, name) in names.iter().enumerate() {
         let Some(place) = expected.iter().position(|other| other.0 == *name) else { continue };
+        // (Rows of a dent stay on their facets until the next search.)
+        let in_dent = |names: &[(usize, usize)]| names.iter().filter(|other| other.0 == name.0).count() > 1;
+        if in_dent(&names) || in_dent(&fresh_names) {
+            count[0] += usize::from(name.1 < 2);
+            continue;
+        }
         assert_eq!(found[row], expected[place].1, "{name:?}");
         assert_eq!(contact.facet(row), fresh.facet(place), "{name:?}");
         assert!(after.row(row).eq(g.row(place)), "{name:?}");
@@ -46,7 +53,7 @@ fn check_follow(contact: &mut NodeToFacet<f64>, fresh: &mut NodeToFacet<f64>, fr
         count = [count[0] + 1, count[1] + usize::from(contact.facet(row) != facets[row])];
     }
     // The next search sees the rows that were followed.
-    let same = names.len() == expected.len() && count[0] == names.len();
+    let same = names == fresh_names && after == g;
     assert_eq!(contact.search_on(0.0, to, to, 0.0).unwrap() == Candidates::Unchanged, same);
     assert_eq!(rows(contact), g);
     count
@@ -84,7 +91,7 @@ fn both_passes_are_followed() {
     let make = || mesh.both(turned.iter().copied(), 0.6);
     let (mut contact, mut fresh) = (make(), make());
     let u = random.vector(mesh.size(), 0.03);
-    let to = shaken(&u, &mut random, 0.05);
+    let to = shaken(&u, &mut random, 0.12);
     let [compared, crossed] = check_follow(&mut contact, &mut fresh, &u, &to);
     assert!(compared > 20 && crossed > 0, "{compared} {crossed}");
 }

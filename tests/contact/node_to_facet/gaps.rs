@@ -1,7 +1,7 @@
 //! Gaps against brute force and differences: rows, signs, continuity, rims.
 
 use super::{Cells, Mesh, box_of_quadrilaterals, gaps, grid, imbalance, polygon, rows, single_gap};
-use contact_dynamics::contact::Facet;
+use contact_dynamics::contact::{Facet, NodeToFacet};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::Congruential;
 
@@ -81,7 +81,9 @@ fn translations_leave_gaps_and_rows_balance() {
             assert!(g.product(row, &translation).abs() < 1e-14);
         }
         let moved: Vec<_> = u.iter().zip(&translation).map(|(u, c)| u + c).collect();
-        for (one, other) in here.iter().zip(gaps(&mut contact, &moved)) {
+        // (In a dent two facets may be as near, and the others stand beside the one or the other.)
+        let distances = |rows: Vec<((usize, usize), f64)>| rows.into_iter().filter(|(name, _)| name.1 == 0);
+        for (one, other) in distances(here).zip(distances(gaps(&mut contact, &moved))) {
             assert!(one.0 == other.0 && (one.1 - other.1).abs() < 1e-13, "{one:?} {other:?}");
         }
     }
@@ -194,7 +196,9 @@ fn signs_on_jagged_bodies_are_right() {
         let cloud: Vec<[f64; 3]> = (0..100).map(|_| std::array::from_fn(|_| 1.1 * random.signed())).collect();
         let nodes = mesh.nodes(cloud);
         let mut contact = mesh.contact(&nodes, 4.0);
-        let found = gaps(&mut contact, &vec![0.0; mesh.size()]);
+        let mut found = gaps(&mut contact, &vec![0.0; mesh.size()]);
+        // (What else there is in dents is no distance.)
+        found.retain(|(name, _)| name.1 == 0);
         assert_eq!(found.len(), nodes.len());
         for ((node, _), gap) in found {
             let expected = is_inside(&shell, mesh.coordinates[node]);
@@ -321,5 +325,41 @@ fn beyond_the_rim_there_is_no_row() {
         let gap = single_gap(&mut contact, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, x - 0.5, 0.0]);
         assert_eq!(gap.is_some(), expected.is_some(), "{x}");
         assert!(gap.zip(expected).is_none_or(|(gap, expected)| (gap - expected).abs() < 1e-15));
+    }
+}
+
+#[test]
+fn nodes_in_a_dent_have_a_row_for_each_side() {
+    // Two segments that rise from (1, 0), or fall, and a node above.
+    let contact = |rise: f64, node: [f64; 2]| {
+        let coordinates = [[2.0, rise], [1.0, 0.0], [0.0, rise], node];
+        let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+        NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap()
+    };
+    let zero = [0.0; 8];
+    let heights = |x: f64, y: f64| [y - 0.5 * (x - 1.0), y + 0.5 * (x - 1.0)].map(|height| height / 1.25_f64.sqrt());
+    let mut dent = contact(0.5, [1.05, 0.1]);
+    let [right, left] = heights(1.05, 0.1);
+    let found = gaps(&mut dent, &zero);
+    assert_eq!(found.iter().map(|(name, _)| *name).collect::<Vec<_>>(), [(3, 0), (3, 4)]);
+    assert!((found[0].1 - right).abs() < 1e-15 && (found[1].1 - left).abs() < 1e-15, "{found:?}");
+    // Over the bottom, and into it: each row stays on its side.
+    for [x, y] in [[0.9, 0.2], [0.9, 0.0], [1.0, 0.0], [1.0, -0.1]] {
+        let mut u = zero;
+        (u[6], u[7]) = (x - 1.05, y - 0.1);
+        dent.follow_on(0.0, &u).unwrap();
+        let mut now = [0.0; 2];
+        dent.gap(0.0, &u, &mut now);
+        assert_eq!((dent.facet(0), dent.facet(1)), (0, 1));
+        assert!(now.iter().zip(heights(x, y)).all(|(gap, height)| (gap - height).abs() < 1e-15), "{x} {y}: {now:?}");
+    }
+    // At the bottom neither is nearer: the first facet has the first row.
+    for x in [1.0 - 1e-12, 1.0 + 1e-12] {
+        let found = gaps(&mut contact(0.5, [x, 0.0]), &zero);
+        assert_eq!(found.iter().map(|(name, _)| *name).collect::<Vec<_>>(), [(3, 0), (3, 4)]);
+    }
+    // None over a ridge, in a flat dent, or far from the bottom.
+    for (rise, node) in [(-0.5, [1.05, 0.1]), (0.01, [1.05, 0.1]), (0.5, [1.8, 0.45])] {
+        assert_eq!(gaps(&mut contact(rise, node), &zero).len(), 1, "{rise} {node:?}");
     }
 }
