@@ -481,7 +481,7 @@ fn another_layout_is_another_format() {
     // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
     for (path, names) in [
         ("", "format history rows scalar scheme state"),
-        ("/state", "contacts motion shown"),
+        ("/state", "broken_bonds contacts motion shown"),
         ("/state/motion", "acceleration displacement time velocity"),
         (
             "/state/contacts",
