@@ -290,8 +290,7 @@ impl Surface {
         beyond: f64,
         positions: &[Point],
     ) -> Option<(Shape, Foot)> {
-        let shape = self.facets[facet].shape(positions);
-        shape.project(p, Rim { beyond, ..self.rims[facet] }).map(|foot| (shape, foot))
+        self.project_within(facet, p, Rim { beyond, ..self.rims[facet] }, positions)
     }
 
     /// As `project`, on a facet that goes on beyond all of its sides for a share of itself.
@@ -302,8 +301,12 @@ impl Surface {
         beyond: f64,
         positions: &[Point],
     ) -> Option<(Shape, Foot)> {
+        self.project_within(facet, p, Rim { sides: [true; 4], vertices: [true; 4], beyond }, positions)
+    }
+
+    fn project_within(&self, facet: usize, p: Point, rim: Rim, positions: &[Point]) -> Option<(Shape, Foot)> {
         let shape = self.facets[facet].shape(positions);
-        shape.project(p, Rim { sides: [true; 4], vertices: [true; 4], beyond }).map(|foot| (shape, foot))
+        shape.project(p, rim).map(|foot| (shape, foot))
     }
 
     /// Sum of the normals on both sides of a side, at its share `s`.
