@@ -13,7 +13,8 @@ use crate::real::Real;
 /// The most linearizations of curved rows in a contact problem.
 pub(super) const FOLLOWED: usize = 40;
 
-/// The number of linearizations after which forces may alternate by [`EDGE`].
+/// The number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
+/// other, and either pushes it to the other side.
 const LONG: usize = 12;
 
 /// The relative miss of gaps and forces at which rows fit, in units of the rounding.
@@ -25,8 +26,12 @@ pub(super) const NEAR: f64 = 1e-8;
 /// The miss of a gap, in its tolerances, that is accepted where it falls no more.
 pub(super) const NOISE: f64 = 8.0;
 
-/// Share of the forces that may alternate: a node on an edge has the normal of one side or the other.
-const EDGE: f64 = 1e-5;
+/// Share of the forces that may alternate, which is the angle between the sides: both normals are right there.
+const EDGE: f64 = 0.1;
+
+/// The relative miss of gaps that tells such a node, which stays at the edge, from rows that find no rest on a curve:
+/// these miss gaps as they miss forces.
+const AT_EDGE: f64 = 1e-6;
 
 /// How much the gaps and forces of rows linearized at the result differ from those that were solved for.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +53,8 @@ impl Miss {
     /// Whether rows fit, or nearly fit and miss no less than in the pass `before`, after so many `passes`.
     pub(super) fn is_settled<T: Real>(self, passes: usize, before: Self) -> bool {
         let fit = FIT * T::epsilon().value();
-        let force = if passes > LONG { EDGE } else { NEAR };
-        let near = self.gap <= NEAR.max(fit) && self.force <= force.max(fit);
+        let [gap, force] = if passes > LONG { [AT_EDGE, EDGE] } else { [NEAR; 2] };
+        let near = self.gap <= gap.max(fit) && self.force <= force.max(fit);
         self.largest() <= fit || near && (self.largest() > 0.25 * before.largest() || passes == FOLLOWED)
     }
 }
