@@ -16,6 +16,10 @@ const ROUNDING: f64 = 1e-9;
 /// which edges that are in each other come out in a step: all at once would throw them.
 const SHALLOW: f64 = 1e-3;
 
+/// Shares of an edge, of the gap and beyond the ends, within which edges touch: beside a dent, where the normal may be
+/// none of the facets there, they are in contact all the same.
+const TOUCH: f64 = 0.02;
+
 /// How steeply the gap opens beyond the end of an edge, and the share of the edge in which it comes to.
 const STEEP: f64 = 2.0;
 const WIDTH: f64 = 0.1;
@@ -80,8 +84,7 @@ impl Pair<'_> {
 
     /// Whether edges that press on each other are where they may.
     pub(super) fn is_about(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> bool {
-        const ABOUT: f64 = 0.25;
-        self.miss(crossing, at) <= ABOUT
+        self.miss(crossing, at) <= LARGEST_TURN + UNFORESEEN
     }
 
     /// Where the edges meet, seen so that the gap is positive outside.
@@ -95,18 +98,20 @@ impl Pair<'_> {
     pub(super) fn near(&self, reach: f64, way: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
         let crossing = Crossing::of(self.ends(at)).filter(|crossing| {
             let mut excess = crossing.excess().into_iter().zip(self.edges);
+            // Where lines meet at an angle φ their closest points move 1/sin φ times as fast as they do.
             crossing.sine >= LEAST_SINE
                 && crossing.gap.abs() <= reach + way
-                && excess.all(|(excess, edge)| excess * edge.length <= UNFORESEEN * edge.length + 2.0 * way)
+                && excess.all(|(x, edge)| x * edge.length <= UNFORESEEN * edge.length + 2.0 * way / crossing.sine)
         })?;
         let shorter = self.shorter();
-        let turn = (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN);
+        let touches = crossing.gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
+        let turn = if touches { LARGEST_TURN } else { (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN) };
         let deepest = reach.min(DEEPEST * shorter) + way;
         let is_near = |crossing: &Crossing| {
             let misses = self.misses_normal(crossing, at);
             // What is in already must be in the bodies, and meet; what comes must come from outside.
             let inside = || misses <= ROUNDING && crossing.gap >= -deepest && self.is_inside(crossing, at);
-            misses <= turn && (crossing.gap >= -SHALLOW * shorter || inside())
+            misses <= turn && (touches || crossing.gap >= -SHALLOW * shorter || inside())
         };
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
