@@ -212,6 +212,10 @@ impl Integrals {
         for (index, facet) in slave.facets().iter().enumerate() {
             let Some(base) = Base::new(facet, positions) else { continue };
             let places = Sums::begin(sums, slave, facet, &base);
+            if partners(index).is_empty() {
+                continue;
+            }
+            let base = base.see_beside(slave, index, positions);
             for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
                 let outside = offsets.between(facet, other);
                 base.each_sample(other, positions, &mut |sample: &Sample| {
@@ -239,6 +243,10 @@ impl Integrals {
         for (index, facet) in slave.facets().iter().enumerate() {
             let Some(base) = Base::new(facet, positions) else { continue };
             let places = Sums::begin(&mut self.sums, slave, facet, &base);
+            if partners(index).is_empty() {
+                continue;
+            }
+            let base = base.see_beside(slave, index, positions);
             let mut block = Block::default();
             let mut touched = false;
             for &partner in partners(index) {

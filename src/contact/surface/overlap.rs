@@ -4,8 +4,8 @@
 //! stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004,
 //! section 4); in two dimensions it is a part of a line.
 
-use super::Facet;
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
+use super::{Facet, Surface};
 
 /// A point of the part of a slave facet that a master facet covers.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +46,8 @@ pub(crate) struct Base {
     corners: [[f64; 2]; 4],
     count: usize,
     size: f64,
+    /// By side, the facet behind a sharp edge: a point of it, and its normal.
+    beside: [Option<[Point; 2]>; 4],
 }
 
 /// The weights of the middle of a facet.
@@ -60,6 +62,12 @@ const FACING: f64 = 0.5;
 /// Share of a facet that is too small to be a common part.
 const SLIVER: f64 = 1e-12;
 
+/// Greatest cosine between the normals of facets beside a sharp edge: 37 degrees.
+const SHARP: f64 = 0.8;
+
+/// Share of its depth below a facet that a point is at most below one behind a sharp edge and belongs to that one.
+const NEARER: f64 = 0.25;
+
 impl Base {
     /// None if the facet has no normal.
     pub(crate) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
@@ -70,9 +78,31 @@ impl Base {
         let normal = unit(product)?;
         let along = unit(first)?;
         let axes = [along, cross(normal, along)];
-        let mut base = Self { shape, normal, product, axes, corners: [[0.0; 2]; 4], count, size: shape.size() };
+        let mut base =
+            Self { shape, normal, product, axes, corners: [[0.0; 2]; 4], count, size: shape.size(), beside: [None; 4] };
         base.corners = std::array::from_fn(|k| base.in_plane(shape.corner(k)));
         Some(base)
+    }
+
+    /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over there,
+    /// or lies there, is not below this facet.
+    pub(crate) fn see_beside(mut self, surface: &Surface, index: usize, positions: &[Point]) -> Self {
+        for side in 0..self.count {
+            let Some((other, _)) = surface.neighbor(index, side) else { continue };
+            let other = surface.facets()[other].shape(positions);
+            let weights = middle(other.corners().len());
+            let point = other.point(&weights);
+            let sharp = |normal: &Point| dot(*normal, self.normal) < SHARP;
+            let convex = dot(self.normal, sub(point, self.shape.corner(side))) < 0.0;
+            self.beside[side] = other.normal(&weights).filter(sharp).filter(|_| convex).map(|normal| [point, normal]);
+        }
+        self
+    }
+
+    /// Whether what is at x, by `gap` above the facet, belongs to a facet behind a sharp edge.
+    fn is_beside(&self, x: Point, gap: f64) -> bool {
+        let is_above = |[point, normal]: &[Point; 2]| dot(*normal, sub(x, *point)) > NEARER * gap;
+        gap < 0.0 && self.beside.iter().flatten().any(is_above)
     }
 
     fn in_plane(&self, x: Point) -> [f64; 2] {
@@ -127,9 +157,10 @@ impl Base {
     fn sample(&self, area: f64, slave: [f64; 4], shape: &Shape, master: [f64; 4], act: &mut impl FnMut(&Sample)) {
         let Some(normal) = shape.normal(&master) else { return };
         let cosine = dot(normal, self.normal);
-        let gap = dot(self.normal, sub(shape.point(&master), self.shape.point(&slave)));
+        let point = shape.point(&master);
+        let gap = dot(self.normal, sub(point, self.shape.point(&slave)));
         // (A warped facet may be seen from its side somewhere.)
-        if cosine < 0.0 && gap.is_finite() {
+        if cosine < 0.0 && gap.is_finite() && !self.is_beside(point, gap) {
             act(&Sample { area, slave, master, gap, direction: normal.map(|x| x / cosine) });
         }
     }
@@ -149,7 +180,11 @@ impl Base {
             let (from, to) = (corners[k], corners[(k + 1) % count]);
             let mut sample = |length: f64, share: f64, slave: [f64; 4], outward: [f64; 2]| {
                 let master = shape.on_side(k, share);
-                let gap = dot(self.normal, sub(shape.point(&master), self.shape.point(&slave)));
+                let point = shape.point(&master);
+                let gap = dot(self.normal, sub(point, self.shape.point(&slave)));
+                if self.is_beside(point, gap) {
+                    return;
+                }
                 let [along, across] = outward;
                 let outward = add_scaled(self.axes[0].map(|x| along * x), across, self.axes[1]);
                 act(&RimSample { length, slave, master, gap, outward });
