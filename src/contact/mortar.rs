@@ -7,6 +7,7 @@ mod passage;
 mod ramp;
 mod rates;
 mod rows;
+mod second_order;
 
 use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
 use super::{
