@@ -371,7 +371,15 @@ impl<const D: usize> SecondOrderStack<D> {
     pub fn patch(&self, contact: impl ContactConstraint<f64> + 'static) -> Result<f64> {
         let (stiffness, mass) = self.solid.matrices();
         let system = || LinearSystem::lumped(mass.clone(), stiffness.clone());
-        crate::stacks::under_pressure(&self.solid.nodes, self.solid.material, system, &self.areas(), contact)
+        // (Motions far above 1/h are damped as well: nodes of second order are light.)
+        crate::stacks::under_pressure(
+            &self.solid.nodes,
+            self.solid.material,
+            system,
+            &self.areas(),
+            (0.5625, 0.3),
+            contact,
+        )
     }
 }
 
