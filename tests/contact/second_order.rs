@@ -251,3 +251,30 @@ fn a_part_alone_is_moved_by_all_nodes_of_its_facet() {
     assert!([0, 1, 2].iter().all(|node| contact.dofs().contains(&(2 * node))));
     assert_eq!(Surface::new(&nodes, [half]).unwrap().nodes(), [1, 2]);
 }
+
+/// On both sides of an interface.
+fn check_pressures<const D: usize>(stack: &SecondOrderStack<D>, pressure: f64) {
+    let nodes = &stack.solid.nodes;
+    let (areas, dofs) = (stack.areas(), stack.solid.node_dofs());
+    let forces: Vec<[f64; D]> = dofs.iter().map(|dofs| dofs.map(|dof| -pressure * areas[dof])).collect();
+    for facets in &stack.facets {
+        let surface = Surface::new(nodes, facets.clone()).unwrap();
+        for (found, shear) in
+            surface.pressures(nodes, &forces).unwrap().iter().zip(surface.shears(nodes, &forces).unwrap())
+        {
+            assert!(
+                (found / pressure - 1.0).abs() < 1e-12 && shear.iter().all(|x| x.abs() < 1e-12),
+                "{found} {shear:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn pressures_are_those_of_the_forces_of_second_order() {
+    for family in FAMILIES {
+        check_pressures(&SecondOrderStack::new(plates(2, 3), family, 0.0, |x| x), 0.7);
+        check_pressures(&SecondOrderStack::new(plates(2, 3), family, 0.0, |[x, y]| [x, y + 0.3 * x]), 0.7);
+        check_pressures(&SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), family, 0.0, |x| x), 0.7);
+    }
+}

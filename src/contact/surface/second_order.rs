@@ -142,6 +142,30 @@ impl Whole {
         self.kind.orders()[self.part]
     }
 
+    /// Of the force on a node of the part, the shares that its other nodes get where linear parts take the pressure.
+    ///
+    /// With these the shape functions of nodes in the middle lose to those around them until all have the integrals
+    /// that they have on the parts: the same pressure everywhere makes forces in proportion to the areas.
+    pub(super) fn given(&self, corner: usize) -> ByNode {
+        let order = self.order();
+        let at = order[corner];
+        let (corners, share) = match self.kind {
+            Kind::Segment => (2, 1.0 / 8.0),
+            Kind::Triangle => (3, 1.0 / 8.0),
+            Kind::Serendipity => (4, 3.0 / 16.0),
+            Kind::Biquadratic => (4, 1.0 / 8.0),
+        };
+        let mut given = [0.0; MOST];
+        for (given, &to) in given.iter_mut().zip(order) {
+            *given = match at {
+                8 => [1.0 / 64.0, 3.0 / 32.0, 0.0][to / 4],
+                _ if at >= corners && (to == at - corners || to == (at - corners + 1) % corners) => share,
+                _ => 0.0,
+            };
+        }
+        given
+    }
+
     /// Σ of the natural coordinates of the part's corners.
     fn place(&self, weights: &[f64; 4]) -> [f64; 2] {
         let corners = &self.order()[..self.own];
