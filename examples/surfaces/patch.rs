@@ -85,11 +85,10 @@ fn second_order_row<const D: usize>(
     stack: &SecondOrderStack<D>,
 ) -> Result<(), Box<dyn Error>> {
     write!(table, "| {name} |")?;
-    for upper in [true, false] {
-        write!(table, " {} |", small(stack.patch(stack.mortar_of_first_order(upper)?)?))?;
-    }
-    for upper in [true, false] {
-        write!(table, " {} |", small(stack.patch(stack.mortar(upper)?)?))?;
+    let parts = [true, false].map(|upper| stack.mortar_of_first_order(upper));
+    let whole = [true, false].map(|upper| stack.mortar(upper));
+    for contact in parts.into_iter().chain(whole) {
+        write!(table, " {} |", stack.patch(contact?).map_or("fails".into(), small))?;
     }
     writeln!(table)?;
     Ok(())

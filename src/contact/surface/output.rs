@@ -8,8 +8,8 @@ use crate::real::Real;
 
 impl Surface {
     /// ∫ N dA of each of its [`nodes`](Self::nodes) (area; length in two dimensions), N the shape function of the node:
-    /// the share of the surface that belongs to it; on facets of second order that of their linear parts. `positions` are
-    /// those of all nodes of the mesh.
+    /// the share of the surface that belongs to it; on facets of second order that of their linear parts. `positions`
+    /// are those of all nodes of the mesh.
     ///
     /// # Errors
     ///
@@ -41,8 +41,8 @@ impl Surface {
 
     /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make:
     /// −f·A/|A|² with A = ∫ N n dA, n outward. A pressure that is the same all over the surface comes out as it is, at
-    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears). On facets of second order, whose
-    /// nodes in the middle bear most of a pressure, f is what their linear parts would have of it.
+    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears). On facets of second order,
+    /// whose nodes in the middle bear most of a pressure, f is what their linear parts would have of it.
     ///
     /// `positions` and `forces` are those of all nodes of the mesh: contact forces are those of
     /// [`contact_forces`](crate::Simulation::contact_forces). At the border of a contact that ends inside of a facet

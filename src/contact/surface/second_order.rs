@@ -44,9 +44,10 @@ const ON_QUADRILATERAL: &[[f64; 2]] =
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Whole {
     kind: Kind,
-    part: usize,
-    /// Number of nodes of the part, and the other nodes (the last one fills the rest).
-    own: usize,
+    /// Which part, and its number of nodes.
+    part: u8,
+    own: u8,
+    /// The other nodes (the last one fills the rest).
     others: [usize; 5],
 }
 
@@ -119,27 +120,31 @@ fn serendipity([a, b]: [f64; 2], [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
 }
 
 impl Whole {
-    /// The parts of a facet of second order: for each the nodes of its own, and what it is a part of.
-    pub(super) fn part(kind: Kind, part: usize, nodes: &[usize]) -> ([usize; 4], usize, Self) {
-        let order = kind.orders()[part];
+    /// A part of a facet of second order: its nodes, their number, and what it is a part of.
+    pub(super) fn part(kind: Kind, part: u8, nodes: &[usize]) -> ([usize; 4], usize, Self) {
+        let order = kind.orders()[usize::from(part)];
         let own = match (kind, part) {
             (Kind::Segment, _) => 2,
             (Kind::Triangle, _) | (Kind::Serendipity, 0..4) => 3,
             _ => 4,
         };
-        let (of_part, others) = order.split_at(own);
+        let (of_part, others) = order.split_at(usize::from(own));
         let fill = |places: &[usize], k: usize| nodes[places[k.min(places.len() - 1)]];
         let whole = Self { kind, part, own, others: std::array::from_fn(|k| fill(others, k)) };
-        (std::array::from_fn(|k| fill(of_part, k)), own, whole)
+        (std::array::from_fn(|k| fill(of_part, k)), usize::from(own), whole)
     }
 
     /// The nodes that are none of the part.
     pub(super) fn others(&self) -> &[usize] {
-        &self.others[..self.order().len() - self.own]
+        &self.others[..self.order().len() - self.own()]
+    }
+
+    fn own(&self) -> usize {
+        usize::from(self.own)
     }
 
     fn order(&self) -> &'static [usize] {
-        self.kind.orders()[self.part]
+        self.kind.orders()[usize::from(self.part)]
     }
 
     /// Of the force on a node of the part, the shares that its other nodes get where linear parts take the pressure.
@@ -168,7 +173,7 @@ impl Whole {
 
     /// Σ of the natural coordinates of the part's corners.
     fn place(&self, weights: &[f64; 4]) -> [f64; 2] {
-        let corners = &self.order()[..self.own];
+        let corners = &self.order()[..self.own()];
         corners.iter().zip(weights).fold([0.0; 2], |sum, (&corner, weight)| {
             let at = self.kind.coordinates()[corner];
             [sum[0] + weight * at[0], sum[1] + weight * at[1]]
@@ -188,7 +193,7 @@ impl Whole {
     /// What they are beyond those of the part: zero at all nodes, and in the sum.
     pub(crate) fn excess(&self, weights: &[f64; 4]) -> ByNode {
         let mut excess = self.shapes(weights);
-        excess.iter_mut().zip(&weights[..self.own]).for_each(|(shape, weight)| *shape -= weight);
+        excess.iter_mut().zip(&weights[..self.own()]).for_each(|(shape, weight)| *shape -= weight);
         excess
     }
 
@@ -203,7 +208,7 @@ impl Whole {
                 let (_, [along, across]) = self.kind.shape(place, at);
                 *slope = first * along + second * across;
             }
-            slopes.iter_mut().zip(&by[..self.own]).for_each(|(slope, by)| *slope -= by);
+            slopes.iter_mut().zip(&by[..self.own()]).for_each(|(slope, by)| *slope -= by);
         }
         slopes
     }
@@ -247,7 +252,7 @@ mod tests {
         for (kind, count) in KINDS {
             let nodes: Vec<usize> = (10..10 + count).collect();
             let mut covered = 0.0;
-            for part in 0..kind.orders().len() {
+            for part in (0_u8..).take(kind.orders().len()) {
                 let (own, corners, whole) = Whole::part(kind, part, &nodes);
                 let mut all: Vec<usize> = own[..corners].iter().chain(whole.others()).copied().collect();
                 all.sort_unstable();

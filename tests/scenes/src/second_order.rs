@@ -224,8 +224,8 @@ impl<const D: usize> SecondOrder<D> {
         (0..self.nodes.len()).map(|node| std::array::from_fn(|axis| Solid::<D>::dof(node, axis))).collect()
     }
 
-    /// K, small strains, plane strain in two dimensions; and a mass in proportion to the diagonal of the consistent one,
-    /// element by element.
+    /// K, small strains, plane strain in two dimensions; and a mass in proportion to the diagonal of the consistent
+    /// one, element by element.
     pub fn matrices(&self) -> (SparseColMat<usize, f64>, Vec<f64>) {
         let [lambda, mu] = self.material.lame();
         let reference = self.family.reference(D);
@@ -371,15 +371,9 @@ impl<const D: usize> SecondOrderStack<D> {
     pub fn patch(&self, contact: impl ContactConstraint<f64> + 'static) -> Result<f64> {
         let (stiffness, mass) = self.solid.matrices();
         let system = || LinearSystem::lumped(mass.clone(), stiffness.clone());
+        let areas: Vec<_> = self.areas().into_iter().enumerate().collect();
         // (Motions far above 1/h are damped as well: nodes of second order are light.)
-        crate::stacks::under_pressure(
-            &self.solid.nodes,
-            self.solid.material,
-            system,
-            &self.areas(),
-            (0.5625, 0.3),
-            contact,
-        )
+        crate::stacks::under_pressure(&self.solid.nodes, self.solid.material, system, &areas, (0.5625, 0.3), contact)
     }
 }
 
