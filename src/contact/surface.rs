@@ -110,8 +110,10 @@ impl Surface {
                 let expected = if dimension == 2 { 2 } else { 3 };
                 return Err(Error::Dimension { what: "a facet of a contact surface", expected, found: nodes.len() });
             }
-            let all: Vec<usize> = facet.all_nodes().collect();
-            check_nodes("the nodes of a facet (at most)", &all, coordinates.len())?;
+            let others = facet.whole.as_ref().map_or(&[][..], |whole| whole.others());
+            for nodes in [nodes, others] {
+                check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            }
             if !facet.shape(coordinates).is_regular() {
                 let reason = match facet.shape(coordinates).is_degenerate() {
                     true => "it has no length or area",
@@ -267,7 +269,9 @@ impl Surface {
 
     /// The nodes that move it, ascending: its own, and those of facets of second order that it has parts of.
     pub(crate) fn moved_by(&self) -> Vec<usize> {
-        let mut nodes: Vec<usize> = self.facets.iter().flat_map(Facet::all_nodes).collect();
+        let others = self.facets.iter().filter(|facet| facet.whole.is_some()).flat_map(Facet::all_nodes);
+        let mut nodes = self.nodes.clone();
+        nodes.extend(others);
         nodes.sort_unstable();
         nodes.dedup();
         nodes
