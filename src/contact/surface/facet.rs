@@ -41,8 +41,8 @@ impl From<[usize; 4]> for Facet {
 }
 
 /// Facets of second order are several of first order with the same nodes, which know of what they are parts:
-/// [`Mortar`](super::Mortar) and [`Tie`](super::Tie) take positions between nodes from the shape functions of second
-/// order, other constraints from the parts.
+/// [`Mortar`](crate::contact::Mortar) and [`Tie`](crate::contact::Tie) take positions between nodes from the shape
+/// functions of second order, other constraints from the parts.
 ///
 /// ```
 /// use contact_dynamics::contact::Facet;
