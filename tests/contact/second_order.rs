@@ -278,3 +278,17 @@ fn pressures_are_those_of_the_forces_of_second_order() {
         check_pressures(&SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), family, 0.0, |x| x), 0.7);
     }
 }
+
+#[test]
+fn ties_of_curved_surfaces_turn_freely() {
+    let dome = |[x, y, z]: [f64; 3]| [x, y, z + 0.2 * (x * (1.0 - x) + y * y) * z * (2.0 - z)];
+    for family in FAMILIES {
+        let stack = SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), family, 0.0, dome);
+        let mut tie = stack.tie(true).unwrap();
+        let (u, v) = (shaken(stack.solid.dofs(), 0.02, 4), shaken(stack.solid.dofs(), 0.5, 5));
+        let rate = rates_of_rigid_motions(&mut tie, &stack.solid.nodes, &u);
+        assert!(rate < 1e-13, "{family:?}: {rate:e}");
+        let error = verify::gap_jacobian(&mut tie, 0.0, &u, &v, 1e-5).unwrap();
+        assert!(error.rows > 30 && error.jacobian < 1e-8 && error.acceleration < 1e-4, "{family:?}: {error:?}");
+    }
+}
