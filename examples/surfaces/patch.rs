@@ -1,5 +1,6 @@
 //! Patch tests: two bodies under the same pressure from all sides, whose displacements are linear.
 
+use contact_dynamics_scenes::second_order::{Family, SecondOrderStack};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
 use std::error::Error;
@@ -33,7 +34,64 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
         let skewed = Stack::new(bodies(), 0.0, |[x, y, z]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y, z]);
         row(&mut table, "plane, skewed quads", &name, &skewed)?;
     }
+    second_order(&mut table, quick)?;
     Ok(table)
+}
+
+/// Elements of second order, with their facets as they are and as several of first order.
+fn second_order(table: &mut String, quick: bool) -> Result<(), Box<dyn Error>> {
+    table.push_str(
+        "\nPatch test on elements of second order by `Mortar`\n\n\
+         | elements | interface | elements below, above | as first order, slave above | slave below | slave above | \
+         slave below |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let plates = [
+        ("triangles of 6 nodes", Family::Simplex),
+        ("quadrilaterals of 8", Family::Serendipity),
+        ("quadrilaterals of 9", Family::Lagrange),
+    ];
+    let solids = [
+        ("tetrahedra of 10", Family::Simplex),
+        ("hexahedra of 20", Family::Serendipity),
+        ("hexahedra of 27", Family::Lagrange),
+    ];
+    let meshes = if quick { &[(3, 2)][..] } else { &[(2, 3), (5, 2)] };
+    for ((name, family), &(below, above)) in plates.iter().flat_map(|of| meshes.iter().map(move |mesh| (of, mesh))) {
+        let bodies = || [below, above].map(|cells| Solid::rectangle([1.0; 2], [cells, 1], MATERIAL));
+        let cells = format!("{below}, {above}");
+        let flat = SecondOrderStack::new(bodies(), *family, 0.0, |x| x);
+        second_order_row(table, &format!("{name} | line | {cells}"), &flat)?;
+        let slanted = SecondOrderStack::new(bodies(), *family, 0.0, |[x, y]| [x, y + 0.35 * x * (2.0 - y) * y]);
+        second_order_row(table, &format!("{name} | slanted line | {cells}"), &slanted)?;
+    }
+    for (name, family) in solids.iter().take(if quick { 1 } else { 3 }) {
+        let bodies = || [[2, 2, 1], [1, 2, 1]].map(|cells| Solid::block([1.0; 3], cells, MATERIAL));
+        let flat = SecondOrderStack::new(bodies(), *family, 0.0, |x| x);
+        second_order_row(table, &format!("{name} | plane | 2 × 2, 1 × 2"), &flat)?;
+        let slant = |[x, y, z]: [f64; 3]| [x, y, z + 0.25 * (x + 0.5 * y) * (2.0 - z) * z];
+        let slanted = SecondOrderStack::new(bodies(), *family, 0.0, slant);
+        second_order_row(table, &format!("{name} | slanted plane | 2 × 2, 1 × 2"), &slanted)?;
+        let skewed =
+            SecondOrderStack::new(bodies(), *family, 0.0, |[x, y, z]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y, z]);
+        second_order_row(table, &format!("{name} | plane, skewed sides | 2 × 2, 1 × 2"), &skewed)?;
+    }
+    Ok(())
+}
+
+fn second_order_row<const D: usize>(
+    table: &mut String,
+    name: &str,
+    stack: &SecondOrderStack<D>,
+) -> Result<(), Box<dyn Error>> {
+    write!(table, "| {name} |")?;
+    let parts = [true, false].map(|upper| stack.mortar_of_first_order(upper));
+    let whole = [true, false].map(|upper| stack.mortar(upper));
+    for contact in parts.into_iter().chain(whole) {
+        write!(table, " {} |", stack.patch(contact?).map_or("fails".into(), small))?;
+    }
+    writeln!(table)?;
+    Ok(())
 }
 
 fn row<const D: usize>(

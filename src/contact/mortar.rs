@@ -7,6 +7,7 @@ mod passage;
 mod ramp;
 mod rates;
 mod rows;
+mod second_order;
 
 use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
 use super::{
@@ -29,7 +30,7 @@ const BEYOND: f64 = 0.25;
 
 /// Contact of two deforming surfaces whose nodes need not match: gaps weighted over the facets of one surface, the
 /// slave, against those of the other, the master. Segments in two dimensions, triangles and bilinear quadrilaterals in
-/// three.
+/// three, and those of second order ([`Facet`]).
 ///
 /// The gap of a slave node is the mean of the distance between the surfaces, with the node's shape function N as
 /// weight, over the part of the slave surface that the master covers:
@@ -41,6 +42,11 @@ const BEYOND: f64 = 0.25;
 /// Eng. 79, 2009, with gaps not divided by the area). The multiplier is the force of the node's share of the pressure,
 /// p ∫ N dA: [`area`](Self::area) has the integral. Facets that are covered in part count with what is covered, so that
 /// no row is small because little of it touches.
+///
+/// On facets of second order N is the linear shape function of their parts, so that weights are positive and each node
+/// has a row, and x_s and x_m follow the shape functions of second order (Puso, Laursen and Solberg, Comput. Methods
+/// Appl. Mech. Eng. 197, 2008): a constant pressure makes the nodal forces that their elements have of it. n is that of
+/// the part.
 ///
 /// Rows of G are derivatives of the gap, from both surfaces, the turning of n and the stretch of the area. Contact
 /// forces conserve linear and angular momentum at the configuration where rows are linearized.
@@ -67,7 +73,9 @@ const BEYOND: f64 = 0.25;
 /// - Facets that see each other at more than 60° do not meet: the edges of bodies are not kept apart.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On quadrilaterals that are no parallelograms shape functions are integrated by quadrature: the pressure of the
-///   patch test is then not exact to rounding (`docs/contact.md`).
+///   patch test is then not exact to rounding (`docs/contact.md`). So it is on facets of second order
+///   whose nodes are not in the middle, or that are curved: their areas are those of the parts.
+/// - Gaps are measured along the normals of facets, of second order along those of their parts.
 ///
 /// # Identity
 ///

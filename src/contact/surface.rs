@@ -12,6 +12,7 @@ mod projection;
 mod reach;
 mod search;
 mod second_difference;
+mod second_order;
 mod shape;
 
 pub use facet::Facet;
@@ -22,6 +23,7 @@ pub(crate) use projection::{Ground, Stand};
 pub(crate) use reach::Reach;
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use second_difference::SecondDifference;
+pub(crate) use second_order::ByNode;
 pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 
 use super::check_nodes;
@@ -108,7 +110,10 @@ impl Surface {
                 let expected = if dimension == 2 { 2 } else { 3 };
                 return Err(Error::Dimension { what: "a facet of a contact surface", expected, found: nodes.len() });
             }
-            check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            let others = facet.whole.as_ref().map_or(&[][..], |whole| whole.others());
+            for nodes in [nodes, others] {
+                check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
+            }
             if !facet.shape(coordinates).is_regular() {
                 let reason = match facet.shape(coordinates).is_degenerate() {
                     true => "it has no length or area",
@@ -260,6 +265,16 @@ impl Surface {
     /// The nodes of its facets, ascending.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes
+    }
+
+    /// The nodes that move it, ascending: its own, and those of facets of second order that it has parts of.
+    pub(crate) fn moved_by(&self) -> Vec<usize> {
+        let others = self.facets.iter().filter(|facet| facet.whole.is_some()).flat_map(Facet::all_nodes);
+        let mut nodes = self.nodes.clone();
+        nodes.extend(others);
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
     }
 
     /// The place of one of its nodes among them.

@@ -14,7 +14,9 @@ use joint::Joint;
 const REACH: f64 = 0.1;
 
 /// Two surfaces that are tied to each other where they meet in the reference configuration; their nodes need not match.
-/// Segments in two dimensions, triangles and bilinear quadrilaterals in three.
+/// Segments in two dimensions, triangles and bilinear quadrilaterals in three, and those of second order ([`Facet`]),
+/// on which displacements follow the shape functions of second order and N is that of a linear part, as in
+/// [`Mortar`](super::Mortar).
 ///
 /// Each node of the one surface, the slave, that the other, the master, covers has an equality row for each axis k: the
 /// jump of the displacement in the mean, with the node's shape function N as weight, over what is covered of the

@@ -16,6 +16,7 @@ mod offsets;
 mod passing_through;
 mod pounding;
 mod rate_laws;
+mod second_order;
 #[cfg(feature = "search")]
 mod shapes;
 mod surfaces;

@@ -14,6 +14,7 @@
 //! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
+use super::second_order::{Pair, Shares};
 use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
@@ -121,6 +122,11 @@ pub(super) struct Entry {
 }
 
 impl Entry {
+    /// One that does not change the area.
+    pub(super) fn new(row: usize, node: usize, moment: Point, share: f64) -> Self {
+        Self { row, node, moment, area: [0.0; 3], share }
+    }
+
     /// The derivative of the mean gap.
     pub(super) fn weight(&self, sums: &Sums) -> Point {
         add_scaled(self.moment, -sums.gap(), self.area).map(|x| x / sums.area)
@@ -217,11 +223,15 @@ impl Integrals {
             }
             let base = base.see_beside(slave, index, positions);
             for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
-                let outside = offsets.between(facet, other);
+                let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
                 base.each_sample(other, positions, &mut |sample: &Sample| {
                     let offset = outside.at(&sample.slave, &sample.master);
+                    let mut gap = sample.gap - offsets.factor * offset;
+                    if let Some(pair) = &curved {
+                        gap += pair.gap(&base, &sample.slave, &sample.master);
+                    }
                     for (&place, share) in places.iter().zip(sample.slave).take(base.count()) {
-                        sums[place].add(sample.area * share, sample.gap - offsets.factor * offset, offset);
+                        sums[place].add(sample.area * share, gap, offset);
                     }
                 });
             }
@@ -247,15 +257,17 @@ impl Integrals {
                 continue;
             }
             let base = base.see_beside(slave, index, positions);
-            let mut block = Block::default();
+            let (mut block, mut shares) = (Block::default(), Shares::default());
             let mut touched = false;
             for &partner in partners(index) {
                 let other = (&master.facets()[partner], master.open_sides(partner));
-                touched |= self.integrate_pair((&base, facet), other, (positions, offsets), &places, &mut block);
+                let own = (&mut block, &mut shares);
+                touched |= self.integrate_pair((&base, facet), other, (positions, offsets), &places, own);
             }
             if touched {
                 block.turn(&base);
-                self.push_all(&places, base.count(), facet, &block);
+                self.push_all(&places[..base.count()], facet, &block);
+                self.entries.extend(shares.entries(&places[..base.count()], facet, base.normal));
             }
         }
         self.merge();
@@ -268,22 +280,34 @@ impl Integrals {
         (other, open): (&Facet, [bool; 4]),
         (positions, offsets): (&[Point], Offsets<'_>),
         places: &[usize; 4],
-        block: &mut Block,
+        (block, shares): (&mut Block, &mut Shares),
     ) -> bool {
         let count = base.count();
-        let outside = offsets.between(facet, other);
-        let mut onto = Block::default();
+        let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
+        let (mut onto, mut shares_onto) = (Block::default(), Shares::default());
         let mut touched = false;
         base.each_sample(other, positions, &mut |sample: &Sample| {
             touched = true;
-            let Sample { area, slave, master, gap: distance, direction: normal } = *sample;
-            let (mut gap, mut direction, mut offset) = (distance, normal, 0.0);
+            let Sample { area, slave, master, gap: distance, direction: mut normal } = *sample;
+            let mut point = base.shape.point(&slave);
+            let (mut gap, mut offset) = (distance, 0.0);
+            if let Some(pair) = &curved {
+                let excess = pair.at(&slave, &master);
+                gap += dot(base.normal, excess.apart);
+                normal = pair.direction(base, sample);
+                point = add_scaled(point, 1.0, excess.off);
+                for (a, [of_moment, _]) in block.turns.iter_mut().enumerate().take(count) {
+                    let weight = area * slave[a];
+                    excess.add(a, weight, [&mut *shares, &mut shares_onto]);
+                    *of_moment = add_scaled(*of_moment, weight, excess.apart);
+                }
+            }
+            let mut direction = normal;
             if !offsets.by_node.is_empty() {
                 offset = outside.at(&slave, &master);
                 gap -= offsets.factor * offset;
                 direction = add_scaled(normal, offsets.factor, base.slope(other, positions, &master, &outside.0[1]));
             }
-            let point = base.shape.point(&slave);
             // (Of a segment the second tangent is the unit vector out of the plane, and this its length times n.)
             let [first, second] = base.shape.tangents_at(&slave);
             let product = cross(first, if count == 2 { [0.0, 0.0, 1.0] } else { second });
@@ -315,17 +339,21 @@ impl Integrals {
         });
         if touched {
             base.each_rim_sample(other, open, positions, &mut |sample: &RimSample| {
-                let offset = offsets.factor * outside.at(&sample.slave, &sample.master);
+                let mut offset = offsets.factor * outside.at(&sample.slave, &sample.master);
+                if let Some(pair) = &curved {
+                    offset -= pair.gap(base, &sample.slave, &sample.master);
+                }
                 block.add_rim(sample, offset, count, &mut onto);
             });
-            self.push_all(places, count, other, &onto);
+            self.push_all(&places[..count], other, &onto);
+            self.entries.extend(shares_onto.entries(&places[..count], other, base.normal));
         }
         touched
     }
 
     /// Makes entries of what rows have of the nodes of a facet.
-    fn push_all(&mut self, places: &[usize; 4], count: usize, facet: &Facet, block: &Block) {
-        for (a, &row) in places.iter().enumerate().take(count) {
+    fn push_all(&mut self, places: &[usize], facet: &Facet, block: &Block) {
+        for (a, &row) in places.iter().enumerate() {
             for (b, &node) in facet.nodes().iter().enumerate() {
                 let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
                 self.entries.push(Entry { row, node, moment, area, share });

@@ -1,6 +1,7 @@
 //! A facet by the numbers of its nodes.
 
-use super::shape::{Point, Shape};
+use super::second_order::{ByNode, Kind, Whole};
+use super::shape::{Point, Shape, add_scaled, sub};
 
 /// A facet of a surface: the numbers of its 2, 3 or 4 nodes.
 ///
@@ -17,27 +18,31 @@ pub struct Facet {
     /// The nodes; of less than four the last one fills the rest.
     pub(crate) nodes: [usize; 4],
     pub(crate) count: usize,
+    /// The facet of second order that it is a part of.
+    pub(crate) whole: Option<Whole>,
 }
 
 impl From<[usize; 2]> for Facet {
     fn from([i, j]: [usize; 2]) -> Self {
-        Self { nodes: [i, j, j, j], count: 2 }
+        Self { nodes: [i, j, j, j], count: 2, whole: None }
     }
 }
 
 impl From<[usize; 3]> for Facet {
     fn from([i, j, k]: [usize; 3]) -> Self {
-        Self { nodes: [i, j, k, k], count: 3 }
+        Self { nodes: [i, j, k, k], count: 3, whole: None }
     }
 }
 
 impl From<[usize; 4]> for Facet {
     fn from(nodes: [usize; 4]) -> Self {
-        Self { nodes, count: 4 }
+        Self { nodes, count: 4, whole: None }
     }
 }
 
-/// Facets of higher order are taken as several of first order, with the same nodes.
+/// Facets of second order are several of first order with the same nodes, which know of what they are parts:
+/// [`Mortar`](crate::contact::Mortar) and [`Tie`](crate::contact::Tie) take positions between nodes from the shape
+/// functions of second order, other constraints from the parts.
 ///
 /// ```
 /// use contact_dynamics::contact::Facet;
@@ -46,26 +51,33 @@ impl From<[usize; 4]> for Facet {
 /// ```
 impl Facet {
     /// The halves of a segment of three nodes: its ends, and the node between them.
-    pub fn of_quadratic_segment([a, b, middle]: [usize; 3]) -> [Self; 2] {
-        [Self::from([a, middle]), Self::from([middle, b])]
+    pub fn of_quadratic_segment(nodes: [usize; 3]) -> [Self; 2] {
+        Self::parts(Kind::Segment, &nodes)
     }
 
     /// The parts of a triangle of six nodes: its corners, and the nodes on its sides, the first between the first two
     /// corners.
-    pub fn of_quadratic_triangle([a, b, c, ab, bc, ca]: [usize; 6]) -> [Self; 4] {
-        [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].map(Self::from)
+    pub fn of_quadratic_triangle(nodes: [usize; 6]) -> [Self; 4] {
+        Self::parts(Kind::Triangle, &nodes)
     }
 
     /// The parts of a quadrilateral of eight nodes: its corners, and the nodes on its sides, the first between the
     /// first two corners. They are four triangles and a quadrilateral.
-    pub fn of_quadratic_quadrilateral([a, b, c, d, ab, bc, cd, da]: [usize; 8]) -> [Self; 5] {
-        let [w, x, y, z] = [[a, ab, da], [b, bc, ab], [c, cd, bc], [d, da, cd]].map(Self::from);
-        [w, x, y, z, Self::from([ab, bc, cd, da])]
+    pub fn of_quadratic_quadrilateral(nodes: [usize; 8]) -> [Self; 5] {
+        Self::parts(Kind::Serendipity, &nodes)
     }
 
     /// The parts of a quadrilateral of nine nodes: as of eight, and the node in the middle.
-    pub fn of_biquadratic_quadrilateral([a, b, c, d, ab, bc, cd, da, middle]: [usize; 9]) -> [Self; 4] {
-        [[a, ab, middle, da], [b, bc, middle, ab], [c, cd, middle, bc], [d, da, middle, cd]].map(Self::from)
+    pub fn of_biquadratic_quadrilateral(nodes: [usize; 9]) -> [Self; 4] {
+        Self::parts(Kind::Biquadratic, &nodes)
+    }
+
+    fn parts<const N: usize>(kind: Kind, nodes: &[usize]) -> [Self; N] {
+        const NUMBERS: [u8; 5] = [0, 1, 2, 3, 4];
+        std::array::from_fn(|part| {
+            let (nodes, count, whole) = Whole::part(kind, NUMBERS[part], nodes);
+            Self { nodes, count, whole: Some(whole) }
+        })
     }
 
     /// The nodes in the order given.
@@ -76,5 +88,27 @@ impl Facet {
     /// The facet with its vertices at the positions of its nodes.
     pub(crate) fn shape(&self, positions: &[Point]) -> Shape {
         Shape::new(self.nodes.map(|node| positions[node]), self.count)
+    }
+
+    /// Its nodes, and behind them those that the facet of second order has besides.
+    pub(crate) fn all_nodes(&self) -> impl Iterator<Item = usize> + '_ {
+        let others = self.whole.as_ref().map_or(&[][..], Whole::others);
+        self.nodes().iter().chain(others).copied()
+    }
+
+    /// The shape functions that positions follow, by all its nodes, where its own are `weights`.
+    pub(crate) fn shapes(&self, weights: &[f64; 4]) -> ByNode {
+        self.whole.map_or_else(
+            || std::array::from_fn(|k| weights.get(k).copied().unwrap_or(0.0)),
+            |whole| whole.shapes(weights),
+        )
+    }
+
+    /// Σ of the positions of all its nodes with coefficients whose sum is zero.
+    pub(crate) fn combine(&self, coefficients: &ByNode, positions: &[Point]) -> Point {
+        // Differences from the first node: far from the origin the sum would lose digits.
+        let first = positions[self.nodes[0]];
+        let term = |sum, (node, &share): (usize, &f64)| add_scaled(sum, share, sub(positions[node], first));
+        self.all_nodes().zip(coefficients).fold([0.0; 3], term)
     }
 }

@@ -52,7 +52,7 @@ impl Nodes {
         })
     }
 
-    /// Nodes of a mesh with two surfaces of it, of two bodies whose nodes are those of the surfaces.
+    /// Nodes of a mesh with two surfaces of it, of two bodies whose nodes are those that move the surfaces.
     pub(crate) fn with_surfaces<T: Real, F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -62,7 +62,7 @@ impl Nodes {
         let mut nodes = Self::new(coordinates, dofs)?;
         let one = Surface::of_facets(one, D, &nodes.coordinates)?;
         let other = Surface::of_facets(other, D, &nodes.coordinates)?;
-        nodes.read_bodies([one.nodes().to_vec(), other.nodes().to_vec()])?;
+        nodes.read_bodies([one.moved_by(), other.moved_by()])?;
         Ok((nodes, [one, other]))
     }
 

@@ -8,7 +8,8 @@ use crate::real::Real;
 
 impl Surface {
     /// ∫ N dA of each of its [`nodes`](Self::nodes) (area; length in two dimensions), N the shape function of the node:
-    /// the share of the surface that belongs to it. `positions` are those of all nodes of the mesh.
+    /// the share of the surface that belongs to it; on facets of second order that of their linear parts. `positions`
+    /// are those of all nodes of the mesh.
     ///
     /// # Errors
     ///
@@ -40,7 +41,8 @@ impl Surface {
 
     /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make:
     /// −f·A/|A|² with A = ∫ N n dA, n outward. A pressure that is the same all over the surface comes out as it is, at
-    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears).
+    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears). On facets of second order,
+    /// whose nodes in the middle bear most of a pressure, f is what their linear parts would have of it.
     ///
     /// `positions` and `forces` are those of all nodes of the mesh: contact forces are those of
     /// [`contact_forces`](crate::Simulation::contact_forces). At the border of a contact that ends inside of a facet
@@ -67,7 +69,7 @@ impl Surface {
 
     /// Pressure and shear stress at each node; zero where facets cancel each other.
     fn tractions<T: Real, const D: usize>(&self, positions: &[[T; D]], forces: &[[T; D]]) -> Result<Vec<(f64, Point)>> {
-        let (positions, forces) = (self.points(positions)?, self.points(forces)?);
+        let (positions, forces) = (self.points(positions)?, self.on_parts(self.points(forces)?));
         let mut areas = vec![[0.0; 3]; self.nodes.len()];
         self.integrate(&positions, |place, share, area| areas[place] = add_scaled(areas[place], share, area));
         let traction = |(&node, area): (&usize, Point)| {
@@ -79,6 +81,32 @@ impl Surface {
             (pressure, add_scaled(force, pressure, area).map(|f| f / square.sqrt()))
         };
         Ok(self.nodes.iter().zip(areas).map(traction).collect())
+    }
+
+    /// Forces as linear parts of facets of second order would have them, which have the same sum.
+    fn on_parts(&self, forces: Vec<Point>) -> Vec<Point> {
+        if self.facets.iter().all(|facet| facet.whole.is_none()) {
+            return forces;
+        }
+        // By place how many facets a node has: each hands on its part of the force.
+        let mut facets = vec![0.0; self.nodes.len()];
+        let own = self.facets.iter().flat_map(Facet::nodes);
+        own.for_each(|&node| facets[self.place(node)] += 1.0);
+        let mut moved = forces.clone();
+        for facet in &self.facets {
+            let Some(whole) = &facet.whole else { continue };
+            for (corner, &node) in facet.nodes().iter().enumerate() {
+                let force = forces[node].map(|f| f / facets[self.place(node)]);
+                for (other, share) in facet.all_nodes().zip(whole.given(corner)) {
+                    // (A part alone keeps what the others would get.)
+                    if self.nodes.binary_search(&other).is_ok() {
+                        moved[node] = add_scaled(moved[node], -share, force);
+                        moved[other] = add_scaled(moved[other], share, force);
+                    }
+                }
+            }
+        }
+        moved
     }
 
     /// Calls `act` with place of the node, its shape function, and area times normal, at the points of a quadrature.

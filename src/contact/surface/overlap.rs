@@ -48,6 +48,8 @@ pub(crate) struct Base {
     size: f64,
     /// By side, the facet behind a sharp edge: a point of it, and its normal.
     beside: [Option<[Point; 2]>; 4],
+    /// Whether it is a part of a facet of second order.
+    curved: bool,
 }
 
 /// The weights of the middle of a facet.
@@ -78,8 +80,8 @@ impl Base {
         let normal = unit(product)?;
         let along = unit(first)?;
         let axes = [along, cross(normal, along)];
-        let mut base =
-            Self { shape, normal, product, axes, corners: [[0.0; 2]; 4], count, size: shape.size(), beside: [None; 4] };
+        let (corners, size, curved) = ([[0.0; 2]; 4], shape.size(), facet.whole.is_some());
+        let mut base = Self { shape, normal, product, axes, corners, count, size, curved, beside: [None; 4] };
         base.corners = std::array::from_fn(|k| base.in_plane(shape.corner(k)));
         Some(base)
     }
@@ -129,7 +131,8 @@ impl Base {
         }
         let own = Flat { corners: self.corners, count: self.count };
         let Some(common) = own.common(&master, SLIVER * self.size * self.size) else { return };
-        let rule: &[[f64; 4]] = if self.count == 3 && count == 3 { &THREE } else { &SIX };
+        let linear = self.count == 3 && count == 3 && !self.curved && facet.whole.is_none();
+        let rule: &[[f64; 4]] = if linear { &THREE } else { &SIX };
         let [first, rest @ ..] = common.corners() else { return };
         for pair in rest.windows(2) {
             let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
@@ -243,13 +246,26 @@ impl Base {
     /// With d the vectors across n whose products with the tangents are 0 and 1, dξ = d · dx for the foot's coordinate
     /// ξ.
     pub(crate) fn slope(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], values: &[f64; 4]) -> Point {
-        let count = facet.nodes().len();
+        let by_corner = derivatives(facet.nodes().len(), weights);
+        let change = by_corner.map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
+        self.gradient(facet, positions, weights, change)
+    }
+
+    /// As [`slope`](Self::slope), of how high along n a master facet of second order is over its linear part.
+    pub(crate) fn slope_of_second_order(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4]) -> Point {
+        let Some(whole) = &facet.whole else { return [0.0; 3] };
+        let slopes = whole.excess_slopes(weights, &derivatives(facet.nodes().len(), weights));
+        let change = slopes.map(|slopes| dot(self.normal, facet.combine(&slopes, positions)));
+        self.gradient(facet, positions, weights, change)
+    }
+
+    /// The slope of what changes like this with the coordinates of a master facet.
+    fn gradient(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], change: [f64; 2]) -> Point {
         let [first, second] = facet.shape(positions).tangents_at(weights);
-        let second = if count == 2 { [0.0, 0.0, 1.0] } else { second };
+        let second = if facet.nodes().len() == 2 { [0.0, 0.0, 1.0] } else { second };
         let across = [cross(second, self.normal), cross(self.normal, first)];
         let area = dot(first, across[0]);
-        let change = derivatives(count, weights).map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
-        let [along, beside]: [f64; 2] = change;
+        let [along, beside] = change;
         add_scaled(across[0].map(|x| along / area * x), beside / area, across[1])
     }
 

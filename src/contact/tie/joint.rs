@@ -2,7 +2,7 @@
 //! and the rows that they make in axes that turn with the facets.
 
 use crate::contact::surface::{
-    Base, Bounds, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
+    Base, Bounds, ByNode, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
 };
 use std::ops::Range;
 
@@ -254,7 +254,8 @@ impl Joint {
         let mut nodes: Vec<usize> = self.columns.clone();
         nodes.sort_unstable();
         nodes.dedup();
-        nodes.retain(|node| surface.nodes().binary_search(node).is_ok());
+        let movers = surface.moved_by();
+        nodes.retain(|node| movers.binary_search(node).is_ok());
         nodes
     }
 }
@@ -262,7 +263,7 @@ impl Joint {
 impl Piece {
     /// Whether a term is that of a node of the master.
     fn is_of_master(&self, term: &Term) -> bool {
-        !self.facet.nodes().contains(&term.node)
+        self.facet.all_nodes().all(|node| node != term.node)
     }
 }
 
@@ -287,36 +288,42 @@ fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> 
     let mut all = Vec::new();
     for (index, facet) in slave.facets().iter().enumerate() {
         let Some(base) = Base::new(facet, positions) else { continue };
-        let (count, mut own, mut parts) = (facet.count, [[0.0; 4]; 4], Vec::new());
+        let (count, mut own, mut parts) = (facet.count, [ByNode::default(); 4], Vec::new());
         for &partner in lists.of(index) {
             let other = &master.facets()[partner];
             if !base.may_meet(other, positions, reach) {
                 continue;
             }
-            let mut onto = [[0.0; 4]; 4];
+            let mut onto = [ByNode::default(); 4];
             let mut touched = false;
             base.each_sample(other, positions, &mut |sample: &Sample| {
                 if sample.gap.abs() > reach {
                     return;
                 }
                 touched = true;
+                let (beneath, above) = (facet.shapes(&sample.slave), other.shapes(&sample.master));
                 for a in 0..count {
                     let weight = sample.area * sample.slave[a];
                     areas[slave.place(facet.nodes[a])] += weight;
-                    (0..count).for_each(|b| own[a][b] -= weight * sample.slave[b]);
-                    (0..other.count).for_each(|c| onto[a][c] += weight * sample.master[c]);
+                    own[a].iter_mut().zip(beneath).for_each(|(own, share)| *own -= weight * share);
+                    onto[a].iter_mut().zip(above).for_each(|(onto, share)| *onto += weight * share);
                 }
             });
             if touched {
-                let entries = |a: usize| (0..other.count).map(move |c| (a, c));
-                parts.extend((0..count).flat_map(entries).map(|(a, c)| (a, other.nodes[c], onto[a][c])));
+                push_parts(other, &onto[..count], &mut parts);
             }
         }
         if !parts.is_empty() {
-            let entries = |a: usize| (0..count).map(move |b| (a, b));
-            parts.extend((0..count).flat_map(entries).map(|(a, b)| (a, facet.nodes[b], own[a][b])));
+            push_parts(facet, &own[..count], &mut parts);
             all.push(Covered { facet: *facet, frame: base.frame(), parts });
         }
     }
     (all, areas)
+}
+
+/// Lists what the corners of a slave facet have of the nodes of a facet.
+fn push_parts(facet: &Facet, integrals: &[ByNode], parts: &mut Vec<(usize, usize, f64)>) {
+    for (corner, integrals) in integrals.iter().enumerate() {
+        parts.extend(facet.all_nodes().zip(integrals).map(|(node, &integral)| (corner, node, integral)));
+    }
 }

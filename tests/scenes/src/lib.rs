@@ -28,6 +28,7 @@ pub mod plot;
 pub mod pounding;
 pub mod random;
 pub mod schemes;
+pub mod second_order;
 pub mod slabs;
 pub mod solids;
 pub mod sparse;

@@ -58,7 +58,7 @@ fn shapes<const D: usize>(at: [f64; D]) -> Vec<(f64, [f64; D])> {
 }
 
 /// Determinant and inverse of a small matrix by Gauss–Jordan elimination.
-fn invert<const D: usize>(mut a: [[f64; D]; D]) -> (f64, [[f64; D]; D]) {
+pub(crate) fn invert<const D: usize>(mut a: [[f64; D]; D]) -> (f64, [[f64; D]; D]) {
     let mut inverse: [[f64; D]; D] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     let mut determinant = 1.0;
     for k in 0..D {

@@ -2,7 +2,7 @@
 
 use crate::solids::{Material, Solid};
 use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, Tie};
-use contact_dynamics::{Newmark, Result, Simulation, System};
+use contact_dynamics::{LinearSystem, Newmark, Result, Simulation, System};
 
 /// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
 pub struct Stack<const D: usize> {
@@ -118,39 +118,51 @@ impl<const D: usize> Stack<D> {
     /// the displacements from u = −ε x, relative to the largest of these.
     pub fn patch(&self, contact: impl ContactConstraint<f64> + 'static) -> Result<f64> {
         let Self { solid, .. } = self;
-        let material = solid.material;
-        let strain = 0.01;
-        let [first, second] = material.lame();
-        let pressure = strain * if D == 2 { 2.0 * (first + second) } else { 3.0 * first + 2.0 * second };
-        let exact: Vec<f64> = solid.nodes.iter().flatten().map(|x| -strain * x).collect();
-        // (A wave crosses a body in a tenth of this unit of time.)
-        let time = material.wave_speed() / 10.0;
-        // What the stress needs at all sides, less what contact gives.
-        let mut load = vec![0.0; solid.dofs()];
-        solid.system::<f64>().force(0.0, &exact, &vec![0.0; solid.dofs()], &mut load)?;
-        load.iter_mut().for_each(|load| *load = -*load);
+        let mut areas = Vec::new();
         for facet in self.facets.iter().flatten() {
             for (&node, force) in facet.iter().zip(self.facet_forces(facet)) {
-                for (axis, force) in force.into_iter().enumerate().take(D) {
-                    load[D * node + axis] += pressure * force;
-                }
+                areas.extend(force.into_iter().enumerate().take(D).map(|(axis, force)| (D * node + axis, force)));
             }
         }
-        let mut system = solid.system::<f64>().load(move |t, f| {
-            f.iter_mut().zip(&load).for_each(|(f, load)| *f = load * (time * t / 10.0).min(1.0));
-        });
-        for (node, place) in solid.nodes.iter().enumerate() {
-            for axis in (0..D).filter(|&axis| place[axis].abs() < 1e-9) {
-                system = system.fix(D * node + axis)?;
-            }
-        }
-        // A strongly damped scheme: the static solution after a while.
-        let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0)?, 0.1 / time).constraint(contact).build()?;
-        run.run_until(90.0 / time, &mut ())?;
-        let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();
-        Ok(run.state().displacement().iter().zip(&exact).map(deviation).fold(0.0, f64::max) / scale)
+        under_pressure(&solid.nodes, solid.material, || Ok(solid.system()), &areas, (0.5, 0.1), contact)
     }
+}
+
+/// The patch test on two bodies of any elements, by parts of ∫ N n dA of dofs over the sides that face each other, and
+/// Newmark's β (γ = 1) and the step in units of time of the waves.
+pub(crate) fn under_pressure<const D: usize>(
+    nodes: &[[f64; D]],
+    material: Material,
+    system: impl Fn() -> Result<LinearSystem<'static, f64>>,
+    areas: &[(usize, f64)],
+    (beta, step): (f64, f64),
+    contact: impl ContactConstraint<f64> + 'static,
+) -> Result<f64> {
+    let strain = 0.01;
+    let [first, second] = material.lame();
+    let pressure = strain * if D == 2 { 2.0 * (first + second) } else { 3.0 * first + 2.0 * second };
+    let exact: Vec<f64> = nodes.iter().flatten().map(|x| -strain * x).collect();
+    // (A wave crosses a body in a tenth of this unit of time.)
+    let time = material.wave_speed() / 10.0;
+    // What the stress needs at all sides, less what contact gives.
+    let mut load = vec![0.0; exact.len()];
+    system()?.force(0.0, &exact, &vec![0.0; exact.len()], &mut load)?;
+    load.iter_mut().for_each(|load| *load = -*load);
+    areas.iter().for_each(|(dof, area)| load[*dof] += pressure * area);
+    let mut system = system()?.load(move |t, f| {
+        f.iter_mut().zip(&load).for_each(|(f, load)| *f = load * (time * t / 10.0).min(1.0));
+    });
+    for (node, place) in nodes.iter().enumerate() {
+        for axis in (0..D).filter(|&axis| place[axis].abs() < 1e-9) {
+            system = system.fix(D * node + axis)?;
+        }
+    }
+    // A strongly damped scheme: the static solution after a while.
+    let mut run = Simulation::builder(system, Newmark::new(beta, 1.0)?, step / time).constraint(contact).build()?;
+    run.run_until(90.0 / time, &mut ())?;
+    let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();
+    Ok(run.state().displacement().iter().zip(&exact).map(deviation).fold(0.0, f64::max) / scale)
 }
 
 impl Stack<2> {

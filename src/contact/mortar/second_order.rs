@@ -1,0 +1,84 @@
+//! What facets of second order add to weighted gaps: their points lie off the linear parts that are cut against each
+//! other.
+//!
+//! With x = x_lin + c, c = Σ (N_b − w_b) x_b, N the shape functions of second order and w those of the part, the gap is
+//! that of the parts and n·(c_m − c_s). Its derivative is n·(δc_m − δc_s) + δn·(c_m − c_s), and n·c_m changes as its
+//! foot moves on along the part: as with the offsets of `integrals.rs`, its slope s makes μ − s of μ.
+
+use super::integrals::Entry;
+use crate::contact::surface::{Base, ByNode, Facet, Point, Sample, add_scaled, dot, sub};
+
+/// A pair of facets, one of which at least is a part of one of second order.
+pub(super) struct Pair<'a> {
+    slave: &'a Facet,
+    master: &'a Facet,
+    positions: &'a [Point],
+}
+
+/// What is off the linear parts at a point.
+pub(super) struct Excess {
+    slave: ByNode,
+    master: ByNode,
+    /// c_s, and c_m − c_s.
+    pub(super) off: Point,
+    pub(super) apart: Point,
+}
+
+/// Sums of what shape functions have beyond the linear ones, by corner of the slave facet and node of a facet.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shares([ByNode; 4]);
+
+impl<'a> Pair<'a> {
+    /// None of two linear facets.
+    pub(super) fn new(slave: &'a Facet, master: &'a Facet, positions: &'a [Point]) -> Option<Self> {
+        (slave.whole.is_some() || master.whole.is_some()).then_some(Self { slave, master, positions })
+    }
+
+    /// Where the shape functions of the parts are these.
+    pub(super) fn at(&self, slave: &[f64; 4], master: &[f64; 4]) -> Excess {
+        let excess = |facet: &Facet, weights| facet.whole.map_or([0.0; 9], |whole| whole.excess(weights));
+        let (slave, master) = (excess(self.slave, slave), excess(self.master, master));
+        let off = self.slave.combine(&slave, self.positions);
+        let apart = sub(self.master.combine(&master, self.positions), off);
+        Excess { slave, master, off, apart }
+    }
+
+    /// How far a gap along n is from that of the parts.
+    pub(super) fn gap(&self, base: &Base, slave: &[f64; 4], master: &[f64; 4]) -> f64 {
+        dot(base.normal, self.at(slave, master).apart)
+    }
+
+    /// μ − s.
+    pub(super) fn direction(&self, base: &Base, sample: &Sample) -> Point {
+        sub(sample.direction, base.slope_of_second_order(self.master, self.positions, &sample.master))
+    }
+}
+
+impl Excess {
+    /// Adds a point of this weight to the shares of both facets for a corner of the slave facet.
+    pub(super) fn add(&self, corner: usize, weight: f64, [own, onto]: [&mut Shares; 2]) {
+        let add = |shares: &mut Shares, weight: f64, excess: &ByNode| {
+            shares.0[corner].iter_mut().zip(excess).for_each(|(share, excess)| *share += weight * excess);
+        };
+        add(own, -weight, &self.slave);
+        add(onto, weight, &self.master);
+    }
+}
+
+impl Shares {
+    /// The entries of the rows of the slave facet's corners at the nodes of a facet of second order.
+    pub(super) fn entries<'s>(
+        &'s self,
+        rows: &'s [usize],
+        facet: &'s Facet,
+        normal: Point,
+    ) -> impl Iterator<Item = Entry> + 's {
+        let curved = usize::from(facet.whole.is_some()) * rows.len();
+        rows[..curved].iter().zip(&self.0).flat_map(move |(&row, shares)| {
+            facet
+                .all_nodes()
+                .zip(shares)
+                .map(move |(node, &share)| Entry::new(row, node, add_scaled([0.0; 3], share, normal), share))
+        })
+    }
+}
