@@ -54,7 +54,8 @@ pub struct Meeting {
 
 impl fmt::Display for Meeting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {}, {}-D", self.constraint, self.what, self.space)
+        let motion = ["", ", moving", ", turning"][self.motion()];
+        write!(f, "{}, {}{motion}, {}-D", self.constraint, self.what, self.space)
     }
 }
 
@@ -64,14 +65,23 @@ impl Meeting {
         self.constraint
     }
 
-    /// What it is given, and how that moves.
-    pub fn what(&self) -> String {
-        let motion = match self.kind {
-            Kind::Obstacle(_, Carried::Moves) => ", moving",
-            Kind::Obstacle(_, Carried::Turns) => ", turning",
-            _ => "",
-        };
-        format!("{}{motion}", self.what)
+    /// What it is given.
+    pub fn what(&self) -> &'static str {
+        self.what
+    }
+
+    /// Whether that rests (0), moves (1) or turns (2).
+    pub fn motion(&self) -> usize {
+        match self.kind {
+            Kind::Obstacle(_, Carried::Moves) => 1,
+            Kind::Obstacle(_, Carried::Turns) => 2,
+            _ => 0,
+        }
+    }
+
+    /// Whether edges may cross unseen, or corners pass edges: then bodies may be pushed apart at once, with energy.
+    pub fn misses_edges(&self) -> bool {
+        self.space == 3 && ["NodeToFacet", "Mortar"].contains(&self.constraint)
     }
 
     /// Dimensions.
@@ -100,7 +110,7 @@ impl Meeting {
 
     /// Whether nothing does work on the bodies.
     pub(super) fn conserves(&self) -> bool {
-        !matches!(self.kind, Kind::Obstacle(_, Carried::Moves | Carried::Turns))
+        self.motion() == 0
     }
 }
 

@@ -98,8 +98,8 @@ where
         let slowest = first.wave_speed().min(second.wave_speed());
         let fastest = first.wave_speed().max(second.wave_speed());
         let speed = slowest * decades(-2.5, -0.7, random);
-        // The first contact within some steps.
-        let gap = speed * courant * 0.1 / fastest * random.within(1.0, 12.0);
+        // The first contact within some steps; hollow obstacles have room for so much.
+        let gap = (speed * courant * 0.1 / fastest * random.within(1.0, 12.0)).min(0.05);
         let friction = if pick(&[true, false], random) { 0.0 } else { random.within(0.0, 1.0) };
         let spin = random.signed() * speed;
         let drift = std::array::from_fn(|_| pick(&[0.0, 1.0], random) * speed * random.signed());
@@ -238,7 +238,9 @@ where
                 let factors = [0.1 * (1.0 - cos), rate * sin, 10.0 * rate * rate * cos];
                 factors.map(|factor| along.map(|x| size * factor * x))
             })),
-            Carried::Turns => Box::new(contact.turning(move |t| Space::<D>::turning(point, axis, [rate * t, rate, 0.0]))),
+            Carried::Turns => {
+                Box::new(contact.turning(move |t| Space::<D>::turning(point, axis, [rate * t, rate, 0.0])))
+            }
         });
         Ok(scene)
     }
@@ -355,12 +357,7 @@ where
     }
 
     /// A block that falls on another one, anywhere, or that lies on it.
-    fn of_two(
-        between: Between,
-        drawn: &Drawn<D>,
-        random: &mut Congruential,
-        variant: &Variant,
-    ) -> Result<Self> {
+    fn of_two(between: Between, drawn: &Drawn<D>, random: &mut Congruential, variant: &Variant) -> Result<Self> {
         let mut size = |low: f64, high: f64| -> [f64; D] { std::array::from_fn(|_| random.within(low, high)) };
         let [large, small] = [size(0.4, 0.7), size(0.2, 0.4)];
         let [below, above] = drawn.materials;
@@ -443,7 +440,6 @@ where
         }
         Ok(found)
     }
-
 }
 
 impl<const D: usize> Scene<D> {
@@ -477,7 +473,8 @@ impl<const D: usize> Scene<D> {
 fn is_opposite<const D: usize>(block: &Body<D>, below: usize, node: usize) -> bool {
     let Solid { nodes, .. } = &block.solid;
     (0..D).all(|axis| {
-        let sum = if axis + 1 == D { nodes[below][axis] + nodes[node][axis] } else { nodes[below][axis] - nodes[node][axis] };
+        let sum =
+            if axis + 1 == D { nodes[below][axis] + nodes[node][axis] } else { nodes[below][axis] - nodes[node][axis] };
         sum.abs() < 1e-9
     })
 }

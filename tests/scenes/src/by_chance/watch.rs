@@ -6,6 +6,9 @@ use super::scene::Scene;
 use contact_dynamics::contact::Obstacle;
 use contact_dynamics::{Result, Simulation, State};
 
+/// Nodes are no deeper than this share of an element where contact is imposed on positions.
+const DEEPEST: f64 = 0.05;
+
 /// Gaps of rows with fixed normals are met within so much of the largest coordinate.
 const ROUNDING: f64 = 1e-11;
 
@@ -74,9 +77,12 @@ impl<'s, const D: usize> Watch<'s, D> {
             }
         }
         figures.touched |= raw.iter().any(|force| *force > 0.0);
-        let depth = self.deepest(u, contacts.gaps());
+        let depth = if self.on_positions { self.deepest(u, contacts.gaps()) } else { 0.0 };
         figures.depth = figures.depth.max(depth / self.element);
-        if meeting.has_fixed_normals() && self.on_positions {
+        if depth > DEEPEST * self.element {
+            find(format!("depth {depth:e}, elements are {:e}", self.element));
+        }
+        if meeting.has_fixed_normals() {
             let places = self.nodes.iter().flatten().zip(u);
             let size = places.fold(0.0_f64, |most, (x, u)| most.max(x.abs()).max(u.abs()));
             if depth > ROUNDING * size {
