@@ -50,7 +50,8 @@ impl Line {
                 _ => format!("{all} {name} ({in_vain})"),
             };
             let words: Vec<_> = errors.iter().map(word).collect();
-            write!(table, " {} |", words.join(", "))?;
+            let space = if words.is_empty() { "" } else { " " };
+            write!(table, "{space}{} |", words.join(", "))?;
         }
         writeln!(table, " {gained} | {highest:.0e} | {depth:.0e} | {found} |")
     }

@@ -26,7 +26,7 @@ fn check(scenes: impl Iterator<Item = (Meeting, u64)>, wrong: impl Fn(Meeting, u
 #[test]
 fn nothing_is_found() {
     check(scenes(1..4), |meeting, _, figures| {
-        // (Edges that cross unseen push bodies apart in one step: docs/contact.md has a table of these gains.)
+        // (What edges and corners do that pass each other unseen is in the table of docs/contact.md.)
         let gains = figures.corrected && !meeting.misses_edges() && figures.gain > 0.01;
         let gain = gains.then(|| format!("energy grows by {:e}", figures.gain));
         figures.findings.first().cloned().or(gain)

@@ -79,9 +79,10 @@ impl Meeting {
         }
     }
 
-    /// Whether edges may cross unseen, or corners pass edges: then bodies may be pushed apart at once, with energy.
+    /// Whether corners may pass corners, or edges cross, unseen: what is inside when it is seen is pushed out at once,
+    /// with energy.
     pub fn misses_edges(&self) -> bool {
-        self.space == 3 && ["NodeToFacet", "Mortar"].contains(&self.constraint)
+        self.constraint == "Mortar" || (self.space == 3 && self.constraint == "NodeToFacet")
     }
 
     /// Dimensions.

@@ -69,11 +69,16 @@ impl<'s, const D: usize> Watch<'s, D> {
         if let Some(pull) = raw.iter().find(|force| **force < 0.0 && !meeting.holds()) {
             find(format!("a row that pulls: {pull:e} of {:e}", self.force));
         }
-        for row in 0..forces.len() {
+        let places = self.nodes.iter().flatten().zip(u);
+        let size = places.fold(0.0_f64, |most, (x, u)| most.max(x.abs()).max(u.abs()));
+        // What rounding of the gaps, in which contact problems are accepted, makes of forces: m/h² of it.
+        let heaviest = self.mass.iter().fold(0.0_f64, |most, m| most.max(*m));
+        let noise = 16.0 * f64::EPSILON * size * heaviest / run.history().step_size().powi(2);
+        for (row, force) in forces.iter().enumerate() {
             let rubs = contacts.friction_forces(row).iter().fold(0.0_f64, |size, f| size.hypot(*f));
-            let bound = self.friction * forces[row].max(0.0) * (1.0 + 1e-9) + 1e-9 * self.force;
+            let bound = self.friction * force.max(0.0) * (1.0 + 1e-9) + 1e-9 * self.force + noise;
             if rubs > bound {
-                find(format!("friction {rubs:e} beyond its cone, {bound:e}"));
+                find(format!("friction {rubs:e} beyond its cone, {bound:e}, of which {noise:e} is rounding"));
             }
         }
         figures.touched |= raw.iter().any(|force| *force > 0.0);
@@ -82,12 +87,8 @@ impl<'s, const D: usize> Watch<'s, D> {
         if depth > DEEPEST * self.element {
             find(format!("depth {depth:e}, elements are {:e}", self.element));
         }
-        if meeting.has_fixed_normals() {
-            let places = self.nodes.iter().flatten().zip(u);
-            let size = places.fold(0.0_f64, |most, (x, u)| most.max(x.abs()).max(u.abs()));
-            if depth > ROUNDING * size {
-                find(format!("depth {depth:e} among coordinates of {size:e}"));
-            }
+        if meeting.has_fixed_normals() && depth > ROUNDING * size {
+            find(format!("depth {depth:e} among coordinates of {size:e}"));
         }
         if meeting.conserves() {
             figures.gain = figures.gain.max(total / self.energy - 1.0);
