@@ -76,8 +76,8 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
          that ended with an error by the motion of the obstacle (in parentheses those that halve steps), corrected \
          runs whose energy rises by more than 1 %, their largest rise over the energy at the start, deepest node over \
          the element size, findings\n\n\
-         | constraint | with | scenes | closed | halved | ended, at rest | moving | turning | gain | largest | deepest | \
-         found |\n\
+         | constraint | with | scenes | closed | halved | ended, at rest | moving | turning | gain | largest | \
+         deepest | found |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let seeds = if quick { 1..2 } else { 1..61 };
