@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example surfaces` prints the tables and writes them; `--quick` fewer and coarser meshes.
 
+mod by_chance;
 mod corners;
 mod folding;
 mod hertz;
@@ -26,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         rebound::table(quick)?,
         folding::table(quick)?,
         corners::table(quick)?,
+        by_chance::table(quick)?,
     ]
     .join("\n");
     println!("{tables}");

@@ -64,7 +64,8 @@ impl<T: Real> Cone<T> {
         let direction = if tangents == 1 {
             [-c[0].signum(), T::zero()]
         } else {
-            slip_direction(schur, c, guess, |f| friction * normal(f))
+            let change = |f: [T; 2]| -(w[0][1] * f[0] + w[0][2] * f[1]) / w[0][0];
+            slip_direction(schur, c, guess, [&|f| friction * normal(f), &|f| friction * change(f)])
         };
         // In this direction the block is on the rim of its cone, and its gap is zero, to rounding.
         let along = w[0][1] * direction[0] + w[0][2] * direction[1];
@@ -93,7 +94,15 @@ fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
 /// The direction of the friction of a block that slides in a plane: that of f(γ), −(S + γ)⁻¹ c, at the γ at which
 /// |f| = μ p. With |f| nearly proportional to 1/(S + γ) the quotient μ p/|f| is nearly linear in γ, so that Newton's
 /// method on it, begun anywhere, ends in a few steps; they are kept in the interval in which the solution is.
-fn slip_direction<T: Real>(schur: [[T; 2]; 2], c: [T; 2], guess: [T; 2], bound: impl Fn([T; 2]) -> T) -> [T; 2] {
+///
+/// μ p is given as a function of f, and how it changes with f. (As a difference that would be lost in the rounding of
+/// μ p(0) where W is large in the units of the run.)
+fn slip_direction<T: Real>(
+    schur: [[T; 2]; 2],
+    c: [T; 2],
+    guess: [T; 2],
+    [bound, change]: [&dyn Fn([T; 2]) -> T; 2],
+) -> [T; 2] {
     let (two, size) = (T::of(2.0), (schur[0][0] + schur[1][1]).abs());
     let (mut low, mut high) = (T::zero(), T::infinity());
     // The slip S g + c of the guess g is −γ g for the solution.
@@ -112,7 +121,7 @@ fn slip_direction<T: Real>(schur: [[T; 2]; 2], c: [T; 2], guess: [T; 2], bound: 
         // d f/d γ = −(S + γ)⁻¹ f.
         let slope = solve_two(schur, gamma, f);
         let length_slope = (f[0] * slope[0] + f[1] * slope[1]) / length;
-        let radius_slope = bound(slope) - bound([T::zero(); 2]);
+        let radius_slope = change(slope);
         let step = (length - radius) * length / (radius_slope * length - radius * length_slope);
         let next = gamma + step;
         // (NaN is in no interval.)

@@ -2,6 +2,8 @@
 
 mod bipenalty;
 mod bonds;
+#[cfg(feature = "search")]
+mod by_chance;
 mod constraints;
 mod curved;
 mod edges;

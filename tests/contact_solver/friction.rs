@@ -85,6 +85,24 @@ fn blocks_alone_meet_coulombs_law() {
     }
 }
 
+/// W in other units, by powers of two: multipliers are the same bits.
+#[test]
+fn blocks_alone_are_the_same_in_any_unit() {
+    let mut random = Congruential(12);
+    let [compliance, length] = [40, 20].map(|exponent| 2.0_f64.powi(exponent));
+    for trial in 0..1000 {
+        let w = semidefinite(&mut random, 3, 3, 0.05);
+        let q = random.vector(3, 1.0);
+        let sets = [cone(3, 0.6)];
+        let found = solve(&mut GaussSeidel::default(), (&w, &q, &sets)).unwrap();
+        let (w, q): (Vec<_>, Vec<_>) =
+            (w.iter().map(|w| w * compliance).collect(), q.iter().map(|q| q * length).collect());
+        let scaled = solve(&mut GaussSeidel::default(), (&w, &q, &sets)).unwrap();
+        let same = found.iter().zip(scaled).all(|(r, other)| r.to_bits() == (other * compliance / length).to_bits());
+        assert!(same, "trial {trial}");
+    }
+}
+
 /// All solutions of a problem in a plane: every combination of open, stick, and slip to either side.
 fn all_solutions(w: &[f64], q: &[f64], frictions: &[f64]) -> Vec<Vec<f64>> {
     let (contacts, size) = (frictions.len(), q.len());

@@ -47,9 +47,14 @@ pub type Named<const D: usize> = (&'static str, Box<dyn Obstacle<f64, D>>);
 
 /// One of each shape in space, about as large as one, about the origin, with sizes that are drawn.
 pub fn in_space(random: &mut Congruential) -> Vec<Named<3>> {
-    let mut point = |size: f64| std::array::from_fn::<f64, 3, _>(|_| size * random.signed());
+    in_space_of_size(1.0, random)
+}
+
+/// The same about as large as `size`.
+pub fn in_space_of_size(size: f64, random: &mut Congruential) -> Vec<Named<3>> {
+    let mut point = |share: f64| std::array::from_fn::<f64, 3, _>(|_| size * share * random.signed());
     let [center, other, axis] = [point(0.1), point(0.6), point(1.0)];
-    let mut length = |low: f64, high: f64| random.within(low, high);
+    let mut length = |low: f64, high: f64| size * random.within(low, high);
     let radius = length(0.4, 0.8);
     let half = [length(0.3, 0.8), length(0.3, 0.8), length(0.3, 0.8)];
     let rounding = length(0.05, 0.2);
@@ -59,9 +64,10 @@ pub fn in_space(random: &mut Congruential) -> Vec<Named<3>> {
         ("cuboid", Box::new(Cuboid::new(center, half, rounding).unwrap())),
         ("cone", Box::new(Cone::new(center, axis.map(|x| 2.0 * x), radius, 0.1 * rounding).unwrap())),
     ];
-    for side in [Side::Outside, Side::Inside] {
-        shapes.push(("sphere", Box::new(Sphere::new(center, radius, side).unwrap())));
-        shapes.push(("cylinder", Box::new(Cylinder::new(center, axis, radius, side).unwrap())));
+    let sides = [(Side::Outside, "sphere", "cylinder"), (Side::Inside, "hollow sphere", "hollow cylinder")];
+    for (side, sphere, cylinder) in sides {
+        shapes.push((sphere, Box::new(Sphere::new(center, radius, side).unwrap())));
+        shapes.push((cylinder, Box::new(Cylinder::new(center, axis, radius, side).unwrap())));
     }
     let (vertices, triangles) = box_mesh(center, half);
     shapes.push(("mesh of a box", Box::new(ClosedSurface::new(&vertices, &triangles, rounding).unwrap())));
@@ -72,17 +78,23 @@ pub fn in_space(random: &mut Congruential) -> Vec<Named<3>> {
 
 /// The same in the plane.
 pub fn in_plane(random: &mut Congruential) -> Vec<Named<2>> {
-    let mut point = |size: f64| std::array::from_fn::<f64, 2, _>(|_| size * random.signed());
+    in_plane_of_size(1.0, random)
+}
+
+/// The same about as large as `size`.
+pub fn in_plane_of_size(size: f64, random: &mut Congruential) -> Vec<Named<2>> {
+    let mut point = |share: f64| std::array::from_fn::<f64, 2, _>(|_| size * share * random.signed());
     let [center, other, normal] = [point(0.1), point(0.6), point(1.0)];
-    let (radius, rounding) = (random.within(0.4, 0.8), random.within(0.05, 0.2));
-    let half = [random.within(0.3, 0.8), random.within(0.3, 0.8)];
+    let mut length = |low: f64, high: f64| size * random.within(low, high);
+    let (radius, rounding) = (length(0.4, 0.8), length(0.05, 0.2));
+    let half = [length(0.3, 0.8), length(0.3, 0.8)];
     let mut shapes: Vec<Named<2>> = vec![
         ("line", Box::new(Plane::new(center, normal).unwrap())),
         ("capsule", Box::new(Capsule::new([center, other], 0.6 * radius).unwrap())),
         ("rectangle", Box::new(Cuboid::new(center, half, rounding).unwrap())),
     ];
-    for side in [Side::Outside, Side::Inside] {
-        shapes.push(("disc", Box::new(Sphere::new(center, radius, side).unwrap())));
+    for (side, name) in [(Side::Outside, "disc"), (Side::Inside, "hollow disc")] {
+        shapes.push((name, Box::new(Sphere::new(center, radius, side).unwrap())));
     }
     // A star of five rays: with notches.
     let corner = |k: usize| {

@@ -204,7 +204,7 @@ impl Solid<2> {
 
 impl<const D: usize> Solid<D> {
     /// The unit cube cut into `cells`, its nodes placed by `place`.
-    fn grid(cells: [usize; D], material: Material, place: impl Fn([f64; D]) -> [f64; D]) -> Self {
+    pub(crate) fn grid(cells: [usize; D], material: Material, place: impl Fn([f64; D]) -> [f64; D]) -> Self {
         let points = cells.map(|n| n + 1);
         let split = |mut index: usize, sizes: [usize; D]| -> [usize; D] {
             std::array::from_fn(|axis| {
