@@ -2,6 +2,8 @@
 
 #[cfg(feature = "search")]
 mod affine_rows;
+#[cfg(feature = "search")]
+mod body_contact;
 mod bond;
 mod constraint;
 mod contacts;
@@ -27,6 +29,8 @@ mod tangents;
 #[cfg(feature = "search")]
 mod tie;
 
+#[cfg(feature = "search")]
+pub use body_contact::BodyContact;
 pub use bond::{BondStrength, BrokenBond};
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub use contacts::{Contact, Contacts};

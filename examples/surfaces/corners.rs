@@ -9,11 +9,11 @@ use std::fmt::Write;
 /// A rise of the energy that is not the scheme's own.
 const GAIN: f64 = 0.01;
 
-const CONTACTS: [(&str, (Keeps, bool)); 4] = [
-    ("two passes", (Keeps::TwoPasses, false)),
-    ("two passes, edges", (Keeps::TwoPasses, true)),
-    ("mortar", (Keeps::Mortar, false)),
-    ("mortar, edges", (Keeps::Mortar, true)),
+const CONTACTS: [(&str, Keeps); 4] = [
+    ("two passes", Keeps::TwoPasses),
+    ("two passes, edges", Keeps::TwoPassesAndEdges),
+    ("mortar", Keeps::Mortar),
+    ("bodies", Keeps::Bodies),
 ];
 
 /// How often energy is gained, how much, how deep nodes and edges get, and how many steps are refused.

@@ -16,7 +16,7 @@ use pairs::{LEAST_SINE, Pair};
 use rows::Rows;
 
 /// The angle by which a surface turns around an edge, if not given: 30°.
-const SHARP: f64 = std::f64::consts::FRAC_PI_6;
+pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 
 /// Contact of the edges of two deforming surfaces in three dimensions, where they cross: beside
 /// [`NodeToFacet`](super::NodeToFacet) or [`Mortar`](super::Mortar) of the same surfaces, which do not see it.

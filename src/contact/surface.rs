@@ -14,6 +14,7 @@ mod search;
 mod second_difference;
 mod second_order;
 mod shape;
+mod sharp;
 
 pub use facet::Facet;
 pub(crate) use kin::Kin;
@@ -324,14 +325,20 @@ impl Surface {
         shape.project(p, rim).map(|foot| (shape, foot))
     }
 
-    /// Sum of the normals on both sides of a side, at its share `s`.
-    fn side_normal(&self, facet: usize, k: usize, s: f64, positions: &[Point]) -> Option<Point> {
+    /// Sum of the normals on both sides of a side, at its share `s`; of that beyond it only if it `counts`.
+    fn side_normal(
+        &self,
+        facet: usize,
+        (k, s): (usize, f64),
+        counts: &impl Fn(Point) -> bool,
+        positions: &[Point],
+    ) -> Option<Point> {
         let shape = self.facets[facet].shape(positions);
         let own = shape.normal(&shape.on_side(k, s))?;
         let Some((neighbor, l)) = self.neighbors[facet][k] else { return Some(own) };
         let shape = self.facets[neighbor].shape(positions);
         let across = shape.normal(&shape.on_side(l, 1.0 - s))?;
-        unit(add_scaled(own, 1.0, across)).or(Some(own))
+        if counts(across) { unit(add_scaled(own, 1.0, across)).or(Some(own)) } else { Some(own) }
     }
 
     /// The facets around a node, with the vertex that it is of each.
@@ -348,11 +355,16 @@ impl Surface {
 
     /// Mean of the normals of the facets around a node, weighted by their angles there; none if the node has no facet.
     pub(crate) fn node_normal(&self, node: usize, positions: &[Point]) -> Option<Point> {
+        self.node_normal_of(node, &|_| true, positions)
+    }
+
+    /// The same of those that `count`.
+    fn node_normal_of(&self, node: usize, counts: &impl Fn(Point) -> bool, positions: &[Point]) -> Option<Point> {
         let sum = self.corners_around(node).fold([0.0; 3], |sum, (facet, k)| {
             let shape = self.facets[facet].shape(positions);
             let mut weights = [0.0; 4];
             weights[k] = 1.0;
-            match shape.normal(&weights) {
+            match shape.normal(&weights).filter(|normal| counts(*normal)) {
                 Some(normal) => add_scaled(sum, shape.angle(k), normal),
                 None => sum,
             }
@@ -386,13 +398,14 @@ impl Surface {
     /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
     /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
     /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
-    /// facet, where that direction is lost in rounding, the mean normal itself.
+    /// facet, where that direction is lost in rounding, the mean normal itself, of those that the node `meets`: a corner
+    /// upon a corner of a body below is above it, not beside it.
     pub(crate) fn direction(
         &self,
         facet: usize,
         p: Point,
         (shape, foot): &(Shape, Foot),
-        share: f64,
+        (share, meets): (f64, &impl Fn(Point) -> bool),
         positions: &[Point],
     ) -> Option<(Point, f64)> {
         let arm = sub(p, foot.point);
@@ -402,13 +415,18 @@ impl Surface {
             location => location,
         };
         let nodes = self.facets[facet].nodes();
+        let counts = |normal: Point| !touching || meets(normal);
         let mean = match location {
             Location::Inside | Location::Beyond => shape.normal(&foot.weights),
-            Location::Vertex(k) => self.node_normal(nodes[k], positions),
+            Location::Vertex(k) => {
+                let of_some = self.node_normal_of(nodes[k], &counts, positions);
+                of_some.or_else(|| self.node_normal(nodes[k], positions))
+            }
             Location::Side(k) => {
                 let next = foot.weights[(k + 1) % nodes.len()];
                 let total = foot.weights[k] + next;
-                self.side_normal(facet, k, if total > 0.0 { next / total } else { 0.5 }, positions)
+                let share = if total > 0.0 { next / total } else { 0.5 };
+                self.side_normal(facet, (k, share), &counts, positions)
             }
         }?;
         if touching || foot.location == Location::Inside {

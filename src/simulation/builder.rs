@@ -155,6 +155,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Adds a list of contact constraints, as [`BodyContact`](crate::contact::BodyContact) makes it.
+    #[must_use]
+    pub fn constraints(mut self, constraints: impl IntoIterator<Item = Box<dyn ContactConstraint<T> + 'a>>) -> Self {
+        self.constraints.extend(constraints);
+        self
+    }
+
     /// Chooses the solver of the contact problems; [`ActiveSet`] by default.
     #[must_use]
     pub fn contact_solver(mut self, solver: impl ContactSolver<T> + 'a) -> Self {

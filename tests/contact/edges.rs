@@ -514,13 +514,13 @@ fn blocks_that_fall_edge_on_face_gain_no_energy() {
     for fall in 0..5 {
         let scene = Fall::new(Landing::Edge, &mut random);
         let courant = 0.5 + random();
-        let figures = scene.run((Keeps::TwoPasses, true), Box::new(Composite), courant, 2.5).unwrap();
+        let figures = scene.run(Keeps::TwoPassesAndEdges, Box::new(Composite), courant, 2.5).unwrap();
         assert!(figures.highest < 1.01 && figures.momentum < 1e-10, "{fall}: {figures:?}");
     }
 }
 
 /// The falls of a landing by their numbers, until some time.
-fn check_falls(landing: Landing, edges: bool, seed: u64, falls: &[usize], until: f64) {
+fn check_falls(landing: Landing, keeps: Keeps, seed: u64, falls: &[usize], until: f64) {
     let mut random = xorshift(seed);
     for fall in 0..=falls.iter().copied().max().unwrap() {
         let scene = Fall::new(landing, &mut random);
@@ -528,7 +528,7 @@ fn check_falls(landing: Landing, edges: bool, seed: u64, falls: &[usize], until:
         if !falls.contains(&fall) {
             continue;
         }
-        let figures = scene.run((Keeps::TwoPasses, edges), Box::new(Composite), courant, until).unwrap();
+        let figures = scene.run(keeps, Box::new(Composite), courant, until).unwrap();
         assert!(figures.highest < 1.01 && figures.momentum < 1e-10, "{landing:?} {fall}: {figures:?}");
         assert!(figures.node_depth < 0.02 * scene.element, "{landing:?} {fall}: {figures:?}");
     }
@@ -537,14 +537,14 @@ fn check_falls(landing: Landing, edges: bool, seed: u64, falls: &[usize], until:
 #[test]
 fn corners_in_the_dents_that_they_make_gain_no_energy() {
     // With one row a node they were in one side of the dent or the other, and came out at once: 1.03, 0.05 elements.
-    check_falls(Landing::Corner, false, 77, &[10, 19], 4.5);
+    check_falls(Landing::Corner, Keeps::TwoPasses, 77, &[10, 19], 4.5);
 }
 
 #[test]
 fn edges_that_end_on_edges_gain_no_energy() {
     // Rows of edges and of nodes that are nearly the same saw pasts that contradict each other: 1.02 and 1.29.
-    check_falls(Landing::Across, true, 77, &[7], 3.8);
-    check_falls(Landing::Beside, true, 3, &[7], 4.7);
+    check_falls(Landing::Across, Keeps::TwoPassesAndEdges, 77, &[7], 3.8);
+    check_falls(Landing::Beside, Keeps::TwoPassesAndEdges, 3, &[7], 4.7);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Contact constraints and laws: gaps and their derivatives, what passes and what does not, what laws do in a run.
 
 mod bipenalty;
+mod bodies;
 mod bonds;
 #[cfg(feature = "search")]
 mod by_chance;

@@ -155,7 +155,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
     /// The normal and the signed distance from the surface itself.
     fn direction(&self, p: Point, nearest: &Nearest) -> Option<(Point, f64)> {
         let rounding = f64::EPSILON.sqrt();
-        self.surface.direction(nearest.facet, p, &nearest.projected, rounding, &self.positions)
+        self.surface.direction(nearest.facet, p, &nearest.projected, (rounding, &|_| true), &self.positions)
     }
 }
 

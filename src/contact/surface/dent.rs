@@ -1,7 +1,7 @@
 //! Nodes in a dent of a surface: what stands on one facet there may press on those beside it as well.
 
 use super::projection::{Ground, Stand};
-use super::shape::{Location, Point, Shape, add_scaled, cross, dot, norm, sub};
+use super::shape::{Location, Point, Shape, cross, dot, norm, sub};
 
 /// How near to the sides of a dent a node is that may come to press on them within a step, in shares of the facet,
 /// beside its way.
@@ -56,8 +56,8 @@ impl Ground<'_> {
         let Some(normal) = shape.normal(&stand.weights) else { return false };
         let height = |normal: Point, x: Point| dot(normal, sub(x, vertex));
         norm(cross(normal, beside.normal)) >= LEAST_SINE
-            && height(normal, middle(other)) >= 0.0
-            && height(beside.normal, middle(shape)) >= 0.0
+            && height(normal, other.middle()) >= 0.0
+            && height(beside.normal, shape.middle()) >= 0.0
             && height(beside.normal, shape.point(&stand.weights)) >= -self.rounding * other.size()
     }
 
@@ -116,10 +116,4 @@ impl Ground<'_> {
         let normal = shape.normal(&foot.weights).filter(|_| foot.location != Location::Beyond)?;
         Some(Stand::inside(place, facet, &foot, normal, dot(normal, sub(p, foot.point))))
     }
-}
-
-/// The mean of the corners.
-fn middle(shape: &Shape) -> Point {
-    let corners = shape.corners();
-    corners.iter().fold([0.0; 3], |sum, &corner| add_scaled(sum, 1.0 / corners.len() as f64, corner))
 }

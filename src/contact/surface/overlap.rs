@@ -92,8 +92,7 @@ impl Base {
         for side in 0..self.count {
             let Some((other, _)) = surface.neighbor(index, side) else { continue };
             let other = surface.facets()[other].shape(positions);
-            let weights = middle(other.corners().len());
-            let point = other.point(&weights);
+            let (weights, point) = (middle(other.corners().len()), other.middle());
             let sharp = |normal: &Point| dot(*normal, self.normal) < SHARP;
             let convex = dot(self.normal, sub(point, self.shape.corner(side))) < 0.0;
             self.beside[side] = other.normal(&weights).filter(sharp).filter(|_| convex).map(|normal| [point, normal]);

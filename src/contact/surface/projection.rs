@@ -86,7 +86,7 @@ impl Ground<'_> {
     fn is_beyond(&self, place: usize, facet: usize, projected: &(Shape, Foot)) -> bool {
         self.kin.is_some_and(|kin| {
             let p = self.positions[self.nodes[place]];
-            let direction = || self.surface.direction(facet, p, projected, self.rounding, self.positions);
+            let direction = || self.direction(place, facet, p, projected);
             projected.1.distance > kin.depth(place) && direction().is_some_and(|(_, gap)| gap < 0.0)
         })
     }
@@ -143,13 +143,19 @@ impl Ground<'_> {
         self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
     }
 
+    /// The normal along which a node at p stands on a facet, and its distance along it.
+    fn direction(&self, place: usize, facet: usize, p: Point, projected: &(Shape, Foot)) -> Option<(Point, f64)> {
+        let meets = |normal: Point| self.meets(normal, self.own_normal(place));
+        self.surface.direction(facet, p, projected, (self.rounding, &meets), self.positions)
+    }
+
     fn on(&self, place: usize, facet: usize, projected: &(Shape, Foot)) -> Option<Stand> {
         let Foot { weights, location, .. } = projected.1;
         if location == Location::Beyond {
             return None;
         }
         let p = self.positions[self.nodes[place]];
-        let (normal, gap) = self.surface.direction(facet, p, projected, self.rounding, self.positions)?;
+        let (normal, gap) = self.direction(place, facet, p, projected)?;
         Some(Stand { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] })
     }
 }

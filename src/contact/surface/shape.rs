@@ -131,6 +131,12 @@ impl Shape {
         [lower, upper]
     }
 
+    /// The mean of the corners.
+    pub(crate) fn middle(&self) -> Point {
+        let (first, share) = (self.corners[0], 1.0 / self.count as f64);
+        self.corners().iter().fold(first, |sum, &corner| add_scaled(sum, share, sub(corner, first)))
+    }
+
     /// The point with the given shape functions.
     pub(crate) fn point(&self, weights: &[f64; 4]) -> Point {
         // Differences from the first corner: far from the origin the sum of weighted corners would lose digits.

@@ -30,7 +30,9 @@ pub enum Landing {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeps {
     TwoPasses,
+    TwoPassesAndEdges,
     Mortar,
+    Bodies,
 }
 
 /// Two blocks of hex8 elements.
@@ -109,31 +111,32 @@ impl Fall {
         self.stack.mortar(true)?.reach(0.2)
     }
 
+    /// Weighted gaps, nodes at corners and edges, and edges, the upper block being the slave.
+    pub fn bodies(&self) -> Result<Vec<Box<dyn ContactConstraint<f64>>>> {
+        self.stack.bodies(true)?.reach(0.2).constraints()
+    }
+
     /// Edges on edges.
     pub fn edges(&self) -> Result<EdgeToEdge<f64>> {
         self.stack.edges()?.reach(0.2)
     }
 
     /// Lets the block fall until t = `until`, by steps of a Courant number.
-    pub fn run(
-        &self,
-        (keeps, edges): (Keeps, bool),
-        scheme: Box<dyn TimeIntegrator>,
-        courant: f64,
-        until: f64,
-    ) -> Result<FallFigures> {
+    pub fn run(&self, keeps: Keeps, scheme: Box<dyn TimeIntegrator>, courant: f64, until: f64) -> Result<FallFigures> {
         let Self { stack, speed, crossing, .. } = self;
         let (solid, h) = (&stack.solid, courant * crossing);
-        let contact: Box<dyn ContactConstraint<f64>> = match keeps {
-            Keeps::TwoPasses => Box::new(self.two_passes()?),
-            Keeps::Mortar => Box::new(self.mortar()?),
+        let constraints: Vec<Box<dyn ContactConstraint<f64>>> = match keeps {
+            Keeps::TwoPasses => vec![Box::new(self.two_passes()?)],
+            Keeps::TwoPassesAndEdges => vec![Box::new(self.two_passes()?), Box::new(self.edges()?)],
+            Keeps::Mortar => vec![Box::new(self.mortar()?)],
+            Keeps::Bodies => self.bodies()?,
         };
-        let builder = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, h)
+        let mut run = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, h)
             .velocity(stack.velocity_of_upper([0.0, 0.0, -speed]))
             .corrector(PersistencyCorrection::with_history_projection())
             .step_control(StepControl::halving(h / 256.0)?)
-            .constraint(contact);
-        let mut run = if edges { builder.constraint(self.edges()?).build()? } else { builder.build()? };
+            .constraints(constraints)
+            .build()?;
         // (Gaps of a rigid law are measured from where edges were found inside.)
         let spring = ContactLaw::Penalty { stiffness: 1.0 };
         let (mut nodes, mut crossed) = (self.two_passes()?, self.edges()?.with_law(spring));

@@ -1,6 +1,7 @@
 //! Elements of second order: simplices, and quadrilaterals and hexahedra with or without nodes in the middle.
 
 use crate::solids::{Material, Solid, invert};
+use crate::stacks::under_pressure;
 use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, Surface, Tie};
 use contact_dynamics::faer::Mat;
 use contact_dynamics::faer::linalg::solvers::DenseSolveCore;
@@ -373,7 +374,8 @@ impl<const D: usize> SecondOrderStack<D> {
         let system = || LinearSystem::lumped(mass.clone(), stiffness.clone());
         let areas: Vec<_> = self.areas().into_iter().enumerate().collect();
         // (Motions far above 1/h are damped as well: nodes of second order are light.)
-        crate::stacks::under_pressure(&self.solid.nodes, self.solid.material, system, &areas, (0.5625, 0.3), contact)
+        let constraints: Vec<Box<dyn ContactConstraint<f64>>> = vec![Box::new(contact)];
+        under_pressure(&self.solid.nodes, self.solid.material, system, &areas, (0.5625, 0.3), constraints)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Two bodies upon each other whose meshes need not match, and the patch test on them.
 
 use crate::solids::{Material, Solid};
-use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, Tie};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, Tie};
 use contact_dynamics::{LinearSystem, Newmark, Result, Simulation, System};
 
 /// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
@@ -62,6 +62,13 @@ impl<const D: usize> Stack<D> {
         Mortar::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
     }
 
+    /// What keeps the bodies apart by faces, corners and edges, the upper one being the slave, or the lower one.
+    pub fn bodies(&self, upper: bool) -> Result<BodyContact<f64, D>> {
+        let [lower, above] = self.surfaces();
+        let (slave, master) = if upper { (above, lower) } else { (lower, above) };
+        BodyContact::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
+    }
+
     /// The bodies tied to each other, the upper one being the slave, or the lower one.
     pub fn tie(&self, upper: bool) -> Result<Tie<f64>> {
         let [lower, above] = self.surfaces();
@@ -117,6 +124,11 @@ impl<const D: usize> Stack<D> {
     /// Both bodies under the same pressure from all sides, held on the planes through the origin: largest deviation of
     /// the displacements from u = −ε x, relative to the largest of these.
     pub fn patch(&self, contact: impl ContactConstraint<f64> + 'static) -> Result<f64> {
+        self.patch_with(vec![Box::new(contact)])
+    }
+
+    /// The same with any constraints.
+    pub fn patch_with(&self, constraints: Vec<Box<dyn ContactConstraint<f64>>>) -> Result<f64> {
         let Self { solid, .. } = self;
         let mut areas = Vec::new();
         for facet in self.facets.iter().flatten() {
@@ -124,7 +136,7 @@ impl<const D: usize> Stack<D> {
                 areas.extend(force.into_iter().enumerate().take(D).map(|(axis, force)| (D * node + axis, force)));
             }
         }
-        under_pressure(&solid.nodes, solid.material, || Ok(solid.system()), &areas, (0.5, 0.1), contact)
+        under_pressure(&solid.nodes, solid.material, || Ok(solid.system()), &areas, (0.5, 0.1), constraints)
     }
 }
 
@@ -136,7 +148,7 @@ pub(crate) fn under_pressure<const D: usize>(
     system: impl Fn() -> Result<LinearSystem<'static, f64>>,
     areas: &[(usize, f64)],
     (beta, step): (f64, f64),
-    contact: impl ContactConstraint<f64> + 'static,
+    constraints: Vec<Box<dyn ContactConstraint<f64>>>,
 ) -> Result<f64> {
     let strain = 0.01;
     let [first, second] = material.lame();
@@ -158,7 +170,8 @@ pub(crate) fn under_pressure<const D: usize>(
         }
     }
     // A strongly damped scheme: the static solution after a while.
-    let mut run = Simulation::builder(system, Newmark::new(beta, 1.0)?, step / time).constraint(contact).build()?;
+    let mut run =
+        Simulation::builder(system, Newmark::new(beta, 1.0)?, step / time).constraints(constraints).build()?;
     run.run_until(90.0 / time, &mut ())?;
     let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();

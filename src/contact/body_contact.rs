@@ -1,0 +1,193 @@
+//! Contact of two bodies with faces, corners and edges: the constraints that keep all of them apart.
+
+use super::edge_to_edge::{self, EdgeToEdge};
+use super::surface::{Facet, Nodes};
+use super::{ContactConstraint, ContactLaw, Mortar, NodeToFacet};
+use crate::error::{Error, Result};
+use crate::real::Real;
+
+/// Contact of two deforming bodies whose surfaces may have corners and edges: what
+/// [`SimulationBuilder::constraints`](crate::SimulationBuilder::constraints) takes.
+///
+/// Weighted gaps spread contact over faces, but see none where facets stand at more than 60° to each other: a
+/// [`Mortar`] alone lets corners and edges in, and throws them out later with energy that was not there. So this is a
+/// list of constraints, of which a body has those that its shape asks for:
+///
+/// 1. [`Mortar`] of the whole surfaces;
+/// 2. [`NodeToFacet`] of the slave's nodes at sharp edges (in two dimensions: at sharp corners) with the master's
+///    facets, and of the master's nodes with the slave's facets;
+/// 3. [`EdgeToEdge`], in three dimensions.
+///
+/// Smooth bodies have the first one only, and pay for nothing else. Where a face with its edges lies on a face there
+/// are more rows than independent gaps: the multipliers are then those of least norm, and their sums are what matters.
+///
+/// Give the whole surfaces of both bodies, as [`Surface::of_cells`](super::Surface::of_cells) finds them: where a
+/// surface ends it is not known what is behind, and nothing is sharp.
+///
+/// # Known failure
+///
+/// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
+/// - Nodes within faces are kept out in the mean over their facets only, as by [`Mortar`]: by a tenth of an element in
+///   blocks that fall on edges (`docs/contact.md` has a table).
+/// - A body against itself: [`NodeToFacet::of_itself`].
+///
+/// ```
+/// use contact_dynamics::contact::BodyContact;
+/// use contact_dynamics::faer::sparse::SparseColMat;
+/// use contact_dynamics::{Composite, LinearSystem, Simulation};
+///
+/// // A square of nodes on its corner, 0.1 above a square with sides along the axes; walked with the bodies on the left.
+/// let coordinates = [
+///     [-1.0, -2.0], [1.0, -2.0], [1.0, 0.0], [-1.0, 0.0],
+///     [0.0, 0.1], [1.0, 1.1], [0.0, 2.1], [-1.0, 1.1],
+/// ];
+/// let dofs: Vec<[usize; 2]> = (0..8).map(|node| [2 * node, 2 * node + 1]).collect();
+/// let sides = |first: usize| (0..4).map(move |k| [first + k, first + (k + 1) % 4]);
+/// let contact = BodyContact::new(&coordinates, &dofs, sides(4), sides(0))?;
+/// assert_eq!(contact.sharp_nodes(), [vec![4, 5, 6, 7], vec![0, 1, 2, 3]]);
+///
+/// // Nodes without springs, of which the lower ones are held and the corner falls.
+/// let free = SparseColMat::<usize, f64>::try_new_from_triplets(16, 16, &[])?;
+/// let mut system = LinearSystem::lumped(vec![1.0; 16], free)?;
+/// for dof in 0..8 {
+///     system = system.fix(dof)?;
+/// }
+/// let mut velocity = vec![0.0; 16];
+/// velocity[9] = -1.0;
+/// let mut run = Simulation::builder(system, Composite, 0.01)
+///     .velocity(velocity)
+///     .constraints(contact.constraints()?)
+///     .build()?;
+/// run.run_until(0.2, &mut ())?;
+/// assert!((run.state().displacement()[9] + 0.1_f64).abs() < 1e-12);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct BodyContact<T: Real, const D: usize> {
+    coordinates: Vec<[T; D]>,
+    dofs: Vec<[usize; D]>,
+    /// Facets of the slave and of the master.
+    facets: [Vec<Facet>; 2],
+    sharp: [Vec<usize>; 2],
+    angle: f64,
+    law: ContactLaw,
+    friction: f64,
+    reach: Option<T>,
+}
+
+impl<T: Real, const D: usize> BodyContact<T, D> {
+    /// Contact of the whole surfaces of two bodies, by their facets; which of them is the slave of the weighted gaps is
+    /// chosen as for [`Mortar`].
+    ///
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
+    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
+    /// [`with_law`](Self::with_law) gives another.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Mortar::new`].
+    pub fn new<F: Into<Facet>, G: Into<Facet>>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        slave: impl IntoIterator<Item = F>,
+        master: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        let mut contact = Self {
+            coordinates: coordinates.to_vec(),
+            dofs: dofs.to_vec(),
+            facets: [slave.into_iter().map(Into::into).collect(), master.into_iter().map(Into::into).collect()],
+            sharp: [Vec::new(), Vec::new()],
+            angle: edge_to_edge::SHARP,
+            law: ContactLaw::Rigid,
+            friction: 0.0,
+            reach: None,
+        };
+        contact.find_sharp_nodes()?;
+        Ok(contact)
+    }
+
+    /// The law of all rows.
+    #[must_use]
+    pub fn with_law(mut self, law: ContactLaw) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// Coulomb's friction with a coefficient μ, from 0, in all rows.
+    #[must_use]
+    pub fn friction(mut self, coefficient: f64) -> Self {
+        self.friction = coefficient;
+        self
+    }
+
+    /// How far (length) outside of each other, and inside, facets and edges meet at least; by default the mean size of
+    /// the facets, of the coarser surface. What the velocities bring near within a step is found as well.
+    #[must_use]
+    pub fn reach(mut self, reach: T) -> Self {
+        self.reach = Some(reach);
+        self
+    }
+
+    /// What is sharp: sides, in two dimensions nodes, around which a surface turns by more than `angle` (radians,
+    /// between the normals of its facets in the reference coordinates) to a convex one; 30° if not given.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless from 0 to π.
+    pub fn sharp(mut self, angle: f64) -> Result<Self> {
+        if !(0.0..=std::f64::consts::PI).contains(&angle) {
+            let name = "the angle of a contact edge";
+            return Err(Error::Parameter { name, value: angle, range: "from 0 to π" });
+        }
+        self.angle = angle;
+        self.find_sharp_nodes()?;
+        Ok(self)
+    }
+
+    /// The nodes at sharp edges and corners of the slave, and of the master, ascending.
+    pub fn sharp_nodes(&self) -> &[Vec<usize>; 2] {
+        &self.sharp
+    }
+
+    fn find_sharp_nodes(&mut self) -> Result<()> {
+        let [slave, master] = self.facets.each_ref().map(|facets| facets.iter().copied());
+        let (nodes, surfaces) = Nodes::with_surfaces(&self.coordinates, &self.dofs, slave, master)?;
+        self.sharp = surfaces.map(|surface| surface.sharp_nodes(self.angle, &nodes.coordinates));
+        Ok(())
+    }
+
+    /// The constraints, in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's on
+    /// the slave's, edges on edges. What a body has nothing for is left out.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless the reach is positive and finite.
+    pub fn constraints(self) -> Result<Vec<Box<dyn ContactConstraint<T>>>> {
+        let Self { coordinates, dofs, facets, sharp, angle, law, friction, reach } = self;
+        let of = |body: usize| facets[body].iter().copied();
+        let mut faces = Mortar::new(&coordinates, &dofs, of(0), of(1))?.with_law(law).friction(friction);
+        if let Some(reach) = reach {
+            faces = faces.reach(reach)?;
+        }
+        let mut constraints: Vec<Box<dyn ContactConstraint<T>>> = vec![Box::new(faces)];
+        for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
+            let corners = NodeToFacet::one_pass(&coordinates, &dofs, nodes, of(1 - body))?.facing(of(body))?;
+            let mut corners = corners.with_law(law).friction(friction);
+            if let Some(reach) = reach {
+                corners = corners.reach(reach)?;
+            }
+            constraints.push(Box::new(corners));
+        }
+        if D == 3 && sharp.iter().all(|nodes| !nodes.is_empty()) {
+            let places: Vec<[T; 3]> = coordinates.iter().map(|x| std::array::from_fn(|i| x[i])).collect();
+            let dofs: Vec<[usize; 3]> = dofs.iter().map(|dofs| std::array::from_fn(|i| dofs[i])).collect();
+            let mut edges = EdgeToEdge::new(&places, &dofs, of(0), of(1))?.sharp(angle)?;
+            if let Some(reach) = reach {
+                edges = edges.reach(reach)?;
+            }
+            constraints.push(Box::new(edges.with_law(law).friction(friction)));
+        }
+        Ok(constraints)
+    }
+}

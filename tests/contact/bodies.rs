@@ -1,0 +1,147 @@
+//! Bodies with faces, corners and edges: what keeps them apart, and how many constraints that takes.
+
+use contact_dynamics::contact::{BodyContact, Facet};
+use contact_dynamics::{Composite, Error, PersistencyCorrection, Simulation, StepControl};
+use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::random::xorshift;
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::stacks::Stack;
+
+const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+
+/// A round body of segments or quadrilaterals, and a box below it.
+fn over_a_box<const D: usize>(ball: Solid<D>, below: Solid<D>) -> BodyContact<f64, D> {
+    Stack::of_whole_surfaces([below, ball]).bodies(true).unwrap()
+}
+
+#[test]
+fn a_body_has_the_constraints_that_its_shape_asks_for() {
+    let disc = || Solid::ring([0.2, 1.0], [2, 40], MATERIAL);
+    let square = || Solid::rectangle([1.0; 2], [2; 2], MATERIAL).moved([0.0, -3.0]);
+    // Of the square the four corners are sharp, of a disc with 40 sides nothing is.
+    let contact = over_a_box(disc(), square());
+    assert_eq!(contact.sharp_nodes().each_ref().map(Vec::len), [0, 4]);
+    assert_eq!(contact.constraints().unwrap().len(), 2);
+    assert_eq!(over_a_box(disc(), disc().moved([0.0, -3.0])).constraints().unwrap().len(), 1);
+    assert_eq!(over_a_box(square(), square().moved([0.0, -3.0])).constraints().unwrap().len(), 3);
+    // Of a cube all nodes on its twelve edges are.
+    let cube = || Solid::block([1.0; 3], [3; 3], MATERIAL);
+    let contact = over_a_box(cube(), cube().moved([0.0, 0.0, -3.0]));
+    assert_eq!(contact.sharp_nodes().each_ref().map(Vec::len), [8 + 12 * 2; 2]);
+    assert_eq!(contact.constraints().unwrap().len(), 4);
+    // With a larger angle only what is sharper is: sides of a cube turn by a right angle.
+    let right = std::f64::consts::FRAC_PI_2;
+    let blunt = over_a_box(cube(), cube().moved([0.0, 0.0, -3.0])).sharp(1.01 * right).unwrap();
+    assert_eq!((blunt.sharp_nodes().clone(), blunt.constraints().unwrap().len()), ([vec![], vec![]], 1));
+}
+
+#[test]
+fn a_reentrant_corner_is_not_sharp() {
+    // An L, walked with the body on the left: five convex corners, and one that is none.
+    let coordinates =
+        [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 3.0], [1.0, 3.0], [0.0, 4.0]];
+    let dofs: Vec<[usize; 2]> = (0..9).map(|node| [2 * node, 2 * node + 1]).collect();
+    let l = (0..6).map(|k| Facet::from([k, (k + 1) % 6]));
+    let triangle = [[6, 7], [7, 8], [8, 6]].map(Facet::from);
+    let contact = BodyContact::new(&coordinates, &dofs, l, triangle).unwrap();
+    assert_eq!(contact.sharp_nodes(), &[vec![0, 1, 2, 4, 5], vec![6, 7, 8]]);
+}
+
+#[test]
+fn absurd_angles_and_reaches_are_refused() {
+    let contact = || {
+        over_a_box(
+            Solid::rectangle([1.0; 2], [1; 2], MATERIAL).moved([0.0, 1.5]),
+            Solid::rectangle([1.0; 2], [1; 2], MATERIAL),
+        )
+    };
+    for angle in [-0.1, 3.2, f64::NAN] {
+        assert!(matches!(contact().sharp(angle), Err(Error::Parameter { .. })), "{angle}");
+    }
+    for reach in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(contact().reach(reach).constraints(), Err(Error::Parameter { .. })), "{reach}");
+    }
+}
+
+/// Faces, corners and edges of the whole bodies.
+fn whole<const D: usize>(stack: &Stack<D>) -> BodyContact<f64, D> {
+    let is_lower = |facet: &Vec<usize>| facet.iter().all(|&node| node < stack.split);
+    let (below, above): (Vec<_>, Vec<_>) = stack.solid.boundary().into_iter().partition(is_lower);
+    let of = |facets: Vec<Vec<usize>>| facets.into_iter().map(|facet| Stack::<D>::facet(&facet));
+    BodyContact::new(&stack.solid.nodes, &stack.solid.node_dofs(), of(above), of(below)).unwrap()
+}
+
+#[test]
+fn pressure_passes_through_faces_with_corners_and_edges() {
+    // (Rows of corners and edges say again what weighted gaps say.)
+    let flat = Stack::new([3, 2].map(|n| Solid::rectangle([1.0; 2], [n; 2], MATERIAL)), 0.0, |x| x);
+    let contact = whole(&flat).constraints().unwrap();
+    assert_eq!(contact.len(), 3);
+    let patch = flat.patch_with(contact).unwrap();
+    assert!(patch < 1e-12, "{patch}");
+    let solid = Stack::new([3, 2].map(|n| Solid::block([1.0; 3], [n; 3], MATERIAL)), 0.0, |x| x);
+    let contact = whole(&solid).constraints().unwrap();
+    assert_eq!(contact.len(), 4);
+    let patch = solid.patch_with(contact).unwrap();
+    assert!(patch < 1e-12, "{patch}");
+}
+
+/// A square that falls on a corner, turned by some angle, beside the corner of a larger one or in its middle.
+fn fall_in_the_plane(angle: f64, beside: f64, bodies: bool) -> [f64; 2] {
+    let lower = Solid::rectangle([1.5, 1.0], [5, 4], MATERIAL).moved([-0.75, -1.0]);
+    let square = Solid::rectangle([1.0; 2], [4; 2], MATERIAL).moved([-0.5; 2]);
+    let upper = square.rotated(angle).lifted(0.02).moved([beside, 0.0]);
+    let stack = Stack::of_whole_surfaces([lower, upper]);
+    let h = 0.7 * 0.25 / MATERIAL.wave_speed();
+    let builder = Simulation::builder(Hyperelastic::new(&stack.solid, Law::NeoHookean), Composite, h)
+        .velocity(stack.velocity_of_upper([0.0, -0.15]))
+        .corrector(PersistencyCorrection::with_history_projection())
+        .step_control(StepControl::halving(h / 256.0).unwrap());
+    let builder = match bodies {
+        true => builder.constraints(stack.bodies(true).unwrap().constraints().unwrap()),
+        false => builder.constraint(stack.mortar(true).unwrap()),
+    };
+    let mut run = builder.build().unwrap();
+    let start = run.energy().total();
+    let (mut highest, mut pressed) = (1.0_f64, 0.0_f64);
+    while run.time() < 6.0 {
+        if run.step().is_err() {
+            return [f64::INFINITY, pressed];
+        }
+        highest = highest.max(run.energy().total() / start);
+        pressed = run.state().contacts().forces().iter().fold(pressed, |most, force| most.max(*force));
+    }
+    [highest, pressed]
+}
+
+#[test]
+fn corners_in_the_plane_gain_no_energy() {
+    let mut alone = 0.0_f64;
+    for (angle, beside) in [(0.785, 0.0), (0.6, 0.2), (0.9, -0.7), (0.785, 0.75), (0.3, 0.4)] {
+        let [highest, pressed] = fall_in_the_plane(angle, beside, true);
+        assert!(highest < 1.0 + 1e-6 && pressed > 0.0, "{angle} {beside}: {highest}, {pressed}");
+        alone = alone.max(fall_in_the_plane(angle, beside, false)[0]);
+    }
+    // Weighted gaps alone let corners in.
+    assert!(alone > 1.01, "{alone}");
+}
+
+#[test]
+fn blocks_gain_no_energy_and_stay_out_of_each_other() {
+    for (landing, fall, until) in [(Landing::Corner, 1, 4.0), (Landing::Edge, 0, 3.0), (Landing::Beside, 5, 4.5)] {
+        let mut random = xorshift(77);
+        for number in 0..=fall {
+            let scene = Fall::new(landing, &mut random);
+            let courant = 0.5 + random();
+            if number < fall {
+                continue;
+            }
+            let figures = scene.run(Keeps::Bodies, Box::new(Composite), courant, until).unwrap();
+            assert!(figures.touched && figures.momentum < 1e-10, "{landing:?}: {figures:?}");
+            assert!(figures.highest < 1.0 + 1e-6, "{landing:?}: {figures:?}");
+            assert!(figures.edge_depth < 0.03 * scene.element, "{landing:?}: {figures:?}");
+            assert!(figures.node_depth < 0.15 * scene.element, "{landing:?}: {figures:?}");
+        }
+    }
+}
