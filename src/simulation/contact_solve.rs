@@ -56,7 +56,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         vectors: &mut StageVectors<T>,
         contact: &mut ContactWork<T>,
     ) -> Result<bool> {
-        let mut miss = Miss::ALL;
+        let mut before = [Miss::ALL; 2];
         for pass in 0..FOLLOWED {
             match pass {
                 0 => self.observe(operator, new, past, vectors, contact)?,
@@ -76,11 +76,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 return Ok(true);
             }
             operator.follow(contact.rows.curved.version(self.constraints));
-            let before = std::mem::replace(&mut miss, self.miss(new, past, contact)?);
+            let miss = self.miss(new, past, contact)?;
             contact.rows.curved.miss = miss.largest();
             if miss.is_settled::<T>(pass + 1, before) {
                 return Ok(true);
             }
+            before = [miss, before[0]];
         }
         Ok(false)
     }

@@ -29,6 +29,9 @@ pub(super) const NOISE: f64 = 8.0;
 /// Share of the forces that may alternate, which is the angle between the sides: both normals are right there.
 const EDGE: f64 = 0.1;
 
+/// Share of the miss of the pass before the last that tells what alternates from what converges, however slowly.
+const AGAIN: f64 = 0.999;
+
 /// The relative miss of gaps that tells such a node, which stays at the edge, from rows that find no rest on a curve:
 /// these miss gaps as they miss forces.
 const AT_EDGE: f64 = 1e-6;
@@ -50,14 +53,14 @@ impl Miss {
         self.gap.max(self.force)
     }
 
-    /// Whether rows fit, or nearly fit and miss no less than in the pass `before`, after so many `passes`.
-    pub(super) fn is_settled<T: Real>(self, passes: usize, before: Self) -> bool {
+    /// Whether rows fit, or nearly fit and miss no less than in the passes before, that `before` this one and the
+    /// `earlier` one, after so many `passes`.
+    pub(super) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2]) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
-        let (now, before) = (self.largest(), before.largest());
-        let near = within(NEAR, NEAR) && (now > 0.25 * before || passes == FOLLOWED);
-        // (What still converges, however slowly, misses less from pass to pass.)
-        let alternates = passes > LONG && within(AT_EDGE, EDGE) && now >= before;
+        let now = self.largest();
+        let near = within(NEAR, NEAR) && (now > 0.25 * before.largest() || passes == FOLLOWED);
+        let alternates = passes > LONG && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
         now <= fit || near || alternates
     }
 }
