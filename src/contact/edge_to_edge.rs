@@ -19,7 +19,8 @@ use rows::Rows;
 pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 
 /// Contact of the edges of two deforming surfaces in three dimensions, where they cross: beside
-/// [`NodeToFacet`](super::NodeToFacet) or [`Mortar`](super::Mortar) of the same surfaces, which do not see it.
+/// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not see it, or in a
+/// [`BodyContact`](super::BodyContact).
 ///
 /// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)). The
 /// lines through an edge e of the first surface and an edge f of the second are closest in x_e and x_f. The pair is in
@@ -50,6 +51,9 @@ pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// 2 l x²/(x + 0.1): gaps and rows are continuous where edges come to meet or slide off each other. Geometry is computed
 /// in `f64` in every run.
 ///
+/// Edges that touch, by 2 % of the shorter one, are in contact even if the normal is up to 30° beside those of the
+/// facets: in the dent that an edge makes it may be none of theirs.
+///
 /// Edges that a search finds in each other deeper than a thousandth of the shorter one, because a body has come in
 /// elsewhere, come out by so much in a step: their gaps are measured from there (but for springs). To throw them out at
 /// once would create energy.
@@ -60,8 +64,6 @@ pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 ///
 /// # Known failure
 ///
-/// - Where a block comes down by a corner beside an edge of another one, edges still get into each other in some falls,
-///   by up to a fifth of an element (`docs/contact.md` has a table).
 /// - An open rim is no edge: what is behind it is not known. Give the whole surface of a body.
 /// - Edges that are concave, or that turn by less than the angle, are seen by nodes and facets only.
 /// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is another contact:

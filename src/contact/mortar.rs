@@ -70,7 +70,8 @@ const BEYOND: f64 = 0.25;
 ///
 /// # Known failure
 ///
-/// - Facets that see each other at more than 60° do not meet: the edges of bodies are not kept apart.
+/// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and are thrown out
+///   later. [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On quadrilaterals that are no parallelograms shape functions are integrated by quadrature: the pressure of the
 ///   patch test is then not exact to rounding (`docs/contact.md`). So it is on facets of second order
