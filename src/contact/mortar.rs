@@ -219,8 +219,8 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). That nothing lies upon the other surface is an error of
-    /// the first search ([`Error::Empty`]).
+    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). That nothing lies upon the other
+    /// surface is an error of the first search ([`Error::Empty`]).
     pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
         self.bonds = Some(Bonds::new(self.nodes.clone(), [self.slave.clone(), self.master.clone()], strength));
         self.with_fitting_bonds()
@@ -301,9 +301,9 @@ impl<T: Real> Mortar<T> {
     /// ψ_a = Σ_b A_ab N_b, A = D M⁻¹, D = diag ∫ N_a dA, M_ab = ∫ N_a N_b dA, so that ∫ ψ_a N_b dA = δ_ab ∫ N_a dA
     ///
     /// (Wohlmuth, SIAM J. Numer. Anal. 38, 2000; Popp, Gee and Wall, Int. J. Numer. Methods Eng. 79, 2009). Of a flat
-    /// slave surface that touches the master and is covered, a row then has the row's own node only, so that G M⁻¹ Gᵀ has
-    /// fewer entries, and slip is that of this node. Where surfaces are apart or curved the row has a little of the
-    /// others, from the turning of normals. A is that of segments, triangles and parallelograms, which is one for all
+    /// slave surface that touches the master and is covered, a row then has its own node only, so that G M⁻¹ Gᵀ has fewer
+    /// entries, and slip is that of this node. Where surfaces are apart or curved the row has a little of the others,
+    /// from the turning of normals. A is that of segments, triangles and parallelograms, which is one for all
     /// shapes: on other quadrilaterals, and on facets of second order, whose parts have ψ, rows have a little of the
     /// others as well.
     ///
@@ -365,8 +365,8 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// ∫ N dA, with the weights of the row (area; length in two dimensions), over what is covered of the facets around the node of a row: its force
-    /// over this is the pressure.
+    /// ∫ N dA (area; length in two dimensions) over what is covered of the facets around the node of a row, N being its
+    /// weights, [dual](Self::dual) or not: its force over this is the pressure.
     pub fn area(&self, row: usize) -> T {
         T::of(self.rows.spots[row].area)
     }

@@ -226,15 +226,12 @@ fn rows_are_the_derivatives_of_gaps() {
             let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
             let error = verify::gap_jacobian(&mut triangles(&stack).dual().unwrap(), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-8, "{shift}: {error:?}");
-            for size in [0.02, 0.01, 0.005, 0.002] {
-                let (u, v) = (shaken(stack.solid.dofs(), size, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
-                let error = verify::gap_jacobian(&mut dual(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-                let other = verify::gap_jacobian(&mut standard(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-                eprintln!(
-                    "QQ {seed} {shift} {size} {:e} {:e} {} {}",
-                    error.jacobian, other.jacobian, error.rows, error.rows_lost
-                );
-            }
+            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature. Dual functions add up
+            // what it leaves of shape functions, 9 times at most.)
+            let error = verify::gap_jacobian(&mut dual(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            let other = verify::gap_jacobian(&mut standard(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
+            assert!(error.rows == other.rows && error.rows_lost == 0, "{shift}: {error:?}");
+            assert!(error.jacobian < 10.0 * other.jacobian && other.jacobian < 1e-3, "{shift}: {error:?} {other:?}");
         }
     }
 }
@@ -310,9 +307,8 @@ fn forces_of_an_impact_are_near_those_of_shape_functions() {
     let largest = expected.iter().copied().fold(0.0, f64::max);
     let miss = found.iter().zip(&expected).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
     let [one, other] = [&found, &expected].map(|forces| forces.iter().sum::<f64>());
-    eprintln!("{largest} {miss} {one} {other}");
-    assert!(miss < 0.1 * largest, "{miss} {largest}");
-    assert!((one / other - 1.0).abs() < 0.01, "{one} {other}");
+    assert!(miss < 1e-3 * largest, "{miss} {largest}");
+    assert!((one / other - 1.0).abs() < 1e-3, "{one} {other}");
 }
 
 #[test]

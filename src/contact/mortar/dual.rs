@@ -66,7 +66,7 @@ impl Blend {
             [change.moment, change.area].map(|change| slope / whole * change)
         });
         for (a, row) in matrix.iter_mut().enumerate() {
-            row.iter_mut().for_each(|share| *share *= c);
+            *row = row.map(|share| c * share);
             row[a] += 1.0;
         }
         Self { count, matrix, by_area, covered }
