@@ -308,12 +308,14 @@ impl<T: Real> Mortar<T> {
     /// others as well.
     ///
     /// ψ is negative far from its node. On a facet that is covered in part the weights are (1 − c) N + c ψ, with c a
-    /// smooth function of the covered share of its area: 0 up to three quarters, 1 for all of it. So ∫ of the weight is
-    /// positive for segments, triangles and parallelograms whatever the part, 0.4 ∫ N at least. What c changes by is in
-    /// the rows. Weights add up to one everywhere: a constant pressure is exact as with N, and momenta are conserved.
+    /// smooth function of the covered share of its area: 0 up to three quarters, 1 for all of it. So on segments,
+    /// triangles and parallelograms the integral of a weight is positive whatever the part, a third of that of N at
+    /// least. What c changes by is in the rows. Weights add up to one everywhere: a constant pressure is exact as with N,
+    /// and momenta are conserved.
     ///
-    /// Known failure: distances far from the node count with a negative weight, so that over rough or strongly curved
-    /// masters a gap may be above or below all the distances that it is the mean of.
+    /// Known failure: distances far from the node count with a negative weight, so that over rough or curved masters a
+    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart, and a start
+    /// nearly in contact may be refused ([`Error::InitialViolation`]).
     ///
     /// ```
     /// use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};

@@ -144,11 +144,11 @@ mod tests {
     fn functions_are_dual_and_a_partition_of_unity() {
         for count in 2..=4 {
             let (points, matrix) = (points(count), dual(count));
-            let psi = |a: usize, n: &[f64; 4]| (0..4).map(|b| matrix[a][b] * n[b]).sum::<f64>();
-            for a in 0..count {
-                assert!(((0..count).map(|b| matrix[b][a]).sum::<f64>() - 1.0).abs() < 1e-15);
+            for (a, row) in matrix.iter().enumerate().take(count) {
+                let psi = |n: &[f64; 4]| row.iter().zip(n).map(|(share, n)| share * n).sum::<f64>();
+                assert!((matrix.iter().map(|row| row[a]).sum::<f64>() - 1.0).abs() < 1e-15);
                 for b in 0..count {
-                    let product = points.iter().map(|n| psi(a, n) * n[b]).sum::<f64>() / points.len() as f64;
+                    let product = points.iter().map(|n| psi(n) * n[b]).sum::<f64>() / points.len() as f64;
                     let expected = if a == b { 1.0 / count as f64 } else { 0.0 };
                     assert!((product - expected).abs() < 2e-4, "{count}, {a}, {b}: {product}");
                 }
@@ -161,16 +161,15 @@ mod tests {
         for count in 2..=4 {
             let (points, matrix) = (points(count), dual(count));
             for percent in 1..=100 {
-                let covered = f64::from(percent) / 100.0;
-                let [c, _] = blend(covered);
-                // What is left of the weight beyond 0.4 N: where it is greatest is not covered, at the worst.
+                let [c, _] = blend(percent as f64 / 100.0);
+                // What is left of the weight beyond N/3: where it is greatest is not covered, at the worst.
                 let excess = |n: &[f64; 4]| {
                     let psi = (0..4).map(|b| matrix[0][b] * n[b]).sum::<f64>();
-                    (1.0 - c) * n[0] + c * psi - 0.4 * n[0]
+                    (1.0 - c) * n[0] + c * psi - n[0] / 3.0
                 };
                 let mut values: Vec<f64> = points.iter().map(excess).collect();
                 values.sort_unstable_by(f64::total_cmp);
-                let least: f64 = values.iter().take(values.len() * percent as usize / 100).sum();
+                let least: f64 = values.iter().take(values.len() * percent / 100).sum();
                 assert!(least > 0.0, "{count}, {percent} %: {least}");
             }
         }
