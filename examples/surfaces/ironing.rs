@@ -26,11 +26,13 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     let meshes = if quick { &[(20, 6)][..] } else { &[(20, 6), (30, 14), (60, 14), (60, 40)] };
     for &(block, stamp) in meshes {
         let scene = scene(block, stamp);
-        let contacts: [(&str, Box<dyn ContactConstraint<f64>>); 4] = [
+        let contacts: [(&str, Box<dyn ContactConstraint<f64>>); 6] = [
             ("nodes of the stamp, one pass", Box::new(scene.nodes_on_facets(1)?)),
             ("nodes, two passes", Box::new(scene.nodes_on_facets(2)?)),
             ("mortar, stamp the slave", Box::new(scene.mortar(true)?)),
             ("mortar, block the slave", Box::new(scene.mortar(false)?)),
+            ("dual mortar, stamp the slave", Box::new(scene.mortar(true)?.dual()?)),
+            ("dual mortar, block the slave", Box::new(scene.mortar(false)?.dual()?)),
         ];
         for (name, contact) in contacts {
             let passed = WAY * block as f64 / LENGTH;

@@ -12,8 +12,9 @@ const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     let mut table = String::from(
         "Patch test: largest error of the displacements over the largest displacement\n\n\
-         | interface | elements below, above | one pass | two passes | mortar, slave above | slave below |\n\
-         | --- | --- | --- | --- | --- | --- |\n",
+         | interface | elements below, above | one pass | two passes | mortar, slave above | slave below | dual, slave \
+         above | slave below |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let meshes = if quick { &[(3, 2)][..] } else { &[(3, 3), (2, 4), (3, 4), (4, 2), (7, 2)] };
     for &(below, above) in meshes {
@@ -102,8 +103,9 @@ fn row<const D: usize>(
 ) -> Result<(), Box<dyn Error>> {
     let nodes = [1, 2].map(|passes| stack.patch(stack.nodes_on_facets(passes)?));
     let mortar = [true, false].map(|upper| stack.patch(stack.mortar(upper)?));
+    let dual = [true, false].map(|upper| stack.patch(stack.mortar(upper)?.dual()?));
     write!(table, "| {interface} | {cells} |")?;
-    for error in nodes.into_iter().chain(mortar) {
+    for error in nodes.into_iter().chain(mortar).chain(dual) {
         write!(table, " {} |", small(error?))?;
     }
     writeln!(table)?;

@@ -14,6 +14,7 @@
 //! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
+use super::dual::{self, Blend, Multiplier};
 use super::second_order::{Pair, Shares};
 use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm};
 
@@ -46,14 +47,14 @@ impl Outside {
     }
 }
 
-/// What is integrated for a slave node.
+/// What is integrated for a slave node; N are the weights, be they shape functions or others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     /// ∫N dA over what is covered, and over all facets of the node.
     pub(super) area: f64,
     whole: f64,
     /// ∫N g dA.
-    moment: f64,
+    pub(super) moment: f64,
     /// ∫N o dA with the offsets of both surfaces.
     offset: f64,
     /// ∫N x dA, and −∫N μ dA.
@@ -65,9 +66,39 @@ impl Sums {
     /// Adds the whole of a slave facet to the sums of its nodes; returns their places.
     fn begin(sums: &mut [Self], slave: &Surface, facet: &Facet, base: &Base) -> [usize; 4] {
         let (places, count) = (facet.nodes.map(|node| slave.place(node)), base.count());
-        let whole = norm(base.product) * [1.0, 0.5, 4.0][count - 2] / count as f64;
+        let whole = dual::area(base) / count as f64;
         places[..count].iter().for_each(|&place| sums[place].whole += whole);
         places
+    }
+
+    /// Takes out what the corners of a facet have had, if the facet's own sums are to be told apart.
+    fn take(sums: &mut [Self], places: &[usize], multiplier: Multiplier) -> Option<[Self; 4]> {
+        (multiplier == Multiplier::Dual).then(|| {
+            let mut before = [Self::default(); 4];
+            before.iter_mut().zip(places).for_each(|(before, &place)| *before = std::mem::take(&mut sums[place]));
+            before
+        })
+    }
+
+    /// Makes a facet's own sums those of dual functions, and puts back what its corners had before.
+    fn put_back(sums: &mut [Self], places: &[usize; 4], base: &Base, before: &[Self; 4]) -> Blend {
+        let mut own = [Self::default(); 4];
+        own.iter_mut().zip(&places[..base.count()]).for_each(|(own, &place)| *own = sums[place]);
+        let blend = Blend::of(base, &mut own);
+        for ((&place, own), before) in places[..base.count()].iter().zip(&own).zip(before) {
+            sums[place] = *before;
+            sums[place].add_scaled(1.0, own);
+        }
+        blend
+    }
+
+    /// Adds all that is summed over what is covered.
+    pub(super) fn add_scaled(&mut self, factor: f64, other: &Self) {
+        self.area += factor * other.area;
+        self.moment += factor * other.moment;
+        self.offset += factor * other.offset;
+        self.position = add_scaled(self.position, factor, other.position);
+        self.normal = add_scaled(self.normal, factor, other.normal);
     }
 
     /// Adds a point.
@@ -115,8 +146,8 @@ pub(super) struct Entry {
     pub(super) row: usize,
     pub(super) node: usize,
     /// The derivatives of ∫N g dA and of ∫N dA by the position of the node.
-    moment: Point,
-    area: Point,
+    pub(super) moment: Point,
+    pub(super) area: Point,
     /// ∫N_row N_node dA: positive for slave nodes, negative for master nodes.
     pub(super) share: f64,
 }
@@ -132,10 +163,10 @@ impl Entry {
         add_scaled(self.moment, -sums.gap(), self.area).map(|x| x / sums.area)
     }
 
-    fn add(&mut self, other: &Self) {
-        self.moment = add_scaled(self.moment, 1.0, other.moment);
-        self.area = add_scaled(self.area, 1.0, other.area);
-        self.share += other.share;
+    pub(super) fn add_scaled(&mut self, factor: f64, other: &Self) {
+        self.moment = add_scaled(self.moment, factor, other.moment);
+        self.area = add_scaled(self.area, factor, other.area);
+        self.share += factor * other.share;
     }
 }
 
@@ -210,6 +241,7 @@ impl Integrals {
         [slave, master]: [&Surface; 2],
         positions: &[Point],
         offsets: Offsets<'_>,
+        multiplier: Multiplier,
         partners: impl Fn(usize) -> &'p [usize],
     ) {
         let sums = &mut self.sums;
@@ -222,6 +254,7 @@ impl Integrals {
                 continue;
             }
             let base = base.see_beside(slave, index, positions);
+            let before = Sums::take(sums, &places[..base.count()], multiplier);
             for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
                 let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
                 base.each_sample(other, positions, &mut |sample: &Sample| {
@@ -235,16 +268,19 @@ impl Integrals {
                     }
                 });
             }
+            if let Some(before) = before {
+                Sums::put_back(sums, &places, &base, &before);
+            }
         }
     }
 
     /// Integrates over all facets of the slave surface what the master facets listed for each cover.
     pub(super) fn integrate<'p>(
         &mut self,
-        slave: &Surface,
-        master: &Surface,
+        [slave, master]: [&Surface; 2],
         positions: &[Point],
         offsets: Offsets<'_>,
+        multiplier: Multiplier,
         partners: impl Fn(usize) -> &'p [usize],
     ) {
         self.sums.clear();
@@ -257,8 +293,9 @@ impl Integrals {
                 continue;
             }
             let base = base.see_beside(slave, index, positions);
+            let before = Sums::take(&mut self.sums, &places[..base.count()], multiplier);
             let (mut block, mut shares) = (Block::default(), Shares::default());
-            let mut touched = false;
+            let (mut touched, first) = (false, self.entries.len());
             for &partner in partners(index) {
                 let other = (&master.facets()[partner], master.open_sides(partner));
                 let own = (&mut block, &mut shares);
@@ -268,6 +305,11 @@ impl Integrals {
                 block.turn(&base);
                 self.push_all(&places[..base.count()], facet, &block);
                 self.entries.extend(shares.entries(&places[..base.count()], facet, base.normal));
+            }
+            if let Some(before) = before {
+                let blend = Sums::put_back(&mut self.sums, &places, &base, &before);
+                blend.weigh(&mut self.entries[first..]);
+                self.entries.extend(blend.of_whole(&base, &places, facet));
             }
         }
         self.merge();
@@ -351,10 +393,10 @@ impl Integrals {
         touched
     }
 
-    /// Makes entries of what rows have of the nodes of a facet.
+    /// Makes entries of what rows have of the nodes of a facet, all rows of a node after each other.
     fn push_all(&mut self, places: &[usize], facet: &Facet, block: &Block) {
-        for (a, &row) in places.iter().enumerate() {
-            for (b, &node) in facet.nodes().iter().enumerate() {
+        for (b, &node) in facet.nodes().iter().enumerate() {
+            for (a, &row) in places.iter().enumerate() {
                 let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
                 self.entries.push(Entry { row, node, moment, area, share });
             }
@@ -391,7 +433,7 @@ impl Integrals {
             of_row.sort_unstable();
             for &(node, number) in &*of_row {
                 match merged[first..].last_mut() {
-                    Some(last) if last.node == node => last.add(&entries[number]),
+                    Some(last) if last.node == node => last.add_scaled(1.0, &entries[number]),
                     _ => merged.push(entries[number]),
                 }
             }

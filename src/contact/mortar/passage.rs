@@ -72,7 +72,7 @@ impl<T: Real> Mortar<T> {
             pairs.take_near(surfaces, positions, reach, depth);
             let factor = self.ramp.at(step.t[0] + share * (step.t[1] - step.t[0]));
             let offsets = Offsets { by_node: &self.offsets, factor };
-            integrals.sum(surfaces, positions, offsets, |facet| pairs.of(facet));
+            integrals.sum(surfaces, positions, offsets, self.multiplier, |facet| pairs.of(facet));
             for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
                 if look == 0 {
                     // What is inside already comes out as it may.

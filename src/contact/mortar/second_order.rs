@@ -66,19 +66,19 @@ impl Excess {
 }
 
 impl Shares {
-    /// The entries of the rows of the slave facet's corners at the nodes of a facet of second order.
+    /// The entries of the rows of the slave facet's corners at the nodes of a facet of second order, all rows of a node
+    /// after each other.
     pub(super) fn entries<'s>(
         &'s self,
         rows: &'s [usize],
         facet: &'s Facet,
         normal: Point,
     ) -> impl Iterator<Item = Entry> + 's {
-        let curved = usize::from(facet.whole.is_some()) * rows.len();
-        rows[..curved].iter().zip(&self.0).flat_map(move |(&row, shares)| {
-            facet
-                .all_nodes()
-                .zip(shares)
-                .map(move |(node, &share)| Entry::new(row, node, add_scaled([0.0; 3], share, normal), share))
+        let nodes = facet.whole.is_some().then(|| facet.all_nodes().enumerate());
+        nodes.into_iter().flatten().flat_map(move |(k, node)| {
+            rows.iter()
+                .zip(&self.0)
+                .map(move |(&row, shares)| Entry::new(row, node, add_scaled([0.0; 3], shares[k], normal), shares[k]))
         })
     }
 }
