@@ -44,7 +44,7 @@ use crate::real::Real;
 /// let dofs: Vec<[usize; 2]> = (0..8).map(|node| [2 * node, 2 * node + 1]).collect();
 /// let sides = |first: usize| (0..4).map(move |k| [first + k, first + (k + 1) % 4]);
 /// let contact = BodyContact::new(&coordinates, &dofs, sides(4), sides(0))?;
-/// assert_eq!(contact.sharp_nodes(), [vec![4, 5, 6, 7], vec![0, 1, 2, 3]]);
+/// assert_eq!(contact.sharp_nodes(), &[vec![4, 5, 6, 7], vec![0, 1, 2, 3]]);
 ///
 /// // Nodes without springs, of which the lower ones are held and the corner falls.
 /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(16, 16, &[])?;
@@ -60,7 +60,7 @@ use crate::real::Real;
 ///     .build()?;
 /// run.run_until(0.2, &mut ())?;
 /// assert!((run.state().displacement()[9] + 0.1_f64).abs() < 1e-12);
-/// # Ok::<(), contact_dynamics::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct BodyContact<T: Real, const D: usize> {
