@@ -34,11 +34,12 @@ const MORE_SWEEPS: usize = 50;
 const ITERATIONS: usize = 20;
 const ROUNDS: usize = 4;
 
-/// Proximal steps: the share of the diagonal that is added to W at first, by how much it shrinks, and the least.
+/// Proximal steps: the share of the diagonal that is added to W at first, by how much it shrinks, and the least. (What
+/// distinguishes nearly redundant rows is found only with a share below its own part of the diagonal.)
 const PROXIMAL_STEPS: usize = 300;
 const FIRST_SHARE: f64 = 1.0;
 const SHRINK: f64 = 0.3;
-const LEAST_SHARE: f64 = 1e-6;
+const LEAST_SHARE: f64 = 1e-13;
 
 /// Sweeps that go on alone in the end.
 const LAST_SWEEPS: usize = 20_000;

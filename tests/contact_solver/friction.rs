@@ -387,3 +387,31 @@ fn who_takes_no_friction_says_so() {
     let not_a_number = solve(&mut ActiveSet::default(), (&w, &[f64::NAN, 0.0], &sets));
     assert!(matches!(not_a_number, Err(ContactFailure::NotConverged { iterations: 0, .. })), "{not_a_number:?}");
 }
+
+/// Two pairs of nodes of a bar that folds, each node on a facet that ends at the other one of its pair: every contact
+/// twice, but for the angle between the facets and a thousandth of the way along them. What distinguishes the two moves
+/// so little that proximal steps must be nearly those of W itself.
+#[test]
+fn nodes_that_are_each_on_a_facet_of_the_other() {
+    let numbers = |text: &str| -> Vec<f64> { text.split_whitespace().map(|x| x.parse().unwrap()).collect() };
+    let below = numbers(
+        "0.0517985785202122 -1.0508374007936719e-06 0.05289801989042714 -0.000645809321127484 \
+        -2.426472709709146e-05 0.025880621118449895 -1.1988234363062554e-05 0.00144119960603335 \
+        -9.115526760604188e-06 0.026436071935721766 -0.0006458548524937502 2.3022463937240144e-05 \
+        0.02586639022309303 0.0008581900451633221 0.025880621118454766 9.212782264985188e-06 \
+        0.001441219997091264 -0.0008581900451633025 0.026422140150691803 9.115526760622097e-06 \
+        0.026436071935726536 0.051798480521514645 0.00010077175815094907 -0.0006458548525835315 \
+        -9.212782267549056e-06 -0.0006458093212174222 1.1988234363447832e-05 0.051798578520567594 \
+        -0.00010077175813514127 0.0528979239004024 -2.3022463934585868e-05 0.001441219997006482 \
+        2.426472709696724e-05 0.0014411996059487894 1.0508374165948843e-06 0.05289801989077578",
+    );
+    let q = numbers(
+        "-0.4927427440511541 -0.0004734725057493274 -0.39586935854470673 -0.0064929089978760755 \
+        -0.3958693585457268 0.006492908932339891 -0.49274274405222296 0.00047347173592096544",
+    );
+    let entry = |i: usize, j: usize| below[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+    let w: Vec<f64> = (0..64).map(|e| entry(e / 8, e % 8)).collect();
+    let sets = [cone(2, 0.567_363_523_158_849_6); 4];
+    let found = solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap();
+    check(&w, &q, &sets, &found, 1e-11, "a bar that folds");
+}
