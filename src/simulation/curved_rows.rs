@@ -26,7 +26,10 @@ pub(super) const NEAR: f64 = 1e-8;
 /// The miss of a gap, in its tolerances, that is accepted where it falls no more.
 pub(super) const NOISE: f64 = 8.0;
 
-/// Share of the forces that may alternate, which is the angle between the sides: both normals are right there.
+/// Share of the forces that they may miss then where gaps miss no more than [`NEAR`].
+const TIRED: f64 = 1e-5;
+
+/// Share of the forces that may alternate then, which is the angle between the sides: both normals are right there.
 const EDGE: f64 = 0.1;
 
 /// Share of the miss of the pass before the last that tells what alternates from what converges, however slowly.
@@ -59,7 +62,8 @@ impl Miss {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let near = within(NEAR, NEAR) && (now > 0.25 * before.largest() || passes == FOLLOWED);
+        let force = if passes > LONG { TIRED } else { NEAR };
+        let near = within(NEAR, force) && (now > 0.25 * before.largest() || passes == FOLLOWED);
         let alternates = passes > LONG && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
         now <= fit || near || alternates
     }
