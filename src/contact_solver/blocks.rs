@@ -10,6 +10,9 @@ use std::ops::Range;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockAcceptance<T> {
     accepted: T,
+    /// What may be rounding at most, whatever the multipliers are: a small share of many times the largest |q|. (Where
+    /// there is no solution they grow beyond all bounds, and their rounding with them.)
+    largest: T,
 }
 
 impl<T: Real> BlockAcceptance<T> {
@@ -22,21 +25,22 @@ impl<T: Real> BlockAcceptance<T> {
     ) -> Result<Self, ContactFailure<T>> {
         multipliers.fill(T::zero());
         problem.check_finite(true)?;
-        let Self { accepted } = Self::of(problem, tolerance);
+        let acceptance = Self::of(problem, tolerance);
         for (rows, set) in problem.blocks() {
             let row = rows.start;
             let q = problem.offset[row];
             let miss = if set.is_bilateral() { q.abs() } else { -q };
-            if problem.delassus(row, row) <= T::zero() && miss > accepted.max(problem.tolerance[row]) {
+            if problem.delassus(row, row) <= T::zero() && miss > acceptance.accepted.max(problem.tolerance[row]) {
                 return Err(ContactFailure::NotConverged { iterations: 0, row, residual: miss });
             }
         }
-        Ok(Self { accepted })
+        Ok(acceptance)
     }
 
     /// The rule for a problem, whose rest is known to be sound.
     pub(super) fn of(problem: &ContactProblem<'_, T>, tolerance: T) -> Self {
-        Self { accepted: tolerance * T::largest(problem.offset) }
+        let scale = T::largest(problem.offset);
+        Self { accepted: tolerance * scale, largest: T::epsilon().powf(T::of(0.4)) * T::of(32.0) * scale }
     }
 
     /// Whether every block is solved.
@@ -45,8 +49,9 @@ impl<T: Real> BlockAcceptance<T> {
             let miss = problem.block_miss(rows.clone(), set, multipliers);
             // NaN fails both.
             miss <= self.accepted || {
-                let rounding = |row: usize| problem.rounding(row, multipliers);
-                miss <= T::of(2.0) * rows.map(rounding).fold(T::zero(), T::max)
+                let rounding = rows.clone().map(|row| problem.rounding(row, multipliers)).fold(T::zero(), T::max);
+                let tolerance = rows.map(|row| problem.tolerance[row]).fold(T::zero(), T::max);
+                miss <= T::of(2.0) * rounding.min(tolerance + self.largest)
             }
         })
     }
