@@ -36,7 +36,7 @@ use crate::real::Real;
 /// use contact_dynamics::faer::sparse::SparseColMat;
 /// use contact_dynamics::{Composite, LinearSystem, Simulation};
 ///
-/// // A square of nodes on its corner, 0.1 above a square with sides along the axes; walked with the bodies on the left.
+/// // A square of nodes on its corner, 0.1 above a square with sides along the axes; bodies on the left of the way.
 /// let coordinates = [
 ///     [-1.0, -2.0], [1.0, -2.0], [1.0, 0.0], [-1.0, 0.0],
 ///     [0.0, 0.1], [1.0, 1.1], [0.0, 2.1], [-1.0, 1.1],

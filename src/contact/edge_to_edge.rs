@@ -22,17 +22,17 @@ pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 /// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not see it, or in a
 /// [`BodyContact`](super::BodyContact).
 ///
-/// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)). The
-/// lines through an edge e of the first surface and an edge f of the second are closest in x_e and x_f. The pair is in
-/// contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is one of the
-/// second body at f, between the normals of the two facets beside f, and −n one of the first body at e: then n is a
+/// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)).
+/// The lines through an edge e of the first surface and an edge f of the second are closest in x_e and x_f. The pair is
+/// in contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is one of
+/// the second body at f, between the normals of the two facets beside f, and −n one of the first body at e: then n is a
 /// normal of the Minkowski difference of the bodies, and which of the two signs fits is known. The gap is
 ///
 /// `g = n · (x_e − x_f)` (length; positive outside).
 ///
 /// Its row of G is n times (1 − s, s) on the ends of e and −n times (1 − t, t) on those of f, s and t the places of x_e
-/// and x_f along them. That is the derivative of g, for n is orthogonal to both edges. x_e − x_f is parallel to n: forces
-/// conserve momentum and angular momentum at the configuration where rows are linearized.
+/// and x_f along them. That is the derivative of g, for n is orthogonal to both edges. x_e − x_f is parallel to n:
+/// forces conserve momentum and angular momentum at the configuration where rows are linearized.
 ///
 /// # Beside which contact
 ///
@@ -43,13 +43,13 @@ pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 ///
 /// # Linearization
 ///
-/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step
-/// ([`search`](ContactConstraint::search)): edges that meet, and those that may come to meet within the step, by their
-/// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
-/// contact of the step. [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the
-/// closest points lie beyond an end by a share x of an edge of length l, the gap is larger than that of the lines by
-/// 2 l x²/(x + 0.1): gaps and rows are continuous where edges come to meet or slide off each other. Geometry is computed
-/// in `f64` in every run.
+/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step ([`search`](ContactConstraint::search)):
+/// edges that meet, and those that may come to meet within the step, by their velocities and a tenth of an edge. In
+/// between gaps are affine, and rows [`follow`](ContactConstraint::follow) the contact of the step.
+/// [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the closest points lie
+/// beyond an end by a share x of an edge of length l, the gap is larger than that of the lines by 2 l x²/(x + 0.1):
+/// gaps and rows are continuous where edges come to meet or slide off each other. Geometry is computed in `f64` in
+/// every run.
 ///
 /// Edges that touch, by 2 % of the shorter one, are in contact even if the normal is up to 30° beside those of the
 /// facets: in the dent that an edge makes it may be none of theirs.
@@ -204,9 +204,9 @@ impl<T: Real> EdgeToEdge<T> {
     /// What an edge is: a side around which the surface turns by more than `angle` (radians, between the normals of its
     /// facets in the reference coordinates) to a convex one; 30° if not given.
     ///
-    /// What turns less is left to nodes on facets. Two edges of length l that cross in their middles then sink into each
-    /// other by ½ l tan(½ `angle`) at most before a node touches: by 13 % of an element at 30°. Smaller angles make
-    /// edges of the sides of a mesh on a curved surface, at the cost of a search among all of them.
+    /// What turns less is left to nodes on facets. Two edges of length l that cross in their middles then sink into
+    /// each other by ½ l tan(½ `angle`) at most before a node touches: by 13 % of an element at 30°. Smaller angles
+    /// make edges of the sides of a mesh on a curved surface, at the cost of a search among all of them.
     ///
     /// # Errors
     ///

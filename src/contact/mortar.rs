@@ -64,11 +64,11 @@ const BEYOND: f64 = 0.25;
 ///
 /// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
 /// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are differences of gaps along the motion.
-/// What is close enough is found by boxes around the facets, as far as velocities take them. A node that slides over the rim of the
-/// master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet since the
-/// search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone into or
-/// through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a smaller step
-/// mends). Geometry is computed in `f64` in every run.
+/// What is close enough is found by boxes around the facets, as far as velocities take them. A node that slides over
+/// the rim of the master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet
+/// since the search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone
+/// into or through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a
+/// smaller step mends). Geometry is computed in `f64` in every run.
 ///
 /// # Known failure
 ///
@@ -220,8 +220,8 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). That nothing lies upon the other
-    /// surface is an error of the first search ([`Error::Empty`]).
+    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). That nothing lies upon the
+    /// other surface is an error of the first search ([`Error::Empty`]).
     pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
         self.bonds = Some(Bonds::new(self.nodes.clone(), [self.slave.clone(), self.master.clone()], strength));
         self.with_fitting_bonds()
@@ -302,21 +302,21 @@ impl<T: Real> Mortar<T> {
     /// ψ_a = Σ_b A_ab N_b, A = D M⁻¹, D = diag ∫ N_a dA, M_ab = ∫ N_a N_b dA, so that ∫ ψ_a N_b dA = δ_ab ∫ N_a dA
     ///
     /// (Wohlmuth, SIAM J. Numer. Anal. 38, 2000; Popp, Gee and Wall, Int. J. Numer. Methods Eng. 79, 2009). Of a flat
-    /// slave surface that touches the master and is covered, a row then has its own node only, so that G M⁻¹ Gᵀ has fewer
-    /// entries, and slip is that of this node. Where surfaces are apart or curved the row has a little of the others,
-    /// from the turning of normals. A is that of segments, triangles and parallelograms, which is one for all
+    /// slave surface that touches the master and is covered, a row then has its own node only, so that G M⁻¹ Gᵀ has
+    /// fewer entries, and slip is that of this node. Where surfaces are apart or curved the row has a little of the
+    /// others, from the turning of normals. A is that of segments, triangles and parallelograms, which is one for all
     /// shapes: on other quadrilaterals, and on facets of second order, whose parts have ψ, rows have a little of the
     /// others as well.
     ///
     /// ψ is negative far from its node. On a facet that is covered in part the weights are (1 − c) N + c ψ, with c a
     /// smooth function of the covered share of its area: 0 up to three quarters, 1 for all of it. So on segments,
     /// triangles and parallelograms the integral of a weight is positive whatever the part, a third of that of N at
-    /// least. What c changes by is in the rows. Weights add up to one everywhere: a constant pressure is exact as with N,
-    /// and momenta are conserved.
+    /// least. What c changes by is in the rows. Weights add up to one everywhere: a constant pressure is exact as with
+    /// N, and momenta are conserved.
     ///
     /// Known failure: distances far from the node count with a negative weight, so that over rough or curved masters a
-    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart, and a start
-    /// nearly in contact may be refused ([`Error::InitialViolation`]).
+    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart, and a
+    /// start nearly in contact may be refused ([`Error::InitialViolation`]).
     ///
     /// ```
     /// use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};

@@ -82,9 +82,9 @@ impl Pass {
 ///
 /// # Identity
 ///
-/// (number of the node, pass), passes being 0 and 1; in a dent the others are (number of the node, pass + 2 (1 + facet)),
-/// with the index of their facet in its list. A node that slides from one facet to the next keeps its multiplier;
-/// [`facet`](Self::facet) tells the facet.
+/// (number of the node, pass), passes being 0 and 1; in a dent the others are (number of the node, pass + 2 (1 +
+/// facet)), with the index of their facet in its list. A node that slides from one facet to the next keeps its
+/// multiplier; [`facet`](Self::facet) tells the facet.
 ///
 /// # Search
 ///

@@ -398,8 +398,8 @@ impl Surface {
     /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
     /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
     /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
-    /// facet, where that direction is lost in rounding, the mean normal itself, of those that the node `meets`: a corner
-    /// upon a corner of a body below is above it, not beside it.
+    /// facet, where that direction is lost in rounding, the mean normal itself, of those that the node `meets`: a
+    /// corner upon a corner of a body below is above it, not beside it.
     pub(crate) fn direction(
         &self,
         facet: usize,

@@ -231,8 +231,8 @@ fn rows_are_the_derivatives_of_gaps() {
             let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
             let error = verify::gap_jacobian(&mut triangles(&stack).dual().unwrap(), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-8, "{shift}: {error:?}");
-            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature. Dual functions add up
-            // what it leaves of shape functions: 9 times it at a corner, and a little for the blend.)
+            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature. Dual functions add
+            // up what it leaves of shape functions: 9 times it at a corner, and a little for the blend.)
             let error = verify::gap_jacobian(&mut dual(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
             let other = verify::gap_jacobian(&mut standard(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows == other.rows && error.rows_lost == 0, "{shift}: {error:?}");

@@ -14,8 +14,8 @@ pub(super) struct Rates {
 }
 
 impl<T: Real> Mortar<T> {
-    /// ∂g/∂t, which is that of the offsets, and Ġ v + ∂ġ/∂t, by differences of integrals without derivatives. A node that
-    /// nothing lies over on the way has the row that it had: none of the latter.
+    /// ∂g/∂t, which is that of the offsets, and Ġ v + ∂ġ/∂t, by differences of integrals without derivatives. A node
+    /// that nothing lies over on the way has the row that it had: none of the latter.
     pub(super) fn rates_along(&mut self, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) {
         let Self { nodes, slave, master, offsets, ramp, pairs, rows, rates, ahead, multiplier, .. } = self;
         let Rates { integrals, differences } = rates;

@@ -86,8 +86,8 @@ impl Base {
         Some(base)
     }
 
-    /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over there,
-    /// or lies there, is not below this facet.
+    /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over
+    /// there, or lies there, is not below this facet.
     pub(crate) fn see_beside(mut self, surface: &Surface, index: usize, positions: &[Point]) -> Self {
         for side in 0..self.count {
             let Some((other, _)) = surface.neighbor(index, side) else { continue };

@@ -24,8 +24,8 @@ pub(crate) struct SecondDifference {
 impl SecondDifference {
     /// d²g/ds² of the gaps at time t + s and displacements u + s v, for s = 0, by row: calls `gaps` three times, with a
     /// time and where the nodes of both bodies are then, for a list of gaps (NaN where there is none). `ahead` is the
-    /// time that the last search looks ahead, and `finest` the smallest facet, of which nodes go a share if that is zero.
-    /// Differences that are rounding are zero.
+    /// time that the last search looks ahead, and `finest` the smallest facet, of which nodes go a share if that is
+    /// zero. Differences that are rounding are zero.
     pub(crate) fn find<T: Real>(
         &mut self,
         nodes: &Nodes,

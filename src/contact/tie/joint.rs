@@ -172,8 +172,8 @@ impl Joint {
         apart
     }
 
-    /// The axes of the rows of a piece's corners, if its facet lies like this (none if it has lost its area: gaps that are
-    /// no numbers are refused).
+    /// The axes of the rows of a piece's corners, if its facet lies like this (none if it has lost its area: gaps that
+    /// are no numbers are refused).
     fn axes(&self, piece: &Piece, base: Option<&Base>) -> [[Point; 3]; 4] {
         let space = match (base, self.turns) {
             (Some(base), true) => turned(&piece.frame, &base.frame()),

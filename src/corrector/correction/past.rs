@@ -95,8 +95,9 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Takes the jumps of one field of past state k as the rows that hold now see them, where by those of the past it
-    /// would move much farther. Rows that are nearly the same, but turned in between, may see pasts that contradict each
-    /// other: together they would throw it far. By rows that hold now it goes no farther than the bodies have come.
+    /// would move much farther. Rows that are nearly the same, but turned in between, may see pasts that contradict
+    /// each other: together they would throw it far. By rows that hold now it goes no farther than the bodies have
+    /// come.
     fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, projection, g, contacts, new, .. } = self;
         let Buffers { rates, jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
