@@ -3,7 +3,7 @@
 use super::edge_to_edge::{self, EdgeToEdge};
 use super::surface::{Facet, Nodes};
 use super::{ContactConstraint, ContactLaw, Mortar, NodeToFacet};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::real::Real;
 
 /// Contact of two deforming bodies whose surfaces may have corners and edges: what
@@ -136,10 +136,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     ///
     /// [`Error::Parameter`] unless from 0 to π.
     pub fn sharp(mut self, angle: f64) -> Result<Self> {
-        if !(0.0..=std::f64::consts::PI).contains(&angle) {
-            let name = "the angle of a contact edge";
-            return Err(Error::Parameter { name, value: angle, range: "from 0 to π" });
-        }
+        edge_to_edge::check_angle(angle)?;
         self.angle = angle;
         self.find_sharp_nodes()?;
         Ok(self)

@@ -18,6 +18,14 @@ use rows::Rows;
 /// The angle by which a surface turns around an edge, if not given: 30°.
 pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 
+/// Refuses what is no angle by which a surface turns.
+pub(super) fn check_angle(angle: f64) -> Result<()> {
+    match (0.0..=std::f64::consts::PI).contains(&angle) {
+        true => Ok(()),
+        false => Err(Error::Parameter { name: "the angle of a contact edge", value: angle, range: "from 0 to π" }),
+    }
+}
+
 /// Contact of the edges of two deforming surfaces in three dimensions, where they cross: beside
 /// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not see it, or in a
 /// [`BodyContact`](super::BodyContact).
@@ -212,10 +220,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless from 0 to π.
     pub fn sharp(mut self, angle: f64) -> Result<Self> {
-        if !(0.0..=std::f64::consts::PI).contains(&angle) {
-            let name = "the angle of a contact edge";
-            return Err(Error::Parameter { name, value: angle, range: "from 0 to π" });
-        }
+        check_angle(angle)?;
         self.find_edges(angle)?;
         Ok(self)
     }

@@ -1,9 +1,9 @@
 //! Weighted gaps with dual functions: what rows have, patch tests, derivatives, momentum, what is covered in part.
 
+use super::mortar::{blocks, check_patches_of_blocks, check_patches_of_plates, plates, shaken};
 use super::two_bodies::check_impact;
 use contact_dynamics::contact::{BondStrength, ContactConstraint, Contacts, Facet, Mortar};
 use contact_dynamics::{Composite, Error, PersistencyCorrection, Simulation, verify};
-use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::second_order::{Family, SecondOrderStack};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
@@ -18,14 +18,6 @@ fn standard<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
 
 fn dual<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
     standard(stack, upper).dual().unwrap()
-}
-
-fn blocks(lower: [usize; 3], upper: [usize; 3]) -> [Solid<3>; 2] {
-    [lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL))
-}
-
-fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
-    [lower, upper].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL))
 }
 
 /// The area of a row, and the weights by dof.
@@ -170,27 +162,12 @@ fn areas_are_positive_whatever_is_covered() {
 
 #[test]
 fn the_patch_test_in_two_dimensions() {
-    for (lower, upper) in [(3, 4), (7, 2), (1, 5)] {
-        for slope in [0.0, 0.35] {
-            let stack = Stack::new(plates(lower, upper), 0.0, |[x, y]| [x, y + slope * x * (2.0 - y) * y]);
-            for from_above in [true, false] {
-                let error = stack.patch(dual(&stack, from_above)).unwrap();
-                assert!(error < 1e-12, "{lower} on {upper}, slope {slope}: {error:e}");
-            }
-        }
-    }
+    check_patches_of_plates(&[(3, 4), (7, 2), (1, 5)], dual);
 }
 
 #[test]
 fn the_patch_test_in_three_dimensions() {
-    for slope in [0.0, 0.25] {
-        let map = |[x, y, z]: [f64; 3]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z];
-        let stack = Stack::new(blocks([2, 3, 1], [4, 1, 1]), 0.0, map);
-        for from_above in [true, false] {
-            let error = stack.patch(dual(&stack, from_above)).unwrap();
-            assert!(error < 1e-12, "slope {slope}: {error:e}");
-        }
-    }
+    check_patches_of_blocks(&[[[2, 3, 1], [4, 1, 1]]], dual);
 }
 
 #[test]
@@ -206,12 +183,6 @@ fn the_patch_test_on_facets_of_second_order() {
     let stack = SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), Family::Simplex, 0.0, |x| x);
     let error = stack.patch(stack.mortar(true).unwrap().reach(0.3).unwrap().dual().unwrap()).unwrap();
     assert!(error < 1e-12, "{error:e}");
-}
-
-/// All displacements of a constraint, at random within `size`.
-fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
-    let mut random = xorshift(seed);
-    (0..dofs).map(|_| size * (2.0 * random() - 1.0)).collect()
 }
 
 #[test]

@@ -14,43 +14,55 @@ fn mortar<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
     stack.mortar(upper).unwrap().reach(0.3).unwrap()
 }
 
-fn blocks(lower: [usize; 3], upper: [usize; 3]) -> [Solid<3>; 2] {
+/// Blocks of hexahedra, one to lie upon the other.
+pub(crate) fn blocks(lower: [usize; 3], upper: [usize; 3]) -> [Solid<3>; 2] {
     [lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL))
 }
 
-fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
+/// The same in two dimensions.
+pub(crate) fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
     [lower, upper].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL))
 }
 
-#[test]
-fn the_patch_test_in_two_dimensions() {
-    for (lower, upper) in [(3, 3), (3, 4), (7, 2), (1, 5)] {
+/// The patch test on flat and slanted plates of so many elements, below and above.
+pub(crate) fn check_patches_of_plates(cells: &[(usize, usize)], contact: fn(&Stack<2>, bool) -> Mortar<f64>) {
+    for &(lower, upper) in cells {
         for slope in [0.0, 0.35] {
             let stack = Stack::new(plates(lower, upper), 0.0, |[x, y]| [x, y + slope * x * (2.0 - y) * y]);
             for from_above in [true, false] {
-                let error = stack.patch(mortar(&stack, from_above)).unwrap();
+                let error = stack.patch(contact(&stack, from_above)).unwrap();
                 assert!(error < 1e-12, "{lower} on {upper}, slope {slope}: {error:e}");
             }
         }
     }
 }
 
-#[test]
-fn the_patch_test_in_three_dimensions() {
-    for (lower, upper) in [([3, 3, 1], [2, 2, 1]), ([2, 3, 1], [4, 1, 1])] {
+/// The same on blocks.
+pub(crate) fn check_patches_of_blocks(cells: &[[[usize; 3]; 2]], contact: fn(&Stack<3>, bool) -> Mortar<f64>) {
+    for &[lower, upper] in cells {
         for slope in [0.0, 0.25] {
-            let stack =
-                Stack::new(blocks(lower, upper), 0.0, |[x, y, z]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z]);
+            let map = |[x, y, z]: [f64; 3]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z];
+            let stack = Stack::new(blocks(lower, upper), 0.0, map);
             for from_above in [true, false] {
-                let error = stack.patch(mortar(&stack, from_above)).unwrap();
+                let error = stack.patch(contact(&stack, from_above)).unwrap();
                 assert!(error < 1e-12, "{lower:?} on {upper:?}, slope {slope}: {error:e}");
             }
         }
     }
 }
 
+#[test]
+fn the_patch_test_in_two_dimensions() {
+    check_patches_of_plates(&[(3, 3), (3, 4), (7, 2), (1, 5)], mortar);
+}
+
+#[test]
+fn the_patch_test_in_three_dimensions() {
+    check_patches_of_blocks(&[[[3, 3, 1], [2, 2, 1]], [[2, 3, 1], [4, 1, 1]]], mortar);
+}
+
 /// All displacements of a constraint, at random within `size`.
-fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
+pub(crate) fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
     let mut random = xorshift(seed);
     (0..dofs).map(|_| size * (2.0 * random() - 1.0)).collect()
 }

@@ -1,5 +1,6 @@
 //! Facets of second order: patch tests, derivatives, momentum, curved surfaces, ties.
 
+use super::mortar::{blocks, shaken};
 use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Mortar, Surface, Tie};
 use contact_dynamics::{Composite, Simulation, verify};
 use contact_dynamics_scenes::OnSystem;
@@ -12,10 +13,6 @@ const FAMILIES: [Family; 3] = [Family::Simplex, Family::Serendipity, Family::Lag
 
 fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
     [lower, upper].map(|cells| Solid::rectangle([1.0; 2], [cells, 1], MATERIAL))
-}
-
-fn blocks(lower: [usize; 3], upper: [usize; 3]) -> [Solid<3>; 2] {
-    [lower, upper].map(|cells| Solid::block([1.0; 3], cells, MATERIAL))
 }
 
 /// With a reach of less than the bodies.
@@ -51,12 +48,6 @@ fn the_patch_test_in_three_dimensions() {
             assert!(error < 1e-12, "{family:?}, slope {slope}: {error:e}");
         }
     }
-}
-
-/// All displacements of a constraint, at random within `size`.
-fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
-    let mut random = xorshift(seed);
-    (0..dofs).map(|_| size * (2.0 * random() - 1.0)).collect()
 }
 
 #[test]

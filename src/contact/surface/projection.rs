@@ -4,6 +4,7 @@ use super::Surface;
 use super::kin::{FACING, Kin};
 use super::search::{Bounds, Neighborhood, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
+use std::cell::OnceCell;
 
 /// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
 /// look to the same side.
@@ -145,7 +146,9 @@ impl Ground<'_> {
 
     /// The normal along which a node at p stands on a facet, and its distance along it.
     fn direction(&self, place: usize, facet: usize, p: Point, projected: &(Shape, Foot)) -> Option<(Point, f64)> {
-        let meets = |normal: Point| self.meets(normal, self.own_normal(place));
+        // (Asked for by the facets around a vertex or a side that the node touches only, by each of them.)
+        let own = OnceCell::new();
+        let meets = |normal: Point| self.meets(normal, *own.get_or_init(|| self.own_normal(place)));
         self.surface.direction(facet, p, projected, (self.rounding, &meets), self.positions)
     }
 
