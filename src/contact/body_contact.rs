@@ -134,7 +134,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless from 0 to π.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless from 0 to π.
     pub fn sharp(mut self, angle: f64) -> Result<Self> {
         edge_to_edge::check_angle(angle)?;
         self.angle = angle;
@@ -159,7 +159,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless the reach is positive and finite.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless the reach is positive and finite.
     pub fn constraints(self) -> Result<Vec<Box<dyn ContactConstraint<T>>>> {
         let Self { coordinates, dofs, facets, sharp, angle, law, friction, reach } = self;
         let of = |body: usize| facets[body].iter().copied();
