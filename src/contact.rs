@@ -51,8 +51,8 @@ pub use nodes_on_obstacle::NodesOnObstacle;
 pub use obstacle::ClosedSurface;
 pub use obstacle::{Capsule, Cone, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 pub use rigid_motion::RigidMotion;
-pub(crate) use rows::NO_RESPONSE;
 pub use rows::{ContactJacobian, GapRates};
+pub(crate) use rows::{NO_RESPONSE, SpreadRow};
 #[cfg(feature = "search")]
 pub use surface::{Facet, Surface};
 pub(crate) use tangents::Tangents;

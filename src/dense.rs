@@ -72,6 +72,12 @@ impl<T: Real> DenseCholesky<T> {
     /// that is no more than the rounding of the combination of rows that it measures. `Err(row)` if the
     /// matrix is not finite or not semidefinite there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
+        let fill = |i: usize, row: &mut [T]| row.iter_mut().enumerate().for_each(|(j, x)| *x = entry(i, j));
+        self.factorize_rows(size, fill)
+    }
+
+    /// The same with `fill(i, row)`, which writes the entries j ≤ i of row i.
+    pub(crate) fn factorize_rows(&mut self, size: usize, mut fill: impl FnMut(usize, &mut [T])) -> Result<(), usize> {
         let Self { l, first, diagonal, independent, kind, reduced, scratch, .. } = self;
         self.size = size;
         l.clear();
@@ -81,9 +87,7 @@ impl<T: Real> DenseCholesky<T> {
         let mut profile = 0;
         for i in 0..size {
             let row = &mut l[i * size..=i * size + i];
-            for (j, x) in row.iter_mut().enumerate() {
-                *x = entry(i, j);
-            }
+            fill(i, row);
             diagonal.push(row[i]);
             first.push(row.iter().position(|x| *x != T::zero()).unwrap_or(i));
             profile += i - first[i];
@@ -109,9 +113,7 @@ impl<T: Real> DenseCholesky<T> {
             }
             // Not sound: again row by row, from the start, because the kernel has overwritten both triangles.
             for i in 0..size {
-                for j in 0..=i {
-                    l[i * size + j] = entry(i, j);
-                }
+                fill(i, &mut l[i * size..=i * size + i]);
             }
         }
         *kind = Kind::Skyline;
@@ -221,20 +223,27 @@ impl<T: Real> DenseCholesky<T> {
 
     /// Factorizes LᵀL on the independent columns.
     fn factorize_normal(&mut self) {
-        let Self { size, l, independent, normal, .. } = self;
+        let Self { size, l, independent, normal, reduced, .. } = self;
         let (n, rank) = (*size, independent.len());
         normal.clear();
         normal.resize(rank * rank, T::zero());
-        for a in 0..rank {
-            for b in 0..=a {
-                let (i, j) = (independent[a], independent[b]);
-                // Entries of L above the diagonal are leftovers.
-                let mut sum = (i..n).map(|k| l[k * n + i] * l[k * n + j]).sum::<T>();
-                for k in 0..b {
-                    sum -= normal[a * rank + k] * normal[b * rank + k];
-                }
-                normal[a * rank + b] = if a == b { sum.sqrt() } else { sum / normal[b * rank + b] };
+        let mut count = 0;
+        for k in 0..n {
+            // (Entries of L above the diagonal are leftovers.)
+            count += usize::from(independent.get(count) == Some(&k));
+            reduced.clear();
+            reduced.extend(independent[..count].iter().map(|&i| l[k * n + i]));
+            for (a, &x) in reduced.iter().enumerate().filter(|(_, x)| **x != T::zero()) {
+                T::axpy(x, &reduced[..=a], &mut normal[a * rank..=a * rank + a]);
             }
+        }
+        for a in 0..rank {
+            let (done, row) = normal.split_at_mut(a * rank);
+            for b in 0..a {
+                let other = &done[b * rank..=b * rank + b];
+                row[b] = (row[b] - dot(&row[..b], &other[..b])) / other[b];
+            }
+            row[a] = (row[a] - dot(&row[..a], &row[..a])).sqrt();
         }
     }
 

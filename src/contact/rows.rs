@@ -180,15 +180,6 @@ impl<T: Real> ContactJacobian<T> {
         self.located(row).map(|(place, weight)| weight * x[place]).sum()
     }
 
-    /// `G_i D G_jᵀ` with a diagonal D on the interface.
-    pub(crate) fn interface_coupling(&self, i: usize, j: usize, diagonal: &[T]) -> T {
-        let terms = self.located(i).flat_map(|(place, weight)| {
-            let shared = self.located(j).filter(move |(other, _)| *other == place);
-            shared.map(move |(_, other)| weight * (other * diagonal[place]))
-        });
-        terms.sum()
-    }
-
     /// `Σ_j |G_row,j| |x_j|` for x on the interface.
     pub(crate) fn interface_magnitude(&self, row: usize, x: &[T]) -> T {
         self.located(row).map(|(place, weight)| (weight * x[place]).abs()).sum()
@@ -206,5 +197,31 @@ impl<T: Real> ContactJacobian<T> {
         for (dof, weight) in self.row(row) {
             x[dof] += c * weight;
         }
+    }
+}
+
+/// A row of G spread out over dofs: its products with other rows then cost what those have of entries.
+#[derive(Debug, Default)]
+pub(crate) struct SpreadRow<T> {
+    /// Zero between two uses.
+    weights: Vec<T>,
+}
+
+impl<T: Real> SpreadRow<T> {
+    /// Of rows on so many dofs.
+    pub(crate) fn new(dofs: usize) -> Self {
+        Self { weights: vec![T::zero(); dofs] }
+    }
+
+    /// Makes room for rows on so many dofs.
+    pub(crate) fn reserve(&mut self, dofs: usize) {
+        self.weights.resize(dofs.max(self.weights.len()), T::zero());
+    }
+
+    /// Calls `act` with the weights of a row, by dof.
+    pub(crate) fn of<I: Iterator<Item = (usize, T)>>(&mut self, row: impl Fn() -> I, act: impl FnOnce(&[T])) {
+        row().for_each(|(dof, weight)| self.weights[dof] += weight);
+        act(&self.weights);
+        row().for_each(|(dof, _)| self.weights[dof] = T::zero());
     }
 }

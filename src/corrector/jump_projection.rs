@@ -1,6 +1,6 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
-use crate::contact::{ContactId, ContactJacobian, Groups};
+use crate::contact::{ContactId, ContactJacobian, Groups, SpreadRow};
 use crate::contact_solver::FORESEEN;
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
@@ -65,6 +65,8 @@ pub struct JumpProjection<T: Real> {
     factors: Vec<DenseCholesky<T>>,
     /// The right-hand side of a group.
     gathered: Vec<T>,
+    /// M⁻¹ G_iᵀ of a row; lumped masses only.
+    spread: SpreadRow<T>,
     /// Whether roots and factors belong to `closed`.
     factored: bool,
 }
@@ -140,6 +142,7 @@ impl<T: Real> JumpProjection<T> {
             roots: Vec::with_capacity(rows),
             factors: vec![DenseCholesky::with_capacity(rows.min(FORESEEN))],
             gathered: Vec::with_capacity(rows),
+            spread: SpreadRow::new(keys),
             factored: false,
         })
     }
@@ -205,12 +208,17 @@ impl<T: Real> JumpProjection<T> {
         self.sort(g, rows);
         let mut roots = std::mem::take(&mut self.roots);
         let mut factors = std::mem::take(&mut self.factors);
+        let mut spread = std::mem::take(&mut self.spread);
+        spread.reserve(self.dofs_of_lumped());
         roots.clear();
         let (mut result, mut used) = (Ok(()), 0);
         for group in 0..self.groups.len() {
             let own = self.groups.group(group);
-            let entry = |i: usize, j: usize| self.entry(g, rows[own[i]], rows[own[j]]);
-            let root = if own.len() == 1 { entry(0, 0).sqrt() } else { T::zero() };
+            let mut root = [T::zero()];
+            if let &[only] = own {
+                self.couple(g, rows[only], [rows[only]].into_iter(), &mut spread, &mut root);
+            }
+            let root = root[0].sqrt();
             roots.push(root);
             if own.len() == 1 && root.is_finite() {
                 continue;
@@ -218,10 +226,13 @@ impl<T: Real> JumpProjection<T> {
             if used == factors.len() {
                 factors.push(DenseCholesky::default());
             }
-            result = result.and(factors[used].factorize(own.len(), entry).map_err(|i| refuse(rows[own[i]])));
+            let fill = |i: usize, row: &mut [T]| {
+                self.couple(g, rows[own[i]], own.iter().map(|&position| rows[position]), &mut spread, row);
+            };
+            result = result.and(factors[used].factorize_rows(own.len(), fill).map_err(|i| refuse(rows[own[i]])));
             used += 1;
         }
-        (self.roots, self.factors) = (roots, factors);
+        (self.roots, self.factors, self.spread) = (roots, factors, spread);
         result?;
         self.factored = true;
         Ok(())
@@ -354,10 +365,14 @@ impl<T: Real> JumpProjection<T> {
     /// S of `rows`, dense and column-major.
     pub(crate) fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
         self.prepare(g, rows)?;
+        let mut spread = std::mem::take(&mut self.spread);
+        spread.reserve(self.dofs_of_lumped());
         s.clear();
-        for &j in rows {
-            s.extend(rows.iter().map(|&i| self.entry(g, i, j)));
+        s.resize(rows.len() * rows.len(), T::zero());
+        for (&j, column) in rows.iter().zip(s.chunks_exact_mut(rows.len().max(1))) {
+            self.couple(g, j, rows.iter().copied(), &mut spread, column);
         }
+        self.spread = spread;
         Ok(())
     }
 
@@ -406,22 +421,32 @@ impl<T: Real> JumpProjection<T> {
         })
     }
 
-    /// Entry (i, j) of S = G M⁻¹ Gᵀ; row j must be prepared.
-    fn entry(&self, g: &ContactJacobian<T>, i: usize, j: usize) -> T {
+    /// Entries (i, j) of S = G M⁻¹ Gᵀ of as many `others` j as there is room for; rows must be prepared.
+    fn couple(
+        &self,
+        g: &ContactJacobian<T>,
+        i: usize,
+        others: impl Iterator<Item = usize>,
+        spread: &mut SpreadRow<T>,
+        out: &mut [T],
+    ) {
+        let pairs = out.iter_mut().zip(others);
         match &self.inverse {
-            InverseMass::Lumped(inverse) => {
-                let mut sum = T::zero();
-                for (dof, weight) in g.row(i) {
-                    for (other, weight_j) in g.row(j) {
-                        if dof == other {
-                            sum += weight * weight_j * inverse[dof];
-                        }
-                    }
-                }
-                sum
+            InverseMass::Lumped(inverse) => spread.of(
+                || g.row(i).map(|(dof, weight)| (dof, weight * inverse[dof])),
+                |response| {
+                    pairs.for_each(|(entry, j)| *entry = g.product(j, response));
+                },
+            ),
+            InverseMass::Consistent(inverse) => {
+                pairs.for_each(|(entry, j)| *entry = self.columns[self.slots[j]].product(inverse, g.row(i)));
             }
-            InverseMass::Consistent(inverse) => self.columns[self.slots[j]].product(inverse, g.row(i)),
         }
+    }
+
+    /// How many dofs responses of a lumped mass are spread over.
+    fn dofs_of_lumped(&self) -> usize {
+        if matches!(self.inverse, InverseMass::Lumped(_)) { self.dofs } else { 0 }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::contact_path::{ContactPath, analyze, condensation, respond};
 use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
-use crate::contact::{ContactJacobian, Groups};
+use crate::contact::{ContactJacobian, Groups, SpreadRow};
 use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
@@ -36,6 +36,8 @@ pub(crate) struct Operator<T> {
     responses: Responses<T>,
     /// Of a diagonal matrix the responses of the interface to unit forces, its reciprocals there; empty until needed.
     reciprocals: Vec<T>,
+    /// The response of a diagonal matrix to a row.
+    spread: SpreadRow<T>,
     /// Version of the rows that the Delassus operator belongs to.
     rows: u64,
     delassus: Delassus<T>,
@@ -102,6 +104,7 @@ impl<T: Real> Operator<T> {
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
             reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
+            spread: SpreadRow::new(if contact == ContactPath::Apart { interface.len() } else { 0 }),
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
@@ -135,6 +138,7 @@ impl<T: Real> Operator<T> {
             interface: interface.to_vec(),
             responses: Responses::new(Unit::Dof, interface.len()),
             reciprocals: Vec::new(),
+            spread: SpreadRow::default(),
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
@@ -307,22 +311,25 @@ impl<T: Real> Operator<T> {
     /// Forms W of some rows, without compliances.
     fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.prepare(g, rows)?;
-        let Self { delassus: Delassus { rows: assembled, values, diagonal, .. }, responses, reciprocals, .. } = self;
+        let Self {
+            delassus: Delassus { rows: assembled, values, diagonal, .. }, responses, reciprocals, spread, ..
+        } = self;
         let size = rows.len();
         assembled.clear();
         values.clear();
         memory::grow(values, size, size, "the Delassus operator")?;
-        for (k, &j) in rows.iter().enumerate() {
-            match self.contact {
-                ContactPath::Apart => {
-                    for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
-                        *entry = g.interface_coupling(i, j, reciprocals);
-                    }
-                }
-                ContactPath::Condensed | ContactPath::Full => {
-                    responses.couple(g, j, rows, (size, &mut values[k..]));
+        match self.contact {
+            ContactPath::Apart => {
+                for (k, &j) in rows.iter().enumerate() {
+                    let response = || g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
+                    spread.of(response, |response| {
+                        for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
+                            *entry = g.interface_product(i, response);
+                        }
+                    });
                 }
             }
+            ContactPath::Condensed | ContactPath::Full => responses.couple(g, rows, values),
         }
         diagonal.clear();
         diagonal.extend((0..size).map(|k| values[k * size + k]));
@@ -332,10 +339,11 @@ impl<T: Real> Operator<T> {
 
     /// Makes responses to unit forces known on all dofs that some rows act on.
     fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
-        let Self { contact, factor, interface, full, responses, reciprocals, .. } = self;
+        let Self { contact, factor, interface, full, responses, reciprocals, spread, .. } = self;
         if *contact == ContactPath::Apart {
             if reciprocals.is_empty() {
                 reciprocals.resize(interface.len(), T::one());
+                spread.reserve(interface.len());
                 let found = respond((*contact, &mut **factor), interface, full, reciprocals);
                 return found.inspect_err(|_| reciprocals.clear());
             }

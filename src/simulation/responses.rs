@@ -3,12 +3,15 @@
 //! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where
 //! the matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
 
+mod tiles;
+
 use super::constraints::Constraints;
 use crate::contact::ContactJacobian;
 use crate::error::Result;
 use crate::linear_solver::COLUMNS;
 use crate::memory;
 use crate::real::Real;
+use tiles::Tiles;
 
 /// What a column is the response to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +42,7 @@ pub(super) struct Responses<T> {
     columns: usize,
     /// The dofs or rows whose columns are missing.
     missing: Vec<usize>,
-    /// The response to a row.
-    whole: Vec<T>,
+    tiles: Tiles<T>,
 }
 
 /// Dofs of an interface whose responses take little memory, all together.
@@ -62,7 +64,7 @@ impl<T: Real> Responses<T> {
             blocks,
             columns: 0,
             missing: Vec::with_capacity(small),
-            whole: Vec::with_capacity(size),
+            tiles: Tiles::for_interface(small),
         }
     }
 
@@ -138,28 +140,23 @@ impl<T: Real> Responses<T> {
         &self.blocks[block][place * self.size..(place + 1) * self.size]
     }
 
-    /// Column j of W = G A⁻¹ Gᵀ: writes G_i A⁻¹ G_jᵀ of all `rows` i to `out`, whose entries are `stride` apart.
-    pub(super) fn couple(
-        &mut self,
-        g: &ContactJacobian<T>,
-        j: usize,
-        rows: &[usize],
-        (stride, out): (usize, &mut [T]),
-    ) {
-        let mut whole = std::mem::take(&mut self.whole);
-        let response = match self.unit {
-            Unit::Row => self.column(j),
-            Unit::Dof => {
-                whole.clear();
-                whole.resize(self.size, T::zero());
-                g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place), &mut whole));
-                &whole
+    /// W = G A⁻¹ Gᵀ of some rows, row by row.
+    pub(super) fn couple(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
+        match self.unit {
+            Unit::Row => {
+                for (k, &j) in rows.iter().enumerate() {
+                    let response = self.column(j);
+                    for (entry, &i) in w[k..].iter_mut().step_by(rows.len()).zip(rows) {
+                        *entry = g.interface_product(i, response);
+                    }
+                }
             }
-        };
-        for (entry, &i) in out.iter_mut().step_by(stride).zip(rows) {
-            *entry = g.interface_product(i, response);
+            Unit::Dof => {
+                let mut tiles = std::mem::take(&mut self.tiles);
+                tiles.couple(g, rows, self.size, |place| self.column(place), w);
+                self.tiles = tiles;
+            }
         }
-        self.whole = whole;
     }
 
     /// A⁻¹ Gᵀ λ of some rows, whose forces Gᵀ λ on the interface are known.
