@@ -265,7 +265,7 @@ impl<T: Real> EdgeToEdge<T> {
         let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) else { return };
         let [one, other] =
             self.edges.each_ref().map(|edges| edges.iter().map(|edge| edge.bounds(&self.nodes.positions)));
-        self.neighborhood.build_among(one, other, listed);
+        self.neighborhood.build(one, other, listed);
     }
 
     fn find_rows(&mut self, u: &[T], v: &[T], ahead: f64) {

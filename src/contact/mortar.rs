@@ -5,6 +5,7 @@ mod dual;
 mod integrals;
 mod pairs;
 mod passage;
+mod points;
 mod ramp;
 mod rates;
 mod rows;

@@ -4,7 +4,7 @@ mod candidates;
 mod passage;
 mod rows;
 
-use super::surface::{Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surface, add_scaled, overhang};
+use super::surface::{Bounds, Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surface, add_scaled, overhang};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -18,11 +18,14 @@ struct Pass {
     neighborhood: Neighborhood,
     /// For each node a distance that it has from the surface at least, at the last search.
     clearance: Vec<f64>,
+    /// The boxes of the facets at the last search, of which each node looks at many.
+    boxes: Vec<Bounds>,
 }
 
 impl Pass {
     fn new(nodes: Vec<usize>) -> Self {
-        Self { clearance: vec![0.0; nodes.len()], nodes, neighborhood: Neighborhood::default() }
+        let clearance = vec![0.0; nodes.len()];
+        Self { clearance, nodes, neighborhood: Neighborhood::default(), boxes: Vec::new() }
     }
 }
 

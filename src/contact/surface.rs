@@ -65,8 +65,11 @@ pub struct Surface {
     neighbors: Vec<[Option<(usize, usize)>; 4]>,
     /// Nodes of the facets, sorted.
     nodes: Vec<usize>,
-    /// (node, facet, vertex of the facet), sorted: the facets around a node are a range.
-    around: Vec<(usize, usize, usize)>,
+    /// The places among them of the vertices of each facet.
+    places: Vec<[usize; 4]>,
+    /// (facet, vertex of the facet) by node, and where those of each place begin.
+    around: Vec<(usize, usize)>,
+    starts: Vec<usize>,
     /// The longest side of the smallest facet, in the reference coordinates.
     finest: f64,
     /// The mean of the longest sides of all facets there.
@@ -132,15 +135,24 @@ impl Surface {
             .flat_map(|(index, facet)| facet.nodes().iter().enumerate().map(move |(k, &node)| (node, index, k)))
             .collect();
         around.sort_unstable();
-        let mut nodes: Vec<_> = around.iter().map(|&(node, ..)| node).collect();
-        nodes.dedup();
+        let (mut nodes, mut starts, mut places) = (Vec::new(), Vec::new(), vec![[0; 4]; facets.len()]);
+        for (number, &(node, facet, k)) in around.iter().enumerate() {
+            if nodes.last() != Some(&node) {
+                nodes.push(node);
+                starts.push(number);
+            }
+            places[facet][k] = nodes.len() - 1;
+        }
+        starts.push(around.len());
         let mut surface = Self {
             dimension,
             rims: vec![Rim { sides: [true; 4], vertices: [false; 4], beyond: RIM }; facets.len()],
             neighbors: vec![[None; 4]; facets.len()],
             facets,
             nodes,
-            around,
+            places,
+            around: around.into_iter().map(|(_, facet, k)| (facet, k)).collect(),
+            starts,
             finest,
             typical,
         };
@@ -229,21 +241,20 @@ impl Surface {
 
     /// A vertex is on the rim if a side that ends there is.
     fn find_rim(&mut self) {
-        let Self { facets, rims, nodes, .. } = self;
+        let Self { facets, rims, nodes, places, .. } = self;
         let mut open = vec![false; nodes.len()];
-        let place = |node: &usize| nodes.binary_search(node).unwrap_or(0);
-        for (facet, rim) in facets.iter().zip(&*rims) {
-            let vertices = facet.nodes();
-            for (k, node) in vertices.iter().enumerate().filter(|&(k, _)| rim.sides[k]) {
-                open[place(node)] = true;
-                if vertices.len() > 2 {
-                    open[place(&vertices[(k + 1) % vertices.len()])] = true;
+        let vertices = || facets.iter().zip(&*places).map(|(facet, places)| &places[..facet.nodes().len()]);
+        for (places, rim) in vertices().zip(&*rims) {
+            for (k, &place) in places.iter().enumerate().filter(|&(k, _)| rim.sides[k]) {
+                open[place] = true;
+                if places.len() > 2 {
+                    open[places[(k + 1) % places.len()]] = true;
                 }
             }
         }
-        for (facet, rim) in facets.iter().zip(rims) {
-            for (vertex, node) in rim.vertices.iter_mut().zip(facet.nodes()) {
-                *vertex = open[place(node)];
+        for (places, rim) in vertices().zip(rims) {
+            for (vertex, &place) in rim.vertices.iter_mut().zip(places) {
+                *vertex = open[place];
             }
         }
     }
@@ -261,6 +272,11 @@ impl Surface {
     /// The mean of the longest sides of the facets, in the reference coordinates.
     pub(crate) fn typical(&self) -> f64 {
         self.typical
+    }
+
+    /// The boxes of its facets.
+    pub(crate) fn boxes(&self, positions: &[Point]) -> impl Iterator<Item = Bounds> + Clone {
+        self.facets.iter().map(|facet| Bounds::of_corners(&facet.shape(positions)))
     }
 
     /// The nodes of its facets, ascending.
@@ -281,6 +297,11 @@ impl Surface {
     /// The place of one of its nodes among them.
     pub(crate) fn place(&self, node: usize) -> usize {
         self.nodes.partition_point(|&other| other < node)
+    }
+
+    /// The places among the nodes of the vertices of a facet; those behind its last vertex have no meaning.
+    pub(crate) fn places(&self, facet: usize) -> &[usize; 4] {
+        &self.places[facet]
     }
 
     /// The sides of a facet where the surface ends.
@@ -341,11 +362,16 @@ impl Surface {
         if counts(across) { unit(add_scaled(own, 1.0, across)).or(Some(own)) } else { Some(own) }
     }
 
-    /// The facets around a node, with the vertex that it is of each.
+    /// The facets around a node, with the vertex that it is of each; none if it is no node of the surface.
     fn corners_around(&self, node: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let start = self.around.partition_point(|&(other, ..)| other < node);
-        let around = self.around[start..].iter().take_while(move |&&(other, ..)| other == node);
-        around.map(|&(_, facet, k)| (facet, k))
+        let found = self.nodes.binary_search(&node);
+        found.into_iter().flat_map(|place| self.around[self.starts[place]..self.starts[place + 1]].iter().copied())
+    }
+
+    /// The facets around the k-th vertex of a facet, itself among them.
+    pub(crate) fn facets_at(&self, facet: usize, k: usize) -> impl Iterator<Item = usize> + '_ {
+        let place = self.places[facet][k];
+        self.around[self.starts[place]..self.starts[place + 1]].iter().map(|&(facet, _)| facet)
     }
 
     /// The facets around a node.

@@ -90,14 +90,14 @@ impl Blend {
     pub(super) fn of_whole<'s>(
         &'s self,
         base: &Base,
-        places: &'s [usize; 4],
+        places: &'s [usize],
         facet: &'s Facet,
     ) -> impl Iterator<Item = Entry> + 's {
         let by_corner = base.turned(&middle(self.count), base.normal).map(|x| x.map(|x| factor(self.count) * x));
         let is_still = self.by_area.iter().flatten().all(|x| *x == 0.0);
         let nodes = if is_still { &[] } else { facet.nodes() };
         nodes.iter().zip(by_corner).flat_map(move |(&node, growth)| {
-            places[..self.count].iter().zip(self.by_area).map(move |(&row, by_area)| {
+            places.iter().zip(self.by_area).map(move |(&row, by_area)| {
                 let [moment, area] = by_area.map(|by_area| growth.map(|x| -self.covered * by_area * x));
                 Entry { area, ..Entry::new(row, node, moment, 0.0) }
             })

@@ -15,8 +15,9 @@
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
 use super::dual::{self, Blend, Multiplier};
+use super::points::{self, Addends, Column, Points, column};
 use super::second_order::{Pair, Shares};
-use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, cross, dot, middle, norm};
+use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, dot};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
 const LEAST: f64 = 1e-6;
@@ -64,32 +65,16 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Adds the whole of a slave facet to the sums of its nodes; returns their places.
-    fn begin(sums: &mut [Self], slave: &Surface, facet: &Facet, base: &Base) -> [usize; 4] {
-        let (places, count) = (facet.nodes.map(|node| slave.place(node)), base.count());
+    fn begin<'s>(sums: &mut [Self], slave: &'s Surface, facet: usize, base: &Base) -> &'s [usize; 4] {
+        let (places, count) = (slave.places(facet), base.count());
         let whole = dual::area(base) / count as f64;
         places[..count].iter().for_each(|&place| sums[place].whole += whole);
         places
     }
 
-    /// Takes out what the corners of a facet have had, if the facet's own sums are to be told apart.
-    fn take(sums: &mut [Self], places: &[usize], multiplier: Multiplier) -> Option<[Self; 4]> {
-        (multiplier == Multiplier::Dual).then(|| {
-            let mut before = [Self::default(); 4];
-            before.iter_mut().zip(places).for_each(|(before, &place)| *before = std::mem::take(&mut sums[place]));
-            before
-        })
-    }
-
-    /// Makes a facet's own sums those of dual functions, and puts back what its corners had before.
-    fn put_back(sums: &mut [Self], places: &[usize; 4], base: &Base, before: &[Self; 4]) -> Blend {
-        let mut own = [Self::default(); 4];
-        own.iter_mut().zip(&places[..base.count()]).for_each(|(own, &place)| *own = sums[place]);
-        let blend = Blend::of(base, &mut own);
-        for ((&place, own), before) in places[..base.count()].iter().zip(&own).zip(before) {
-            sums[place] = *before;
-            sums[place].add_scaled(1.0, own);
-        }
-        blend
+    /// Adds what is covered of a slave facet to the sums of its nodes.
+    fn end(sums: &mut [Self], places: &[usize], own: &[Self; 4]) {
+        places.iter().zip(own).for_each(|(&place, own)| sums[place].add_scaled(1.0, own));
     }
 
     /// Adds all that is summed over what is covered.
@@ -101,8 +86,9 @@ impl Sums {
         self.normal = add_scaled(self.normal, factor, other.normal);
     }
 
-    /// Adds a point.
-    fn add(&mut self, weight: f64, gap: f64, offset: f64) {
+    /// Adds a point, for a node whose shape function is `share` there.
+    fn add(&mut self, share: f64, area: f64, gap: f64, offset: f64) {
+        let weight = share * area;
         self.area += weight;
         self.moment += weight * gap;
         self.offset += weight * offset;
@@ -175,6 +161,9 @@ impl Entry {
 pub(super) struct Integrals {
     pub(super) sums: Vec<Sums>,
     entries: Vec<Entry>,
+    /// Nodes of master facets over one slave facet, and what they add to the rows of its corners.
+    others: Vec<(usize, [Column; 4])>,
+    points: Points,
     merged: Vec<Entry>,
     /// Where the merged entries of each row begin.
     starts: Vec<usize>,
@@ -183,48 +172,28 @@ pub(super) struct Integrals {
     begins: Vec<usize>,
 }
 
-/// What a facet adds to the rows of a slave facet's corners, by its own corners.
-#[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    moments: [[Point; 4]; 4],
-    areas: [[Point; 4]; 4],
-    shares: [[f64; 4]; 4],
-    /// What the derivative of n is multiplied by, in moments and areas.
-    turns: [[Point; 2]; 4],
+/// What is summed over one slave facet.
+#[derive(Default)]
+struct Own {
+    sums: [Sums; 4],
+    addends: [Addends; 4],
+    shares: Shares,
+    is_touched: bool,
 }
 
-impl Block {
-    /// Adds that the rim of a master moves over the slave facet, to this one and to the master's.
-    fn add_rim(&mut self, sample: &RimSample, offset: f64, count: usize, onto: &mut Self) {
-        let RimSample { length, slave, master, gap: distance, outward } = *sample;
-        let gap = distance - offset;
-        for a in 0..count {
-            let weight = length * slave[a];
-            for k in 0..4 {
-                let (own, other) = (-weight * slave[k], weight * master[k]);
-                self.moments[a][k] = add_scaled(self.moments[a][k], own * gap, outward);
-                self.areas[a][k] = add_scaled(self.areas[a][k], own, outward);
-                onto.moments[a][k] = add_scaled(onto.moments[a][k], other * gap, outward);
-                onto.areas[a][k] = add_scaled(onto.areas[a][k], other, outward);
-            }
-            let [of_moment, of_area] = &mut self.turns[a];
-            *of_moment = add_scaled(*of_moment, -weight * gap * distance, outward);
-            *of_area = add_scaled(*of_area, -weight * distance, outward);
-        }
+/// Adds what a node adds to the rows of a slave facet's corners to what it has added before.
+fn add_to(others: &mut Vec<(usize, [Column; 4])>, node: usize, columns: &[Column; 4]) {
+    match others.iter_mut().find(|(other, _)| *other == node) {
+        Some((_, sums)) => sums.iter_mut().zip(columns).for_each(|(sum, column)| points::add(sum, column)),
+        None => others.push((node, *columns)),
     }
+}
 
-    /// Adds that the normal of the slave facet turns.
-    fn turn(&mut self, base: &Base) {
-        let (count, length) = (base.count(), norm(base.product));
-        // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
-        let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / length);
-        let Self { moments, areas, turns, .. } = self;
-        for (turns, rows) in turns.iter().zip(moments.iter_mut().zip(areas)).take(count) {
-            let [of_moment, of_area] = turns.map(|turn| base.turned(&middle(count), across(turn)));
-            for b in 0..count {
-                rows.0[b] = add_scaled(rows.0[b], 1.0, of_moment[b]);
-                rows.1[b] = add_scaled(rows.1[b], 1.0, of_area[b]);
-            }
+/// Makes entries of what rows have of nodes, all rows of a node after each other.
+fn push_all(entries: &mut Vec<Entry>, rows: &[usize], columns: impl Iterator<Item = (usize, [Column; 4])>) {
+    for (node, columns) in columns {
+        for (&row, &[x, y, z, p, q, r, share, _]) in rows.iter().zip(&columns) {
+            entries.push(Entry { row, node, moment: [x, y, z], area: [p, q, r], share });
         }
     }
 }
@@ -248,13 +217,13 @@ impl Integrals {
         sums.clear();
         sums.resize(slave.nodes().len(), Sums::default());
         for (index, facet) in slave.facets().iter().enumerate() {
-            let Some(base) = Base::new(facet, positions) else { continue };
-            let places = Sums::begin(sums, slave, facet, &base);
+            let Some(mut base) = Base::new(facet, positions) else { continue };
+            let places = Sums::begin(sums, slave, index, &base);
             if partners(index).is_empty() {
                 continue;
             }
-            let base = base.see_beside(slave, index, positions);
-            let before = Sums::take(sums, &places[..base.count()], multiplier);
+            base.see_beside(slave, index, positions);
+            let mut own = [Sums::default(); 4];
             for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
                 let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
                 base.each_sample(other, positions, &mut |sample: &Sample| {
@@ -263,14 +232,15 @@ impl Integrals {
                     if let Some(pair) = &curved {
                         gap += pair.gap(&base, &sample.slave, &sample.master);
                     }
-                    for (&place, share) in places.iter().zip(sample.slave).take(base.count()) {
-                        sums[place].add(sample.area * share, gap, offset);
+                    for (own, share) in own.iter_mut().zip(sample.slave) {
+                        own.add(share, sample.area, gap, offset);
                     }
                 });
             }
-            if let Some(before) = before {
-                Sums::put_back(sums, &places, &base, &before);
+            if multiplier == Multiplier::Dual {
+                Blend::of(&base, &mut own);
             }
+            Sums::end(sums, &places[..base.count()], &own);
         }
     }
 
@@ -287,61 +257,58 @@ impl Integrals {
         self.sums.resize(slave.nodes().len(), Sums::default());
         self.entries.clear();
         for (index, facet) in slave.facets().iter().enumerate() {
-            let Some(base) = Base::new(facet, positions) else { continue };
-            let places = Sums::begin(&mut self.sums, slave, facet, &base);
+            let Some(mut base) = Base::new(facet, positions) else { continue };
+            let places = *Sums::begin(&mut self.sums, slave, index, &base);
             if partners(index).is_empty() {
                 continue;
             }
-            let base = base.see_beside(slave, index, positions);
-            let before = Sums::take(&mut self.sums, &places[..base.count()], multiplier);
-            let (mut block, mut shares) = (Block::default(), Shares::default());
-            let (mut touched, first) = (false, self.entries.len());
+            base.see_beside(slave, index, positions);
+            let (places, first) = (&places[..base.count()], self.entries.len());
+            let mut own = Own::default();
+            self.others.clear();
             for &partner in partners(index) {
                 let other = (&master.facets()[partner], master.open_sides(partner));
-                let own = (&mut block, &mut shares);
-                touched |= self.integrate_pair((&base, facet), other, (positions, offsets), &places, own);
+                self.integrate_pair((&base, facet), other, (positions, offsets), places, &mut own);
             }
-            if touched {
-                block.turn(&base);
-                self.push_all(&places[..base.count()], facet, &block);
-                self.entries.extend(shares.entries(&places[..base.count()], facet, base.normal));
+            if own.is_touched {
+                let columns = facet.nodes().iter().copied().zip(points::own(own.addends, &base));
+                push_all(&mut self.entries, places, columns.chain(self.others.drain(..)));
+                self.entries.extend(own.shares.entries(places, facet, base.normal));
             }
-            if let Some(before) = before {
-                let blend = Sums::put_back(&mut self.sums, &places, &base, &before);
+            if multiplier == Multiplier::Dual {
+                let blend = Blend::of(&base, &mut own.sums);
                 blend.weigh(&mut self.entries[first..]);
-                self.entries.extend(blend.of_whole(&base, &places, facet));
+                self.entries.extend(blend.of_whole(&base, places, facet));
             }
+            Sums::end(&mut self.sums, places, &own.sums);
         }
         self.merge();
     }
 
-    /// Adds what a master facet covers; says whether it covers anything.
+    /// Adds what a master facet covers.
     fn integrate_pair(
         &mut self,
         (base, facet): (&Base, &Facet),
         (other, open): (&Facet, [bool; 4]),
         (positions, offsets): (&[Point], Offsets<'_>),
-        places: &[usize; 4],
-        (block, shares): (&mut Block, &mut Shares),
-    ) -> bool {
-        let count = base.count();
+        places: &[usize],
+        own: &mut Own,
+    ) {
+        let Own { sums, addends, shares, is_touched } = own;
         let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
-        let (mut onto, mut shares_onto) = (Block::default(), Shares::default());
-        let mut touched = false;
+        let (points, mut shares_onto) = (&mut self.points, Shares::default());
         base.each_sample(other, positions, &mut |sample: &Sample| {
-            touched = true;
             let Sample { area, slave, master, gap: distance, direction: mut normal } = *sample;
             let mut point = base.shape.point(&slave);
-            let (mut gap, mut offset) = (distance, 0.0);
+            let (mut gap, mut offset, mut apart) = (distance, 0.0, [0.0; 3]);
             if let Some(pair) = &curved {
                 let excess = pair.at(&slave, &master);
                 gap += dot(base.normal, excess.apart);
                 normal = pair.direction(base, sample);
                 point = add_scaled(point, 1.0, excess.off);
-                for (a, [of_moment, _]) in block.turns.iter_mut().enumerate().take(count) {
-                    let weight = area * slave[a];
-                    excess.add(a, weight, [&mut *shares, &mut shares_onto]);
-                    *of_moment = add_scaled(*of_moment, weight, excess.apart);
+                apart = excess.apart;
+                for (a, share) in slave.iter().enumerate().take(base.count()) {
+                    excess.add(a, area * share, [&mut *shares, &mut shares_onto]);
                 }
             }
             let mut direction = normal;
@@ -350,64 +317,45 @@ impl Integrals {
                 gap -= offsets.factor * offset;
                 direction = add_scaled(normal, offsets.factor, base.slope(other, positions, &master, &outside.0[1]));
             }
-            // (Of a segment the second tangent is the unit vector out of the plane, and this its length times n.)
-            let [first, second] = base.shape.tangents_at(&slave);
-            let product = cross(first, if count == 2 { [0.0, 0.0, 1.0] } else { second });
-            let omega = area / base.stretch(&slave);
-            let stretched = base.turned(&slave, base.normal);
-            for a in 0..count {
-                let weight = area * slave[a];
-                let sums = &mut self.sums[places[a]];
-                sums.add(weight, gap, offset);
-                sums.position = add_scaled(sums.position, weight, point);
-                sums.normal = add_scaled(sums.normal, -weight, normal);
-                let by_area = omega * slave[a];
-                for b in 0..count {
-                    let moment = &mut block.moments[a][b];
-                    *moment = add_scaled(*moment, -weight * slave[b], direction);
-                    *moment = add_scaled(*moment, by_area * gap, stretched[b]);
-                    block.areas[a][b] = add_scaled(block.areas[a][b], by_area, stretched[b]);
-                    block.shares[a][b] += weight * slave[b];
-                }
-                let [of_moment, of_area] = &mut block.turns[a];
-                *of_moment = add_scaled(*of_moment, -weight * distance, direction);
-                *of_moment = add_scaled(*of_moment, by_area * gap, product);
-                *of_area = add_scaled(*of_area, by_area, product);
-                for (c, &share) in master.iter().enumerate() {
-                    onto.moments[a][c] = add_scaled(onto.moments[a][c], weight * share, direction);
-                    onto.shares[a][c] -= weight * share;
-                }
+            for (sums, share) in sums.iter_mut().zip(slave) {
+                sums.add(share, area, gap, offset);
+                sums.position = add_scaled(sums.position, share * area, point);
+                sums.normal = add_scaled(sums.normal, -share * area, normal);
             }
-        });
-        if touched {
-            base.each_rim_sample(other, open, positions, &mut |sample: &RimSample| {
-                let mut offset = offsets.factor * outside.at(&sample.slave, &sample.master);
-                if let Some(pair) = &curved {
-                    offset -= pair.gap(base, &sample.slave, &sample.master);
-                }
-                block.add_rim(sample, offset, count, &mut onto);
+            let (product, stretched) = base.stretch(&slave);
+            let omega = area / dot(base.normal, product);
+            let own = std::array::from_fn(|k| {
+                let (grown, share) = (stretched[k].map(|x| omega * x), area * slave[k]);
+                column(add_scaled(direction.map(|x| -share * x), gap, grown), grown, share)
             });
-            self.push_all(&places[..count], other, &onto);
-            self.entries.extend(shares_onto.entries(&places[..count], other, base.normal));
+            let others = master.map(|share| column(direction.map(|x| area * share * x), [0.0; 3], -area * share));
+            let grown = product.map(|x| omega * x);
+            let turned = add_scaled(grown.map(|x| gap * x), -area * distance, direction);
+            points.push(slave, points::addends(own, others, column(add_scaled(turned, area, apart), grown, 0.0)));
+        });
+        if points.is_empty() {
+            return;
         }
-        touched
-    }
-
-    /// Makes entries of what rows have of the nodes of a facet, all rows of a node after each other.
-    fn push_all(&mut self, places: &[usize], facet: &Facet, block: &Block) {
-        for (b, &node) in facet.nodes().iter().enumerate() {
-            for (a, &row) in places.iter().enumerate() {
-                let (moment, area, share) = (block.moments[a][b], block.areas[a][b], block.shares[a][b]);
-                self.entries.push(Entry { row, node, moment, area, share });
+        *is_touched = true;
+        base.each_rim_sample(other, open, positions, &mut |sample: &RimSample| {
+            let mut offset = offsets.factor * outside.at(&sample.slave, &sample.master);
+            if let Some(pair) = &curved {
+                offset -= pair.gap(base, &sample.slave, &sample.master);
             }
+            points.push_rim(sample, offset);
+        });
+        points.add_to(addends);
+        for (corner, &node) in other.nodes().iter().enumerate() {
+            add_to(&mut self.others, node, &points::take_other(addends, corner));
         }
+        self.entries.extend(shares_onto.entries(places, other, base.normal));
     }
 
     /// Sums entries of a row that belong to one node, in the order in which they were found.
     ///
     /// (Rows are told apart by counting: a sort of all entries of a large surface takes as long as finding them.)
     fn merge(&mut self) {
-        let Self { sums, entries, merged, starts, sorted, begins } = self;
+        let Self { sums, entries, merged, starts, sorted, begins, .. } = self;
         begins.clear();
         begins.resize(sums.len() + 2, 0);
         // Counted two places on, so that after the sums each row's place is where its next entry goes.

@@ -6,6 +6,8 @@ use crate::contact::surface::{Base, Bounds, Neighborhood, Point, Surface};
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     lists: Neighborhood,
+    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets.
+    masters: Vec<(Bounds, Option<Point>)>,
     starts: Vec<usize>,
     near: Vec<usize>,
 }
@@ -19,8 +21,7 @@ impl Pairs {
 
     /// Lists anew what is within `range`.
     pub(super) fn build(&mut self, [slave, master]: [&Surface; 2], positions: &[Point], range: f64) {
-        let boxes = slave.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
-        self.lists.build(boxes, master, positions, range);
+        self.lists.build(slave.boxes(positions), master.boxes(positions), range);
     }
 
     /// Takes from the lists the pairs that face each other within `range`, and are not in each other by more than
@@ -29,17 +30,22 @@ impl Pairs {
         let [slave, master] = surfaces;
         self.clear();
         self.starts.push(0);
+        let Self { lists, masters, starts, near } = self;
+        let normals = master.facets().iter().map(|facet| facet.normal(positions));
+        masters.clear();
+        masters.extend(master.boxes(positions).zip(normals));
         for (index, facet) in slave.facets().iter().enumerate() {
-            let listed = self.lists.of(index);
+            let listed = lists.of(index);
             if let Some(base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
                 let around = Bounds::of_corners(&base.shape).inflated(range);
-                self.near.extend(listed.iter().copied().filter(|&partner| {
-                    let partner = &master.facets()[partner];
-                    around.intersects(&Bounds::of_corners(&partner.shape(positions)))
-                        && base.may_meet(partner, positions, depth)
+                near.extend(listed.iter().copied().filter(|&partner| {
+                    let (bounds, normal) = &masters[partner];
+                    around.intersects(bounds)
+                        && normal
+                            .is_some_and(|normal| base.may_meet(normal, &master.facets()[partner], positions, depth))
                 }));
             }
-            self.starts.push(self.near.len());
+            starts.push(near.len());
         }
     }
 

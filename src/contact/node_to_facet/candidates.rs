@@ -7,14 +7,18 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> NodeToFacet<T> {
-    /// Makes lists of facets valid for the positions now, and for feet as far away as `range`.
+    /// Finds the boxes of all facets, and makes lists of facets valid for the positions now, and for feet as far away as `range`.
     pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
-        let Some(listed) = self.reach.renew(motions, range, &self.nodes.positions) else { return };
+        let positions = &self.nodes.positions;
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
-            let positions = &self.nodes.positions;
+            pass.boxes.clear();
+            pass.boxes.extend(surface.boxes(positions));
+        }
+        let Some(listed) = self.reach.renew(motions, range, positions) else { return };
+        for pass in &mut self.passes {
             let points = pass.nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
-            pass.neighborhood.build(points, surface, positions, listed);
+            pass.neighborhood.build(points, pass.boxes.iter().copied(), listed);
         }
         self.rebuilds += 1;
     }
@@ -40,6 +44,7 @@ impl<T: Real> NodeToFacet<T> {
         let positions = &nodes.positions;
         let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
         let Some(ground) = ground(pass, passes, surfaces, positions, Self::rounding()) else { return };
+        let ground = Ground { boxes: Some(&passes[pass].boxes), ..ground };
         for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
             if !near.contains(positions[node]) {
                 continue;
@@ -90,8 +95,9 @@ impl<T: Real> NodeToFacet<T> {
             let known = reach.known_around(node, positions[node], &motions[1 - pass]);
             let ground = ground.filter(|_| known > 0.0);
             let Stand { place, facet, .. } = stands[0];
-            let closest =
-                ground.and_then(|ground| ground.closest(place, known).or_else(|| ground.last(place, facet, known)));
+            let closest = ground.and_then(|ground| {
+                ground.closest(place, known, Some(facet)).or_else(|| ground.last(place, facet, known))
+            });
             for (k, &old) in stands.iter().enumerate() {
                 let row = first + k;
                 let stand = ground.and_then(|ground| {
@@ -140,5 +146,5 @@ fn ground<'a>(
 ) -> Option<Ground<'a>> {
     let Pass { nodes, neighborhood, .. } = &passes[pass];
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, own, kin, positions, rounding })
+    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, boxes: None, own, kin, positions, rounding })
 }

@@ -26,6 +26,8 @@ struct Crossing<'a> {
     grounds: [Ground<'a>; 2],
     place: usize,
     node: usize,
+    /// The facet that its row stands on, if it has one.
+    likely: Option<usize>,
     /// A bound of its way against the surface.
     way: f64,
     law: ContactLaw,
@@ -68,12 +70,14 @@ impl<T: Real> NodeToFacet<T> {
                     nodes: &list.nodes,
                     neighborhood,
                     surface,
+                    boxes: None,
                     own,
                     kin: self.kin.as_ref(),
                     positions,
                     rounding: Self::rounding(),
                 });
-                let crossing = Crossing { grounds: [start, end], place, node, way, law: self.law };
+                let likely = row.map(|row| self.rows.stands[row].facet);
+                let crossing = Crossing { grounds: [start, end], place, likely, node, way, law: self.law };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
                 let velocity = |node: usize| self.nodes.vector(node, step.v);
                 if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
@@ -99,8 +103,8 @@ impl Crossing<'_> {
     ) -> std::result::Result<(), (&'static str, f64, f64)> {
         let range = 2.0 * self.way;
         let [start, end] = &self.grounds;
-        let before = closed.and_then(|_| start.closest(self.place, f64::INFINITY));
-        let after = end.closest(self.place, range);
+        let before = closed.and_then(|_| start.closest(self.place, f64::INFINITY, self.likely));
+        let after = end.closest(self.place, range, self.likely);
         let gap = before.map_or(f64::INFINITY, |stand| stand.gap);
         let Some(from) = before else {
             return match self.passes(f64::INFINITY) {

@@ -11,12 +11,14 @@ impl Surface {
 
     /// A node of a surface without rim at which it touches itself: the facets there are several fans.
     pub(crate) fn pinched_node(&self) -> Option<usize> {
-        self.around.chunk_by(|a, b| a.0 == b.0).find(|group| self.fan(group) != group.len()).map(|group| group[0].0)
+        let groups = self.nodes.iter().zip(self.starts.windows(2));
+        let mut groups = groups.map(|(&node, range)| (node, &self.around[range[0]..range[1]]));
+        groups.find(|&(node, group)| self.fan(node, group) != group.len()).map(|(node, _)| node)
     }
 
     /// The number of facets in the fan of the first of the facets around a node.
-    fn fan(&self, group: &[(usize, usize, usize)]) -> usize {
-        let Some(&(node, first, vertex)) = group.first() else { return 0 };
+    fn fan(&self, node: usize, group: &[(usize, usize)]) -> usize {
+        let Some(&(first, vertex)) = group.first() else { return 0 };
         if self.facets[first].nodes().len() == 2 {
             return group.len();
         }

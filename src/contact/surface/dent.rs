@@ -21,7 +21,7 @@ impl Ground<'_> {
         let Self { surface, positions, .. } = *self;
         let nodes = surface.facets()[stand.facet].nodes();
         let shape = surface.facets()[stand.facet].shape(positions);
-        let own_normal = self.own_normal(stand.place);
+        let normal = shape.normal(&stand.weights);
         let near = stand.gap.abs() <= way + NEAR * shape.size() && !self.is_around(stand);
         let corners = if near { nodes } else { &[] };
         corners.iter().enumerate().flat_map(move |(k, &vertex)| {
@@ -31,12 +31,18 @@ impl Ground<'_> {
                 facet != stand.facet && !nodes[..k].iter().any(|earlier| others.contains(earlier))
             };
             let met = move |facet: usize| self.kin.is_none_or(|kin| !kin.keeps_apart(stand.place, facet));
-            surface.facets_around(vertex).filter(move |&facet| is_new(facet) && met(facet)).filter_map(move |facet| {
-                let other = surface.facets()[facet].shape(positions);
-                let beside = self.on_plane(stand.place, facet, NEAR + way / other.size())?;
-                let is_dent = self.is_dent(stand, &shape, &beside, &other, positions[vertex]);
-                (is_dent && self.meets(beside.normal, own_normal)).then_some(beside)
-            })
+            surface.facets_at(stand.facet, k).filter(move |&facet| is_new(facet) && met(facet)).filter_map(
+                move |facet| {
+                    let other = surface.facets()[facet].shape(positions);
+                    let (normal, beyond) = (normal?, NEAR + way / other.size());
+                    if other.is_turned_less(normal, LEAST_SINE, beyond) {
+                        return None;
+                    }
+                    let beside = self.on_plane(stand.place, facet, beyond)?;
+                    let is_dent = self.is_dent((stand, normal), &shape, &beside, &other, positions[vertex]);
+                    (is_dent && self.meets(beside.normal, self.own_normal(stand.place))).then_some(beside)
+                },
+            )
         })
     }
 
@@ -51,9 +57,15 @@ impl Ground<'_> {
     }
 
     /// Whether two facets rise from a vertex that they share, each in front of the other, and so does the point that
-    /// the node stands on.
-    fn is_dent(&self, stand: &Stand, shape: &Shape, beside: &Stand, other: &Shape, vertex: Point) -> bool {
-        let Some(normal) = shape.normal(&stand.weights) else { return false };
+    /// the node stands on, where its facet has this normal.
+    fn is_dent(
+        &self,
+        (stand, normal): (&Stand, Point),
+        shape: &Shape,
+        beside: &Stand,
+        other: &Shape,
+        vertex: Point,
+    ) -> bool {
         let height = |normal: Point, x: Point| dot(normal, sub(x, vertex));
         norm(cross(normal, beside.normal)) >= LEAST_SINE
             && height(normal, other.middle()) >= 0.0

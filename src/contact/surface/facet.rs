@@ -1,5 +1,6 @@
 //! A facet by the numbers of its nodes.
 
+use super::middle;
 use super::second_order::{ByNode, Kind, Whole};
 use super::shape::{Point, Shape, add_scaled, sub};
 
@@ -88,6 +89,11 @@ impl Facet {
     /// The facet with its vertices at the positions of its nodes.
     pub(crate) fn shape(&self, positions: &[Point]) -> Shape {
         Shape::new(self.nodes.map(|node| positions[node]), self.count)
+    }
+
+    /// The outward unit normal in its middle; none if it is degenerate there.
+    pub(crate) fn normal(&self, positions: &[Point]) -> Option<Point> {
+        self.shape(positions).normal(&middle(self.count))
     }
 
     /// Its nodes, and behind them those that the facet of second order has besides.

@@ -64,7 +64,7 @@ impl Kin {
     fn depths(&self, surface: &Surface, positions: &[Point], reach: f64) -> Vec<f64> {
         let mut lists = Neighborhood::default();
         let points = surface.nodes().iter().map(|&node| Bounds::of_points([positions[node]]));
-        lists.build(points, surface, positions, reach);
+        lists.build(points, surface.boxes(positions), reach);
         let depth = |(place, &node): (usize, &usize)| {
             let Some(own) = surface.node_normal(node, positions) else { return reach };
             let behind =

@@ -88,7 +88,7 @@ impl Base {
 
     /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over
     /// there, or lies there, is not below this facet.
-    pub(crate) fn see_beside(mut self, surface: &Surface, index: usize, positions: &[Point]) -> Self {
+    pub(crate) fn see_beside(&mut self, surface: &Surface, index: usize, positions: &[Point]) {
         for side in 0..self.count {
             let Some((other, _)) = surface.neighbor(index, side) else { continue };
             let other = surface.facets()[other].shape(positions);
@@ -97,7 +97,6 @@ impl Base {
             let convex = dot(self.normal, sub(point, self.shape.corner(side))) < 0.0;
             self.beside[side] = other.normal(&weights).filter(sharp).filter(|_| convex).map(|normal| [point, normal]);
         }
-        self
     }
 
     /// Whether what is at x, by `gap` above the facet, belongs to a facet behind a sharp edge.
@@ -111,13 +110,10 @@ impl Base {
         [dot(r, self.axes[0]), dot(r, self.axes[1])]
     }
 
-    /// Whether a facet looks toward this one, and is not behind it by more than `depth`.
-    pub(crate) fn may_meet(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
-        let shape = facet.shape(positions);
-        let nodes = facet.nodes();
-        let Some(normal) = shape.normal(&middle(nodes.len())) else { return false };
+    /// Whether a facet with this normal looks toward this one, and is not behind it by more than `depth`.
+    pub(crate) fn may_meet(&self, normal: Point, facet: &Facet, positions: &[Point], depth: f64) -> bool {
         let height = |&node: &usize| dot(self.normal, sub(positions[node], self.shape.corner(0)));
-        dot(normal, self.normal) < -FACING && nodes.iter().map(height).fold(f64::NEG_INFINITY, f64::max) > -depth
+        dot(normal, self.normal) < -FACING && facet.nodes().iter().map(height).any(|height| height > -depth)
     }
 
     /// Calls `act` with the points of what a master facet covers.
@@ -212,13 +208,18 @@ impl Base {
         }
     }
 
-    /// The slave facet's area for its coordinates, where the shape functions are `weights`.
-    pub(crate) fn stretch(&self, weights: &[f64; 4]) -> f64 {
+    /// The product of the tangents where the shape functions are `weights` (of a segment with the unit vector out of the
+    /// plane), and the derivative of its part along n, the facet's area for its coordinates, by the corners.
+    pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
+        let tangents = self.tangents(weights);
+        (cross(tangents[0], tangents[1]), self.turned_by(tangents, weights, self.normal))
+    }
+
+    /// The tangents where the shape functions are `weights`, the second one of a segment being the unit vector out of
+    /// the plane.
+    fn tangents(&self, weights: &[f64; 4]) -> [Point; 2] {
         let [first, second] = self.shape.tangents_at(weights);
-        match self.count {
-            2 => dot(self.normal, cross(first, [0.0, 0.0, 1.0])),
-            _ => dot(self.normal, cross(first, second)),
-        }
+        [first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }]
     }
 
     /// An orthonormal frame that turns with the facet: along its first tangent in the middle, across it, and n.
@@ -276,11 +277,12 @@ impl Base {
     /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`:
     /// the vector that each corner's motion is multiplied by.
     pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
-        let [first, second] = self.shape.tangents_at(weights);
-        let [by_first, by_second] = match self.count {
-            2 => [cross([0.0, 0.0, 1.0], vector), [0.0; 3]],
-            _ => [cross(second, vector), cross(vector, first)],
-        };
+        self.turned_by(self.tangents(weights), weights, vector)
+    }
+
+    fn turned_by(&self, [first, second]: [Point; 2], weights: &[f64; 4], vector: Point) -> [Point; 4] {
+        // (The second tangent of a segment has no derivatives.)
+        let [by_first, by_second] = [cross(second, vector), cross(vector, first)];
         let [one, other] = derivatives(self.count, weights);
         std::array::from_fn(|k| add_scaled(by_first.map(|x| one[k] * x), other[k], by_second))
     }
@@ -308,8 +310,7 @@ struct Flat {
 }
 
 impl Flat {
-    /// The shape functions at a point: of a quadrilateral by Newton's method, which is exact at once for
-    /// parallelograms.
+    /// The shape functions at a point: of a quadrilateral by Newton's method, which ends at once on parallelograms.
     fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
         let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
@@ -325,13 +326,16 @@ impl Flat {
         // Coordinates from 0 to 1: x = x₀ + s a + t b + s t c.
         let (a, b) = (from(1), from(3));
         let c: [f64; 2] = std::array::from_fn(|i| from(2)[i] - a[i] - b[i]);
+        let size = a.iter().chain(&b).fold(0.0_f64, |size, x| size.max(x.abs()));
+        let skew = c[0].abs().max(c[1].abs());
         let [mut s, mut t] = [0.5; 2];
         for _ in 0..ITERATIONS {
             let missing = std::array::from_fn(|i| r[i] - s * a[i] - t * b[i] - s * t * c[i]);
             let [by_s, by_t] = [std::array::from_fn(|i| a[i] + t * c[i]), std::array::from_fn(|i| b[i] + s * c[i])];
             let [ds, dt] = solve(by_s, by_t, missing);
             (s, t) = (s + ds, t + dt);
-            if ds.abs().max(dt.abs()) <= 4.0 * f64::EPSILON {
+            // What is missing now is ds dt c.
+            if (ds * dt).abs() * skew <= f64::EPSILON * size {
                 break;
             }
         }
@@ -361,6 +365,16 @@ impl Flat {
     /// What another one that goes the other way around has in common with this one, if its area is above `least`
     /// (Sutherland and Hodgman, Commun. ACM 17, 1974).
     fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
+        let is_apart = |axis: usize| {
+            let ends = [self, other].map(|flat| {
+                let corners = flat.corners[..flat.count].iter();
+                corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x[axis]), high.max(x[axis])])
+            });
+            ends[0][0] > ends[1][1] || ends[1][0] > ends[0][1]
+        };
+        if is_apart(0) || is_apart(1) {
+            return None;
+        }
         let mut polygon = Polygon::default();
         other.corners[..other.count].iter().rev().for_each(|&corner| polygon.push(corner));
         for k in 0..self.count {

@@ -53,6 +53,8 @@ pub(crate) struct Ground<'a> {
     /// The facets near each node, if known; otherwise all are looked at.
     pub(crate) neighborhood: Option<&'a Neighborhood>,
     pub(crate) surface: &'a Surface,
+    /// The boxes of its facets, if they are known.
+    pub(crate) boxes: Option<&'a [Bounds]>,
     /// The surface of the nodes, if known.
     pub(crate) own: Option<&'a Surface>,
     /// What nodes do not meet of it, if it is the same surface.
@@ -92,39 +94,55 @@ impl Ground<'_> {
         })
     }
 
-    /// The closest facet within `reach` of the node at a place of the list; none beyond the rim.
-    pub(crate) fn closest(&self, place: usize, reach: f64) -> Option<Stand> {
-        let (facet, projected) = self.nearest(place, reach)?;
+    /// The closest facet within `reach` of the node at a place of the list; none beyond the rim. Found sooner if it is
+    /// the one that is `likely`.
+    pub(crate) fn closest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<Stand> {
+        let (facet, projected) = self.nearest(place, reach, likely)?;
         self.on(place, facet, &projected)
     }
 
     /// The distance of that facet, or of its rim, and the stand on it; `reach` if there is no facet as near.
     pub(crate) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
-        match self.nearest(place, reach) {
+        match self.nearest(place, reach, None) {
             Some((facet, projected)) => (projected.1.distance, self.on(place, facet, &projected)),
             None => (reach, None),
         }
     }
 
-    fn nearest(&self, place: usize, reach: f64) -> Option<(usize, (Shape, Foot))> {
+    fn nearest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<(usize, (Shape, Foot))> {
         let Self { surface, positions, .. } = *self;
         let p = positions[self.nodes[place]];
         let own_normal = self.own_normal(place);
+        let bounds = |facet: usize| match self.boxes {
+            Some(boxes) => boxes[facet],
+            None => Bounds::of_corners(&surface.facets()[facet].shape(positions)),
+        };
+        // The first one decides which of the others are too far by their boxes.
+        let first = match likely.filter(|&likely| self.near(place).any(|facet| facet == likely)) {
+            None => {
+                let boxes = self.near(place).map(|facet| (facet, bounds(facet).distance(p)));
+                boxes.min_by(|x, y| x.1.total_cmp(&y.1)).map(|(facet, _)| facet)
+            }
+            likely => likely,
+        };
         let mut best: Option<(usize, (Shape, Foot))> = None;
-        for index in self.near(place) {
+        for facet in first.into_iter().chain(self.near(place).filter(|&facet| Some(facet) != first)) {
             let limit = best.map_or(reach, |(_, (_, foot))| foot.distance);
-            let [lower, upper] = surface.facets()[index].shape(positions).bounds();
-            let bounds = Bounds { lower, upper };
-            if !bounds.inflated(limit + overhang(&bounds)).contains(p) {
+            let bounds = bounds(facet);
+            if bounds.distance(p) > limit + overhang(&bounds) {
                 continue;
             }
-            let Some(projected) = surface.project(index, p, positions) else { continue };
+            let Some(projected) = surface.project(facet, p, positions) else { continue };
             let foot = &projected.1;
-            if foot.distance > reach || best.is_some_and(|(_, (_, best))| !foot.is_better_than(&best)) {
+            // (Of two that share the point the one that comes first.)
+            let is_better = |&(other, (_, best)): &(usize, (Shape, Foot))| {
+                foot.is_better_than(&best) || (facet < other && !best.is_better_than(foot))
+            };
+            if foot.distance > reach || best.is_some_and(|best| !is_better(&best)) {
                 continue;
             }
-            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, index, &projected) {
-                best = Some((index, projected));
+            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, facet, &projected) {
+                best = Some((facet, projected));
             }
         }
         best

@@ -1,6 +1,5 @@
 //! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
 
-use super::Surface;
 use super::shape::{Point, RIM, Shape, norm};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -47,6 +46,11 @@ impl Bounds {
         (0..3).all(|i| self.lower[i] <= other.upper[i] && other.lower[i] <= self.upper[i])
     }
 
+    /// The largest component of the way from a point to the box; zero inside.
+    pub(crate) fn distance(&self, x: Point) -> f64 {
+        (0..3).fold(0.0, |most, i| most.max(self.lower[i] - x[i]).max(x[i] - self.upper[i]))
+    }
+
     pub(crate) fn contains(&self, x: Point) -> bool {
         (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
     }
@@ -91,20 +95,8 @@ impl Neighborhood {
         }
     }
 
-    /// Lists anew, for each box, the facets whose boxes are within `range` of it.
-    pub(crate) fn build(
-        &mut self,
-        boxes: impl Iterator<Item = Bounds> + Clone,
-        surface: &Surface,
-        positions: &[Point],
-        range: f64,
-    ) {
-        let facets = surface.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
-        self.build_among(boxes, facets, range);
-    }
-
     /// Lists anew, for each box, which of the others are within `range` of it.
-    pub(crate) fn build_among(
+    pub(crate) fn build(
         &mut self,
         boxes: impl Iterator<Item = Bounds> + Clone,
         others: impl Iterator<Item = Bounds>,

@@ -170,6 +170,25 @@ impl Shape {
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
     }
 
+    /// Whether all normals of the facet, going on beyond its sides for a share of itself, are surely within the angle of
+    /// this sine of a unit vector.
+    pub(crate) fn is_turned_less(&self, vector: Point, sine: f64, beyond: f64) -> bool {
+        let is_within = |product: Point| {
+            let turned = cross(vector, product);
+            dot(vector, product) > 0.0 && dot(turned, turned) < sine * sine * dot(product, product)
+        };
+        if self.count < 4 {
+            let [first, second] = self.tangents_at(&[0.0; 4]);
+            return is_within(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }));
+        }
+        // The product of the tangents is bilinear, and those within an angle make a convex cone.
+        let end = 1.0 + 2.0 * beyond;
+        let [lower, upper] = [-end, end].map(|end| self.tangents([end; 2]));
+        [lower[0], upper[0]]
+            .into_iter()
+            .all(|first| [lower[1], upper[1]].into_iter().all(|b| is_within(cross(first, b))))
+    }
+
     /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
     pub(crate) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
         match self.count {
@@ -318,20 +337,47 @@ impl Shape {
     fn project_on_quadrilateral(&self, p: Point, rim: Rim) -> Option<Foot> {
         let [bottom, right, top, left] = rim.sides.map(|open| if open { 1.0 + 2.0 * rim.beyond } else { 1.0 });
         let (lower, upper) = ([-left, -bottom], [right, top]);
-        let Some(z) = self.minimize_distance(p, self.start(p), lower, upper) else {
+        let nearly_flat = self.start_if_nearly_flat(p, bottom.max(right).max(top).max(left));
+        let start = nearly_flat.unwrap_or_else(|| self.start(p));
+        let Some(z) = self.minimize_distance(p, start, lower, upper) else {
             return self.nearest_on_sides(p, rim, [true; 4]);
         };
         let at_bound = [z[1] <= lower[1], z[0] >= upper[0], z[1] >= upper[1], z[0] <= lower[0]];
-        let sides = self.nearest_on_sides(p, rim, at_bound);
         if at_bound.contains(&true) {
-            return sides;
+            return self.nearest_on_sides(p, rim, at_bound);
         }
         let inside = self.foot(p, Self::bilinear(z), Location::Inside);
+        if nearly_flat.is_some() {
+            return Some(inside);
+        }
+        let sides = self.nearest_on_sides(p, rim, at_bound);
         // A warped facet seen from afar may have a second local minimum on a side.
         match sides {
             Some(side) if side.distance < inside.distance * (1.0 - 1e-12) => Some(side),
             _ => Some(inside),
         }
+    }
+
+    /// Natural coordinates of the closest point of the parallelogram that has the middle and the tangents there; none
+    /// unless the facet is so nearly this parallelogram that, within `extent` times its natural coordinates, the
+    /// distance from p has one minimum.
+    ///
+    /// With λ the least eigenvalue of the metric, t the twist and d the distance of p, points Δ away from the closest
+    /// one are √λ |Δ| away along the facet, less a little by t, and |t| |Δ|²/2 at most off its tangent plane: they are
+    /// farther from p if d |t| is small beside λ.
+    fn start_if_nearly_flat(&self, p: Point, extent: f64) -> Option<[f64; 2]> {
+        const TWIST: f64 = 0.02;
+        const BEND: f64 = 0.1;
+        let ([a, b], twist, r) = (self.tangents([0.0; 2]), self.twist(), sub(p, self.middle()));
+        let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
+        let determinant = aa * bb - ab * ab;
+        let (least, twist) = (determinant / (aa + bb), dot(twist, twist));
+        if !(twist * extent * extent <= TWIST * TWIST * least && twist * dot(r, r) <= BEND * BEND * least * least) {
+            return None;
+        }
+        let (along, across) = (dot(r, a), dot(r, b));
+        let z = [(bb * along - ab * across) / determinant, (aa * across - ab * along) / determinant];
+        Some(z.map(|z| z.clamp(-1.0, 1.0)))
     }
 
     /// Natural coordinates of the closest point of the two triangles that the first diagonal makes.
@@ -422,5 +468,66 @@ impl Foot {
             || (self.distance == other.distance
                 && other.location == Location::Beyond
                 && self.location != Location::Beyond)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values from −1 to 1 that look like chance.
+    fn noise(k: usize) -> f64 {
+        let x = (k as f64 * 12.9898).sin() * 43_758.545_3;
+        2.0 * (x - x.floor()) - 1.0
+    }
+
+    fn vector(k: usize) -> Point {
+        [noise(3 * k), noise(3 * k + 1), noise(3 * k + 2)]
+    }
+
+    /// A parallelogram whose third corner is off by a share of it.
+    fn skewed(k: usize, share: f64) -> Shape {
+        let (a, b) = (add_scaled([1.0, 0.0, 0.0], 0.3, vector(k)), add_scaled([0.0, 1.0, 0.0], 0.3, vector(k + 1)));
+        let corner = add_scaled(add_scaled(a, 1.0, b), share, vector(k + 2));
+        Shape::new([[0.0; 3], a, corner, b], 4)
+    }
+
+    #[test]
+    fn closest_points_are_closest_on_nearly_flat_facets_and_on_others() {
+        let (mut flat, mut others) = (0, 0);
+        for k in 0..300 {
+            let shape = skewed(7 * k, [0.0, 1e-3, 0.03, 0.3][k % 4]);
+            let p = add_scaled([0.5, 0.5, 0.0], 1.5, vector(5000 + k));
+            match shape.start_if_nearly_flat(p, 1.0) {
+                Some(_) => flat += 1,
+                None => others += 1,
+            }
+            let found = shape.project(p, Rim::default()).unwrap();
+            let at = |i: i32| f64::from(i) / 20.0 - 1.0;
+            let points = (0..=40).flat_map(|i| (0..=40).map(move |j| Shape::bilinear([at(i), at(j)])));
+            let sampled = points.map(|weights| norm(sub(p, shape.point(&weights)))).fold(f64::INFINITY, f64::min);
+            assert!(found.distance <= sampled + 1e-12, "{k}: {} {sampled}", found.distance);
+            assert!(found.distance >= sampled - 0.06, "{k}: {} {sampled}", found.distance);
+        }
+        assert!(flat > 50 && others > 50, "{flat} {others}");
+    }
+
+    #[test]
+    fn normals_are_within_the_angle_that_is_told() {
+        let mut told = 0;
+        for k in 0..300 {
+            let (shape, beyond) = (skewed(7 * k, [1e-3, 0.03, 0.1][k % 3]), [0.0, 0.25, 1.0][k / 3 % 3]);
+            let vector = shape.normal(&Shape::bilinear([0.0; 2])).unwrap();
+            if !shape.is_turned_less(vector, 0.05, beyond) {
+                continue;
+            }
+            told += 1;
+            let at = |i: i32| (1.0 + 2.0 * beyond) * (f64::from(i) / 5.0 - 1.0);
+            for weights in (0..=10).flat_map(|i| (0..=10).map(move |j| Shape::bilinear([at(i), at(j)]))) {
+                let normal = shape.normal(&weights).unwrap();
+                assert!(norm(cross(normal, vector)) < 0.05 && dot(normal, vector) > 0.0, "{k}");
+            }
+        }
+        assert!(told > 50 && told < 250, "{told}");
     }
 }

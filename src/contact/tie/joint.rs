@@ -2,7 +2,7 @@
 //! and the rows that they make in axes that turn with the facets.
 
 use crate::contact::surface::{
-    Base, Bounds, ByNode, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
+    Base, ByNode, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
 };
 use std::ops::Range;
 
@@ -282,8 +282,7 @@ fn turned(from: &[Point; 3], to: &[Point; 3]) -> [Point; 3] {
 /// What of each slave facet is covered, and ∫ N dA over it by place of the slave's nodes.
 fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> (Vec<Covered>, Vec<f64>) {
     let mut lists = Neighborhood::default();
-    let boxes = slave.facets().iter().map(|facet| Bounds::of_corners(&facet.shape(positions)));
-    lists.build(boxes, master, positions, reach);
+    lists.build(slave.boxes(positions), master.boxes(positions), reach);
     let mut areas = vec![0.0; slave.nodes().len()];
     let mut all = Vec::new();
     for (index, facet) in slave.facets().iter().enumerate() {
@@ -291,7 +290,7 @@ fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> 
         let (count, mut own, mut parts) = (facet.count, [ByNode::default(); 4], Vec::new());
         for &partner in lists.of(index) {
             let other = &master.facets()[partner];
-            if !base.may_meet(other, positions, reach) {
+            if !other.normal(positions).is_some_and(|normal| base.may_meet(normal, other, positions, reach)) {
                 continue;
             }
             let mut onto = [ByNode::default(); 4];
@@ -304,7 +303,7 @@ fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> 
                 let (beneath, above) = (facet.shapes(&sample.slave), other.shapes(&sample.master));
                 for a in 0..count {
                     let weight = sample.area * sample.slave[a];
-                    areas[slave.place(facet.nodes[a])] += weight;
+                    areas[slave.places(index)[a]] += weight;
                     own[a].iter_mut().zip(beneath).for_each(|(own, share)| *own -= weight * share);
                     onto[a].iter_mut().zip(above).for_each(|(onto, share)| *onto += weight * share);
                 }

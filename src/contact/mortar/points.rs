@@ -1,0 +1,100 @@
+//! What the points of a slave facet that a master facet covers add to the rows of its corners: gathered for all points
+//! of a pair, and then summed at once.
+
+use crate::contact::surface::{Base, Point, RimSample, add_scaled, dot, middle, norm};
+use crate::real::Kernels;
+
+/// What a node adds to a row, as an [`Entry`](super::integrals::Entry) has it: moment, area, share, and nothing.
+pub(super) type Column = [f64; 8];
+
+/// A column by its parts.
+pub(super) fn column(moment: Point, area: Point, share: f64) -> Column {
+    [moment[0], moment[1], moment[2], area[0], area[1], area[2], share, 0.0]
+}
+
+/// Adds a column to another one.
+pub(super) fn add(sum: &mut Column, column: &Column) {
+    sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
+}
+
+/// What a point adds to a row whose shape function is one there: by corner of the slave facet, by corner of the master
+/// facet, and last what the derivative of n is multiplied by (its share has no meaning).
+pub(super) type Addends = [Column; 9];
+
+/// Where the corners of the slave facet are among addends, those of the master facet, and n.
+const OWN: usize = 0;
+const OTHERS: usize = 4;
+const NORMAL: usize = 8;
+
+/// Addends by the parts that they have.
+pub(super) fn addends(own: [Column; 4], others: [Column; 4], normal: Column) -> Addends {
+    std::array::from_fn(|k| match k {
+        OWN..OTHERS => own[k],
+        OTHERS..NORMAL => others[k - OTHERS],
+        _ => normal,
+    })
+}
+
+/// Points of a pair of facets.
+#[derive(Debug, Default)]
+pub(super) struct Points {
+    /// The shape functions of the slave facet's corners, and what they are multiplied by.
+    shares: Vec<[f64; 4]>,
+    addends: Vec<Addends>,
+}
+
+impl Points {
+    pub(super) fn push(&mut self, shares: [f64; 4], addends: Addends) {
+        self.shares.push(shares);
+        self.addends.push(addends);
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.shares.is_empty()
+    }
+
+    /// Adds that the rim of the master moves over the slave facet, whose gaps are smaller by `offset` than the distance.
+    pub(super) fn push_rim(&mut self, sample: &RimSample, offset: f64) {
+        let RimSample { length, slave, master, gap: distance, outward } = *sample;
+        let [moment, area] = [length * (distance - offset), length].map(|x| outward.map(|along| x * along));
+        let column = column(moment, area, 0.0);
+        let times = |share: f64| column.map(|x| share * x);
+        self.push(slave, addends(slave.map(|share| times(-share)), master.map(times), times(-distance)));
+    }
+
+    /// Adds all points to the sums of the slave facet's corners, and forgets them.
+    pub(super) fn add_to(&mut self, sums: &mut [Addends; 4]) {
+        for (a, sums) in sums.iter_mut().enumerate() {
+            let (sums, addends) = (sums.as_flattened_mut(), |k: usize| self.addends[k].as_flattened());
+            let whole = self.shares.len() - self.shares.len() % 4;
+            // (Several at a time: the sums are read and written less often.)
+            for k in (0..whole).step_by(4) {
+                let shares = std::array::from_fn::<f64, 4, _>(|i| self.shares[k + i][a]);
+                f64::add_all(shares, std::array::from_fn(|i| addends(k + i)), sums);
+            }
+            (whole..self.shares.len()).for_each(|k| f64::add_all([self.shares[k][a]], [addends(k)], sums));
+        }
+        self.shares.clear();
+        self.addends.clear();
+    }
+}
+
+/// Takes what a corner of the master facet has, by corner of the slave facet, out of sums.
+pub(super) fn take_other(sums: &mut [Addends; 4], corner: usize) -> [Column; 4] {
+    sums.each_mut().map(|sums| std::mem::take(&mut sums[OTHERS + corner]))
+}
+
+/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its normal.
+pub(super) fn own(mut sums: [Addends; 4], base: &Base) -> [[Column; 4]; 4] {
+    let (count, length) = (base.count(), norm(base.product));
+    // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
+    let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / length);
+    for sums in &mut sums[..count] {
+        let [x, y, z, p, q, r, ..] = sums[NORMAL];
+        let [of_moment, of_area] = [[x, y, z], [p, q, r]].map(|turn| base.turned(&middle(count), across(turn)));
+        for (k, (moment, area)) in of_moment.into_iter().zip(of_area).enumerate() {
+            add(&mut sums[OWN + k], &column(moment, area, 0.0));
+        }
+    }
+    std::array::from_fn(|k| std::array::from_fn(|a| sums[a][OWN + k]))
+}
