@@ -331,7 +331,7 @@ impl Integrals {
             let others = master.map(|share| column(direction.map(|x| area * share * x), [0.0; 3], -area * share));
             let grown = product.map(|x| omega * x);
             let turned = add_scaled(grown.map(|x| gap * x), -area * distance, direction);
-            points.push(slave, points::addends(own, others, column(add_scaled(turned, area, apart), grown, 0.0)));
+            points.push(slave, &points::addends(own, others, column(add_scaled(turned, area, apart), grown, 0.0)));
         });
         if points.is_empty() {
             return;

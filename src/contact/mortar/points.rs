@@ -44,9 +44,9 @@ pub(super) struct Points {
 }
 
 impl Points {
-    pub(super) fn push(&mut self, shares: [f64; 4], addends: Addends) {
+    pub(super) fn push(&mut self, shares: [f64; 4], addends: &Addends) {
         self.shares.push(shares);
-        self.addends.push(addends);
+        self.addends.push(*addends);
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -59,7 +59,7 @@ impl Points {
         let [moment, area] = [length * (distance - offset), length].map(|x| outward.map(|along| x * along));
         let column = column(moment, area, 0.0);
         let times = |share: f64| column.map(|x| share * x);
-        self.push(slave, addends(slave.map(|share| times(-share)), master.map(times), times(-distance)));
+        self.push(slave, &addends(slave.map(|share| times(-share)), master.map(times), times(-distance)));
     }
 
     /// Adds all points to the sums of the slave facet's corners, and forgets them.

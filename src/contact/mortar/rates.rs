@@ -3,7 +3,7 @@
 use super::Mortar;
 use super::integrals::{Integrals, Offsets};
 use crate::contact::GapRates;
-use crate::contact::surface::SecondDifference;
+use crate::contact::surface::{Point, SecondDifference};
 use crate::real::Real;
 
 /// Memory for rates.
@@ -26,9 +26,11 @@ impl<T: Real> Mortar<T> {
             out.rate = T::of(-change * spot.offset);
         }
         let all = || nodes.bodies().iter().flatten();
-        let gaps = |time: f64, positions: &[_], list: &mut Vec<f64>| {
+        let gaps = |time: f64, positions: &[Point], list: &mut Vec<f64>| {
             // (Rows are linearized where the state is, as a rule.)
-            let is_known = time.to_bits() == t.to_bits() && all().all(|&node| positions[node] == nodes.positions[node]);
+            let bits = |list: &[Point], node: usize| list[node].map(f64::to_bits);
+            let is_there = |&node: &usize| bits(positions, node) == bits(&nodes.positions, node);
+            let is_known = time.to_bits() == t.to_bits() && all().all(is_there);
             if !is_known {
                 let offsets = Offsets { by_node: offsets, factor: ramp.at(time) };
                 integrals.sum([&*slave, &*master], positions, offsets, *multiplier, |facet| pairs.of(facet));

@@ -96,7 +96,9 @@ fn add<'x, T: Real>(terms: &[(usize, T)], list: impl Fn(usize) -> &'x [T], out: 
         let of = |k: usize| list(four[k].0);
         T::add_all(std::array::from_fn::<T, 4, _>(|k| four[k].1), std::array::from_fn(of), out);
     }
-    rest.iter().for_each(|&(place, c)| T::add_all([c], [list(place)], out));
+    for &(place, c) in rest {
+        T::add_all([c], [list(place)], out);
+    }
 }
 
 #[cfg(test)]
