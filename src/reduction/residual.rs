@@ -8,6 +8,9 @@ use crate::memory;
 /// Steps of the iteration; it gains the factor σ/(ω² + σ) a step, ω the first frequency that is not among the modes.
 const STEPS: usize = 2000;
 
+/// A load of which less than this share is left counts as taken up by the modes.
+const NOTHING: f64 = 1e-12;
+
 /// `(G − Σ φ φᵀ/ω²) f` for columns f on the free dofs, G the flexibility without rigid motion: the static response to
 /// the part of a load that the modes do not take up. It is M-orthogonal to them.
 ///
@@ -25,6 +28,14 @@ pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Re
     pencil.mass_product(shapes, &mut inertia);
     balance(n, shapes, &inertia, &mut rest);
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // The weight of a free body is taken up by its rigid motions: of such loads rounding is left.
+    let mut loads = loads.to_vec();
+    for (load, rest) in loads.chunks_exact_mut(n).zip(rest.chunks_exact_mut(n)) {
+        if norm(rest) <= NOTHING * norm(load) {
+            load.fill(0.0);
+            rest.fill(0.0);
+        }
+    }
     let (mut change, mut size) = (f64::INFINITY, 0.0);
     for _ in 0..STEPS {
         step.copy_from_slice(&rest);
@@ -41,7 +52,7 @@ pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Re
             return Ok(x);
         }
         pencil.stiffness_product(&x, &mut products);
-        rest.copy_from_slice(loads);
+        rest.copy_from_slice(&loads);
         rest.iter_mut().zip(&products).for_each(|(r, f)| *r -= f);
         balance(n, shapes, &inertia, &mut rest);
     }
