@@ -22,6 +22,7 @@ pub(crate) struct Block {
     pub(crate) stiffness: SparseColMat<usize, f64>,
     pub(crate) contact: Vec<usize>,
     gaps: Vec<f64>,
+    plain: SparseColMat<usize, f64>,
     pub(crate) velocity: Vec<f64>,
     pub(crate) h: f64,
 }
@@ -61,6 +62,7 @@ impl Block {
         Ok(Self {
             mass,
             stiffness: body.stiffness,
+            plain: body.consistent,
             gaps: bottom.iter().map(|&node| solid.nodes[node][D - 1]).collect(),
             contact,
             velocity: solid.uniform(std::array::from_fn(|axis| if axis == D - 1 { -1.0 } else { 0.0 })),
@@ -109,12 +111,13 @@ impl Block {
     }
 
     fn modes(&self, count: usize) -> Result<Modes> {
-        Modes::lowest(self.mass.as_ref(), self.stiffness.as_ref(), &[], count)
+        Modes::lowest(self.parent().as_ref(), self.stiffness.as_ref(), &[], count)
     }
 
     /// Reduced to modes.
     pub(crate) fn reduced(&self, modes: &Modes, boundary: Boundary) -> Result<Simulation<'static, f64>> {
-        let reduction = Reduction::new(self.mass.as_ref(), self.stiffness.as_ref(), &self.contact).boundary(boundary);
+        let parent = self.parent();
+        let reduction = Reduction::new(parent.as_ref(), self.stiffness.as_ref(), &self.contact).boundary(boundary);
         let body = reduction.with_modes(modes)?;
         let contact: Vec<usize> = body.contact_dofs().collect();
         self.run(body.system()?, &contact, body.velocity(&self.velocity)?)

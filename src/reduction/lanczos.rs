@@ -5,6 +5,9 @@
 //! appended to it. With as many vectors ahead as motions are rigid multiple eigenvalues come together; a product with
 //! nothing left shortens the band, and new random vectors lengthen it. Of Rayleigh and Ritz's pairs the residual is
 //! known without another product. The basis is not restarted: two to three vectors are kept for each mode.
+//!
+//! Where M is singular vectors may gather parts of its null space, which no product with M sees: what is taken for a
+//! mode is multiplied once more.
 
 use super::pencil::Pencil;
 use crate::error::{Error, Result};
@@ -16,7 +19,7 @@ use crate::sparse::scattered_signed;
 const NOTHING: f64 = 1e-14;
 
 /// Residual of a pair that counts as converged, over its eigenvalue of (K + σM)⁻¹ M.
-const CONVERGED: f64 = 1e-11;
+const CONVERGED: f64 = 1e-10;
 
 /// Eigenpairs that have converged without one missing between them, by ascending frequency.
 #[derive(Debug, Default)]
@@ -65,7 +68,7 @@ impl Lanczos {
         pencil.mass_product(&numbers, &mut vectors);
         pencil.solve(&mut vectors)?;
         let before = self.count;
-        self.append(pencil, &mut vectors)?;
+        self.append(pencil, &mut vectors, 0)?;
         self.exhausted = self.count == before;
         Ok(())
     }
@@ -83,14 +86,16 @@ impl Lanczos {
         let mut vectors = memory::zeros(n, ahead.len(), "Lanczos vectors")?;
         pencil.mass_product(&self.basis[ahead.start * n..ahead.end * n], &mut vectors);
         pencil.solve(&mut vectors)?;
-        let columns = self.append(pencil, &mut vectors)?;
+        // (But for rounding these have parts of the last vectors of the basis only.)
+        let columns = self.append(pencil, &mut vectors, ahead.start.saturating_sub(2 * self.block))?;
         self.columns.extend(columns);
         self.done = ahead.end;
         Ok(())
     }
 
-    /// Takes what vectors have of the basis, returns the coefficients, and appends what is left, normalized.
-    fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64]) -> Result<Vec<Vec<f64>>> {
+    /// Takes what vectors have of the basis, returns the coefficients, and appends what is left, normalized. Most of
+    /// what they have is of the basis from `recent` on.
+    fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64], recent: usize) -> Result<Vec<Vec<f64>>> {
         let n = self.n;
         let width = vectors.len() / n;
         let mut products = memory::zeros(n, width, "Lanczos vectors")?;
@@ -98,11 +103,11 @@ impl Lanczos {
         let before: Vec<f64> = norms(n, vectors, &products);
         let mut columns = vec![vec![0.0; self.count]; width];
         // Twice is enough (Kahan; Giraud, Langou, Rozložník, van den Eshof 2005).
-        for _ in 0..2 {
+        for from in [recent, 0] {
             remove(n, &self.locked, &products, vectors);
-            let coefficients = remove(n, &self.basis, &products, vectors);
-            for (column, added) in columns.iter_mut().zip(coefficients.chunks_exact(self.count.max(1))) {
-                column.iter_mut().zip(added).for_each(|(c, x)| *c += x);
+            let coefficients = remove(n, &self.basis[from * n..], &products, vectors);
+            for (column, added) in columns.iter_mut().zip(coefficients.chunks_exact((self.count - from).max(1))) {
+                column[from..].iter_mut().zip(added).for_each(|(c, x)| *c += x);
             }
             pencil.mass_product(vectors, &mut products);
         }

@@ -13,6 +13,9 @@ const APART: f64 = 1e-5;
 /// Residual that computed modes may leave.
 const TOLERANCE: f64 = 1e-9;
 
+/// Vectors ahead while elastic modes are sought: the fewer, the sooner they converge.
+const BAND: usize = 4;
+
 /// How often a missing mode is sought with new random vectors.
 const ATTEMPTS: usize = 8;
 
@@ -253,7 +256,11 @@ impl Modes {
                 continue;
             }
             let mut shapes = rigid;
-            shapes.extend(lanczos.vectors(&pairs, cut.count - zeros)?);
+            shapes.extend(purified(pencil, lanczos.vectors(&pairs, cut.count - zeros)?)?);
+            if pencil.rank < n {
+                // What was off by parts of lower modes is so by more of them.
+                shapes = orthonormal(pencil, shapes)?;
+            }
             return Self::checked(pencil, shapes, zeros, cut.next);
         }
         Err(Error::ModesMissed { found: lanczos.count(), expected: pencil.rank, frequency: 0.0 })
@@ -438,7 +445,7 @@ fn rigid_motions(pencil: &mut Pencil) -> Result<(Vec<f64>, Lanczos)> {
         lanczos.advance(pencil)?;
         let Some(pairs) = lanczos.pairs(pencil.shift) else { continue };
         let low = pairs.values.iter().take_while(|&&value| value < 0.5 * pencil.shift).count();
-        let vectors = lanczos.vectors(&pairs, low)?;
+        let vectors = purified(pencil, lanczos.vectors(&pairs, low)?)?;
         let mut products = vec![0.0; vectors.len()];
         pencil.stiffness_product(&vectors, &mut products);
         let is_rigid = |(x, f)| pencil.quotient(x, f) == 0.0;
@@ -447,14 +454,31 @@ fn rigid_motions(pencil: &mut Pencil) -> Result<(Vec<f64>, Lanczos)> {
             continue;
         }
         if rigid == 0 {
+            lanczos.block = BAND.min(lanczos.block);
             return Ok((Vec::new(), lanczos));
         }
         let rigid = polish(pencil, vectors[..rigid * n].to_vec())?;
-        let block = lanczos.block.min(pencil.rank - rigid.len() / n).max(1);
+        let block = BAND.min(pencil.rank - rigid.len() / n).max(1);
         let mut elastic = Lanczos::new(n, block, rigid.clone());
         elastic.draw(pencil)?;
         return Ok((rigid, elastic));
     }
+}
+
+/// Vectors without their parts in the null space of M, if it is singular.
+fn purified(pencil: &mut Pencil, vectors: Vec<f64>) -> Result<Vec<f64>> {
+    let n = pencil.size();
+    if pencil.rank == n || vectors.is_empty() {
+        return Ok(vectors);
+    }
+    let mut pure = vec![0.0; vectors.len()];
+    pencil.mass_product(&vectors, &mut pure);
+    pencil.solve(&mut pure)?;
+    let lengths = lengths(pencil, &pure);
+    for (vector, length) in pure.chunks_exact_mut(n).zip(lengths) {
+        vector.iter_mut().for_each(|x| *x /= length);
+    }
+    Ok(pure)
 }
 
 /// Rigid motions after two steps of inverse iteration, M-orthonormal.

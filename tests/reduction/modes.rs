@@ -280,3 +280,27 @@ fn modes_of_another_code_are_checked() {
     let named = take(&[0.0, 0.0], shapes(&[0, 1]), omega[2]);
     assert!(matches!(named, Err(Error::ModeResidual { mode: 1, .. })), "{named:?}");
 }
+
+/// A plate with massless contact nodes: vectors of the iteration gather parts of the null space of M.
+#[test]
+fn null_spaces_of_the_mass_do_not_enter_the_modes() {
+    let plate = Solid::rectangle([1.0; 2], [16, 16], STEEL);
+    let mut masses = plate.lumped_mass::<f64>();
+    for (node, place) in plate.nodes.iter().enumerate().filter(|(_, place)| place[1] == 0.0) {
+        assert!(place[0] >= 0.0);
+        masses[2 * node + 1] = 0.0;
+    }
+    let matrices = [diagonal(&masses), plate.stiffness()];
+    for count in [20, 100, 400] {
+        let modes = lowest(&matrices, &[], count).unwrap();
+        assert_eq!(modes.rigid(), 3);
+        assert_orthonormal(&modes, &matrices[0]);
+        for k in 3..count {
+            let shape = modes.shape(k);
+            let [force, inertia] = [&matrices[1], &matrices[0]].map(|a| product(a.as_ref(), &shape));
+            let square = modes.frequencies()[k].powi(2);
+            let size = force.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            assert!(force.iter().zip(&inertia).all(|(f, m)| (f - square * m).abs() < 1e-6 * size), "{k}");
+        }
+    }
+}
