@@ -3,7 +3,7 @@
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, Newmark, Result, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
-use contact_dynamics_scenes::reduced::{Model, Struck, bounces, collision, wall_exact, wall_impact};
+use contact_dynamics_scenes::reduced::{Model, Struck, TAPER, bounces, collision, wall_exact, wall_impact};
 use contact_dynamics_scenes::tables::decimal;
 use std::fmt::Write;
 
@@ -53,7 +53,7 @@ pub(crate) fn wall(quick: bool) -> Table {
             for model in Model::ALL {
                 let mut cells = Vec::new();
                 for (h, _) in STEPS {
-                    cells.push(cell(wall_impact(count + 1, model, scheme, h, (&phases, 3.0))?));
+                    cells.push(cell(wall_impact(count + 1, model, scheme, h, (&phases, TAPER))?));
                 }
                 for (_, steps) in STEPS {
                     cells.push(decimal(bounces(count + 1, model, scheme, steps)?.energy, 4));
@@ -65,19 +65,23 @@ pub(crate) fn wall(quick: bool) -> Table {
     Ok(table)
 }
 
-/// Other exponents of the taper.
+/// Other tapers.
 pub(crate) fn exponents(quick: bool) -> Table {
     let phases = phases(quick);
     let mut table = String::from(
-        "Exponent p of the taper σ² = 1 − (ω/ω_c)^p, ρ∞-Bathe(1), h = 0.25 ms: mean error (worst overshoot)\n\n\
-         | p | r = 20 | r = 50 | r = 100 |\n| --- | --- | --- | --- |\n",
+        "Exponent p of the taper σ² = 1 − (ω/ω_c)^p and softening, ρ∞-Bathe(1), h = 0.25 ms: mean error (worst \
+         overshoot)\n\n\
+         | p | softening | r = 20 | r = 50 | r = 100 |\n| --- | --- | --- | --- | --- |\n",
     );
-    for exponent in [1.0, 1.5, 2.0, 3.0, 4.0, 6.0] {
+    let exponents = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0].map(|exponent| [exponent, 2.0]);
+    let softenings = [0.0, 0.5, 1.0, 1.5, 2.5, 3.0].map(|softening| [3.0, softening]);
+    for taper in exponents.into_iter().chain(softenings) {
         let cells: Result<Vec<String>> = [20, 50, 100]
             .iter()
-            .map(|&count| Ok(cell(wall_impact(count + 1, TAPERED, bathe, 2.5e-4, (&phases, exponent))?)))
+            .map(|&count| Ok(cell(wall_impact(count + 1, TAPERED, bathe, 2.5e-4, (&phases, taper))?)))
             .collect();
-        writeln!(table, "| {exponent} | {} |", cells?.join(" | "))?;
+        let [exponent, softening] = taper;
+        writeln!(table, "| {exponent} | {softening} | {} |", cells?.join(" | "))?;
     }
     Ok(table)
 }
@@ -98,7 +102,7 @@ pub(crate) fn resolution(quick: bool) -> Table {
         let cutoff = std::f64::consts::TAU * count as f64 / duration;
         let mut cells = Vec::new();
         for h in [2e-3, 1e-3, 5e-4, 2.5e-4] {
-            let error = wall_impact(count + 1, TAPERED, bathe, h, (&phases, 3.0))?.error;
+            let error = wall_impact(count + 1, TAPERED, bathe, h, (&phases, TAPER))?.error;
             cells.push(format!("{} ({})", decimal(error * cutoff * duration, 2), decimal(cutoff * h, 2)));
         }
         writeln!(table, "| {count} | {} | {} |", decimal(cutoff * duration, 0), cells.join(" | "))?;

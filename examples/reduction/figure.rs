@@ -3,7 +3,7 @@
 use crate::bars::{TAPERED, bathe};
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, VERMILION, banner};
-use contact_dynamics_scenes::reduced::{Model, wall_exact, wall_force};
+use contact_dynamics_scenes::reduced::{Model, TAPER, wall_exact, wall_force};
 use std::error::Error;
 
 /// Step, and modes.
@@ -21,7 +21,7 @@ pub(crate) fn figure() -> Result<String, Box<dyn Error>> {
         points,
     };
     let run = |model| -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
-        let (forces, _) = wall_force(MODES + 1, model, bathe, H, [0.5, 3.0])?;
+        let (forces, _) = wall_force(MODES + 1, model, bathe, H, (0.5, TAPER))?;
         Ok(forces.into_iter().map(|(t, force)| (t, force / largest)).collect())
     };
     let step = vec![(0.0, 0.0), (start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0), (0.4, 0.0)];

@@ -17,12 +17,14 @@ use faer::sparse::SparseColMatRef;
 #[non_exhaustive]
 pub enum Boundary {
     /// Massless contact dofs on the residual flexibility, the modes tapered toward the highest: the contact force is
-    /// smooth. Statically a little softer than the body: see [`Accuracy`].
+    /// smooth. Statically a little softer than the body: see [`Accuracy`]. For parents with a plain mass matrix: where
+    /// contact dofs of the parent have no mass already it is too soft.
     #[default]
     Tapered,
     /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
     /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
-    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more.
+    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more; not where
+    /// contact dofs of the parent have no mass and the modes are many times as many as these.
     Untapered,
     /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6, 1968).
     /// Statically exact; contact dofs have mass. Known failure: that mass is struck, and the force rings and jumps as
@@ -36,7 +38,8 @@ pub struct Accuracy {
     /// The share of the static compliance at a contact dof, without rigid motion, that is not in the modes: the largest
     /// of all contact dofs. None for [`Boundary::CraigBampton`], whose modes do not see the contact dofs.
     pub residual: Option<f64>,
-    /// By how much, relatively, that compliance is larger than the parent's: twice the residual if tapered, else zero.
+    /// By how much, relatively, that compliance is larger than the parent's: [`Reduction::softening`] times the
+    /// residual if tapered, else zero.
     pub compliance: f64,
     /// The first circular frequency that is not in the modes (1/time). A contact that lasts T has its force resolved to
     /// times of about 1/ω: mean errors were found to be about 2/(ω T) where bodies touch at a point.
@@ -64,7 +67,7 @@ enum Damping<'a> {
 /// \end{aligned}
 /// ```
 ///
-/// which over (η, u_b) has M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
+/// (3 R is what is statically exact, and twice as much again: [`softening`](Self::softening)), which over (η, u_b) has M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
 /// schemes for [dofs without mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and
 /// no corrector.
 ///
@@ -103,6 +106,7 @@ pub struct Reduction<'a, T: Real> {
     fixed: Vec<usize>,
     boundary: Boundary,
     exponent: f64,
+    softening: f64,
     damping: Damping<'a>,
     load: Option<Vec<T>>,
 }
@@ -141,6 +145,7 @@ impl<'a, T: Real> Reduction<'a, T> {
             fixed: Vec::new(),
             boundary: Boundary::default(),
             exponent: 3.0,
+            softening: 2.0,
             damping: Damping::None,
             load: None,
         }
@@ -163,6 +168,13 @@ impl<'a, T: Real> Reduction<'a, T> {
     #[must_use]
     pub fn exponent(self, exponent: f64) -> Self {
         Self { exponent, ..self }
+    }
+
+    /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2. With 0
+    /// statics are exact, and the force overshoots several times as far (`docs/reduction.md`).
+    #[must_use]
+    pub fn softening(self, times: f64) -> Self {
+        Self { softening: times, ..self }
     }
 
     /// Damping of the modes by a share of the critical one, given for each circular frequency; replaces damping given
@@ -292,6 +304,10 @@ impl<'a, T: Real> Reduction<'a, T> {
             let name = "the exponent of the taper";
             return Err(Error::Parameter { name, value: self.exponent, range: "finite and at least 1" });
         }
+        if !(self.softening >= 0.0 && self.softening.is_finite()) {
+            let (name, value) = ("the softening of a tapered reduction", self.softening);
+            return Err(Error::Parameter { name, value, range: "finite and not negative" });
+        }
         let Some(load) = &self.load else { return Ok(()) };
         let what = "the constant load of a reduced body";
         if load.len() != dofs {
@@ -327,7 +343,8 @@ impl<'a, T: Real> Reduction<'a, T> {
                 *share = of_mode(k, 1.0 - squares[k]) * at(k, contact);
             }
         }
-        let times = if tapered { 3.0 } else { 1.0 };
+        let softening = if tapered { self.softening } else { 0.0 };
+        let times = 1.0 + softening;
         let mut fields: Vec<f64> = residual.iter().map(|x| times * x).collect();
         add_product(1.0, n, &modes.shapes, &shares, &mut fields);
         let entry = |i: usize, j: usize| 0.5 * (fields[j * n + places[i]] + fields[i * n + places[j]]);
@@ -338,8 +355,7 @@ impl<'a, T: Real> Reduction<'a, T> {
             if left > 0.0 { left / (left + taken) } else { 0.0 }
         };
         let largest = (0..contacts).map(share).fold(0.0, f64::max);
-        let compliance = if tapered { 2.0 * largest } else { 0.0 };
-        let accuracy = Accuracy { residual: Some(largest), compliance, cutoff };
+        let accuracy = Accuracy { residual: Some(largest), compliance: softening * largest, cutoff };
         Ok(Interface { sigma: squares.into_iter().map(f64::sqrt).collect(), fields, stiffness, accuracy })
     }
 
@@ -401,7 +417,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         // As if the load were one more contact force: S of the load, less what the contact dofs have of it.
         if self.boundary == Boundary::Tapered {
             for x in &mut rest {
-                *x *= 3.0;
+                *x *= 1.0 + self.softening;
             }
         }
         let mut shares = vec![0.0; modes.count()];

@@ -311,7 +311,8 @@ impl Modes {
             pencil.mass_product(&rest, &mut products);
             remove(n, rigid, &products, &mut rest);
             for residual in lengths(pencil, &rest) {
-                within(mode, residual, tolerance)?;
+                let blurred = pencil.blur / (self.frequencies[mode].powi(2) + pencil.shift);
+                within(mode, residual, tolerance + blurred)?;
                 worst = worst.max(residual);
                 mode += 1;
             }

@@ -33,6 +33,8 @@ pub(super) struct Pencil {
     /// Free dofs with mass: there are so many finite eigenvalues.
     pub(super) rank: usize,
     pub(super) shift: f64,
+    /// What rounding of K leaves of an eigenvalue, at most.
+    pub(super) blur: f64,
     factor: Box<dyn Factorization<f64>>,
     /// Factorizations so far.
     pub(super) factorizations: usize,
@@ -130,6 +132,7 @@ impl Pencil {
             dofs,
             rank: ratios.len(),
             shift,
+            blur: 16.0 * f64::EPSILON * median,
             by_mass: Product::new(m, Symmetry::Symmetric),
             by_stiffness: Product::new(k, Symmetry::Symmetric),
             factor: Automatic.analyze(sum.pattern(), &[])?,

@@ -3,7 +3,7 @@
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, Newmark, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
-use contact_dynamics_scenes::reduced::{Model, Struck, bounces, collision, wall_impact};
+use contact_dynamics_scenes::reduced::{Model, Struck, TAPER, bounces, collision, wall_impact};
 
 const TAPERED: Model = Model::Reduced(Boundary::Tapered);
 const UNTAPERED: Model = Model::Reduced(Boundary::Untapered);
@@ -17,7 +17,7 @@ fn conservative() -> Box<dyn TimeIntegrator> {
 }
 
 fn wall(unknowns: usize, model: Model, h: f64) -> Struck {
-    wall_impact(unknowns, model, conservative, h, (&[0.15, 0.45, 0.75], 3.0)).unwrap()
+    wall_impact(unknowns, model, conservative, h, (&[0.15, 0.45, 0.75], TAPER)).unwrap()
 }
 
 #[test]

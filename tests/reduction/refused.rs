@@ -75,6 +75,9 @@ fn contact_dofs_loads_and_settings() {
     for exponent in [0.0, 0.9, f64::NAN, f64::INFINITY] {
         assert_refused!(reduce(&[0]).exponent(exponent).modes(3), Error::Parameter { .. });
     }
+    for softening in [-0.1, f64::NAN, f64::INFINITY] {
+        assert_refused!(reduce(&[0]).softening(softening).modes(3), Error::Parameter { .. });
+    }
     assert_refused!(reduce(&[0]).damping_ratio(|_| -0.1).modes(3), Error::Parameter { value: -0.1, .. });
     assert_refused!(reduce(&[0]).rayleigh(0.0, f64::NAN).modes(3), Error::Parameter { .. });
     // All modes leave nothing between them and the contact dofs, and one that is left does not do for two of these.

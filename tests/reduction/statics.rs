@@ -90,6 +90,17 @@ fn forces_at_contact_dofs_have_their_static_response() {
     }
 }
 
+#[test]
+fn a_taper_without_softening_is_statically_exact() {
+    let plate = Plate::new();
+    let mut load = vec![0.0; plate.stiffness.nrows()];
+    plate.contact.iter().enumerate().for_each(|(k, &dof)| load[dof] = (2.0 + k as f64).cos());
+    let body = plate.reduction(Boundary::Tapered).softening(0.0).modes(9).unwrap();
+    let x = solve(&body, &body.load(&load).unwrap());
+    assert_close(&body.recover_displacement(&x).unwrap(), &plate.solve(&load), 1e-9);
+    assert_eq!(body.accuracy().compliance, 0.0);
+}
+
 /// The taper adds 2R to the static compliance, R found here from the modes and K⁻¹ by itself.
 #[test]
 fn the_taper_adds_twice_the_residual_flexibility() {

@@ -16,6 +16,9 @@ pub const PARENT: usize = 1000;
 const SPEED: f64 = 0.05;
 const IMPACT: f64 = 0.1;
 
+/// Exponent and softening of the taper as they are by default.
+pub const TAPER: [f64; 2] = [3.0, 2.0];
+
 /// How a bar is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
@@ -56,14 +59,14 @@ pub struct Striker {
 }
 
 impl Striker {
-    /// A bar with so many unknowns; its weight is a constant load. `exponent` is that of the taper.
+    /// A bar with so many unknowns; its weight is a constant load. Exponent and softening are those of the taper.
     pub fn new(
         bar: &WallBar,
         unknowns: usize,
         model: Model,
         scheme: &dyn TimeIntegrator,
         h: f64,
-        exponent: f64,
+        [exponent, softening]: [f64; 2],
     ) -> Result<Self> {
         let Model::Reduced(boundary) = model else {
             let bar = WallBar { elements: unknowns - 1, ..*bar };
@@ -77,7 +80,8 @@ impl Striker {
         let bar = WallBar { elements: PARENT, ..*bar };
         let (mass, stiffness) = (bar.consistent_mass(), bar.stiffness());
         let weight: Vec<f64> = bar.mass().iter().map(|m| -bar.gravity * m).collect();
-        let reduction = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(boundary).exponent(exponent);
+        let reduction = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(boundary);
+        let reduction = reduction.exponent(exponent).softening(softening);
         let body = reduction.constant_load(&weight).modes(unknowns - 1)?;
         // Contact dofs with mass take the correction that belongs to them.
         let correctors: Vec<Box<dyn Corrector<f64>>> = match boundary {
@@ -166,11 +170,11 @@ pub fn wall_force(
     model: Model,
     scheme: fn() -> Box<dyn TimeIntegrator>,
     h: f64,
-    [phase, exponent]: [f64; 2],
+    (phase, taper): (f64, [f64; 2]),
 ) -> Result<(Forces, f64)> {
     let bar = paper_bar(PARENT);
     let gap = bar.height + phase * h * SPEED;
-    let mut run = Striker::new(&bar, unknowns, model, &*scheme(), h, exponent)?.flying(-SPEED, gap, scheme(), h)?;
+    let mut run = Striker::new(&bar, unknowns, model, &*scheme(), h, taper)?.flying(-SPEED, gap, scheme(), h)?;
     let (late, before) = (late(&*scheme(), h), run.energy().total());
     let mut forces = Vec::new();
     while run.time() < 4.0 * IMPACT - 0.5 * h {
@@ -193,11 +197,11 @@ pub fn wall_impact(
     model: Model,
     scheme: fn() -> Box<dyn TimeIntegrator>,
     h: f64,
-    (phases, exponent): (&[f64], f64),
+    (phases, taper): (&[f64], [f64; 2]),
 ) -> Result<Struck> {
     let mut all = Vec::new();
     for &phase in phases {
-        let (forces, energy) = wall_force(unknowns, model, scheme, h, [phase, exponent])?;
+        let (forces, energy) = wall_force(unknowns, model, scheme, h, (phase, taper))?;
         all.push((errors(&forces, &wall_exact(h, phase), h), (energy - 1.0).abs()));
     }
     Ok(summary(&all))
@@ -287,7 +291,7 @@ pub fn bounces(unknowns: usize, model: Model, scheme: fn() -> Box<dyn TimeIntegr
     let bar = WallBar::bouncing(PARENT);
     let exact = BouncingBar::doyen();
     let h = 2.0 * bar.length / bar.wave_speed() / steps;
-    let striker = Striker::new(&bar, unknowns, model, &*scheme(), h, 3.0)?;
+    let striker = Striker::new(&bar, unknowns, model, &*scheme(), h, TAPER)?;
     let load = striker.load.clone();
     let mut run = striker.flying(0.0, bar.height, scheme(), h)?;
     let (period, late) = (exact.period(), late(&*scheme(), h));
