@@ -477,7 +477,9 @@ fn purified(pencil: &mut Pencil, vectors: Vec<f64>) -> Result<Vec<f64>> {
     pencil.solve(&mut pure)?;
     let lengths = lengths(pencil, &pure);
     for (vector, length) in pure.chunks_exact_mut(n).zip(lengths) {
-        vector.iter_mut().for_each(|x| *x /= length);
+        for x in vector {
+            *x /= length;
+        }
     }
     Ok(pure)
 }
