@@ -33,6 +33,15 @@ struct Fall {
 }
 
 impl Fall {
+    fn of(mut run: Simulation<'static, f64>, until: f64) -> Result<Self> {
+        let (before, mut forces) = (run.energy().total(), Vec::new());
+        while run.time() < until {
+            run.step()?;
+            forces.push(run.state().contacts().forces().iter().sum());
+        }
+        Ok(Self { forces, energy: run.energy().total() / before })
+    }
+
     fn largest(&self) -> f64 {
         self.forces.iter().copied().fold(0.0, f64::max)
     }
@@ -95,18 +104,9 @@ impl Block {
         Simulation::builder(system, trapezoidal(), self.h).velocity(velocity).constraint(rows).build()
     }
 
-    fn fall(&self, mut run: Simulation<'static, f64>, until: f64) -> Result<Fall> {
-        let (before, mut forces) = (run.energy().total(), Vec::new());
-        while run.time() < until {
-            run.step()?;
-            forces.push(run.state().contacts().forces().iter().sum());
-        }
-        Ok(Fall { forces, energy: run.energy().total() / before })
-    }
-
     fn full(&self, until: f64) -> Result<Fall> {
         let system = LinearSystem::new(self.mass.clone(), self.stiffness.clone())?;
-        self.fall(self.run(system, &self.contact, self.velocity.clone())?, until)
+        Fall::of(self.run(system, &self.contact, self.velocity.clone())?, until)
     }
 
     /// Reduced to modes of a parent: itself, or the body with a plain consistent mass.
@@ -120,7 +120,7 @@ impl Block {
         let reduction = Reduction::new(parent.as_ref(), self.stiffness.as_ref(), &self.contact).boundary(boundary);
         let body = reduction.with_modes(modes)?;
         let contact: Vec<usize> = body.contact_dofs().collect();
-        self.fall(self.run(body.system()?, &contact, body.velocity(&self.velocity)?)?, until)
+        Fall::of(self.run(body.system()?, &contact, body.velocity(&self.velocity)?)?, until)
     }
 
     /// Rows of a table: the full model, then numbers of modes of both parents.

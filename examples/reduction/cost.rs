@@ -72,6 +72,9 @@ pub(crate) fn steps(quick: bool) -> Table {
     Ok(table)
 }
 
+/// Name, consistent mass, stiffness, lumped mass.
+type Large = (String, SparseColMat<usize, f64>, SparseColMat<usize, f64>, Vec<f64>);
+
 /// A hundred modes of large bodies, over one factorization of their K + M.
 pub(crate) fn modes(quick: bool) -> Table {
     let plate = |cells: usize| {
@@ -86,7 +89,6 @@ pub(crate) fn modes(quick: bool) -> Table {
         let bar = contact_dynamics_scenes::wall_bar::WallBar::bouncing(elements);
         (format!("bar of {elements} elements"), bar.consistent_mass(), bar.stiffness(), bar.mass())
     };
-    type Large = (String, SparseColMat<usize, f64>, SparseColMat<usize, f64>, Vec<f64>);
     let bodies: Vec<Large> =
         if quick { vec![bar(10_000), plate(70), block(10)] } else { vec![bar(100_000), plate(223), block(20)] };
     let mut table = String::from(

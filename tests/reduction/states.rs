@@ -2,7 +2,7 @@
 
 use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef};
 use contact_dynamics::reduction::{Blocks, Boundary, ReducedBody, Reduction};
-use contact_dynamics::{Bathe, LinearRows, Simulation, System};
+use contact_dynamics::{Bathe, LinearRows, Real, Simulation, System};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{diagonal, entries, matrix, product, springs};
 
@@ -124,7 +124,7 @@ fn powers_of_two_change_no_bit() {
         for i in 0..17 {
             for j in 0..17 {
                 let [x, y] = [value(one.stiffness(), i, j), value(other.stiffness(), i, j)];
-                assert!(x * unit(i) * unit(j) == y, "{boundary:?} {i} {j}: {x} {y}");
+                assert!((x * unit(i) * unit(j) - y).abs() <= 0.0, "{boundary:?} {i} {j}: {x} {y}");
             }
         }
     }
@@ -142,7 +142,7 @@ fn damping_is_that_of_the_modes() {
         assert!((y - 0.2 - 1e-3 * omega * omega).abs() <= 1e-12 * (1.0 + y), "{k}");
     }
     let contact = ratio.contact_dofs().start;
-    assert_eq!(value(ratio.damping().unwrap(), contact, contact), 0.0);
+    assert!(value(ratio.damping().unwrap(), contact, contact).abs() <= 0.0);
     assert!(reduction().modes(9).unwrap().damping().is_none());
     // Of contact dofs with mass it is that of the whole.
     let whole = reduction().boundary(Boundary::CraigBampton).rayleigh(0.2, 1e-3).modes(9).unwrap();
@@ -192,7 +192,7 @@ fn bodies_stand_side_by_side() {
 fn single_precision_reduces_like_double() {
     let (solid, m, k) = block();
     let (pattern, values) = m.clone().into_parts();
-    let single = SparseColMat::new(pattern, values.into_iter().map(|x| x as f32).collect());
+    let single = SparseColMat::new(pattern, values.into_iter().map(f32::of).collect());
     let other = solid.stiffness::<f32>();
     let body = Reduction::new(single.as_ref(), other.as_ref(), &[0, 1]).modes(10).unwrap();
     let double = Reduction::new(m.as_ref(), k.as_ref(), &[0, 1]).modes(10).unwrap();

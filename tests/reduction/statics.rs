@@ -85,7 +85,7 @@ fn forces_at_contact_dofs_have_their_static_response() {
             assert!(largest(&reduced[..count]) < 1e-10, "{boundary:?}");
             let x = solve(&body, &reduced);
             assert_close(&body.recover_displacement(&x).unwrap(), &exact, 1e-9);
-            assert_eq!(body.accuracy().compliance, 0.0);
+            assert!(body.accuracy().compliance.abs() <= 0.0);
         }
     }
 }
@@ -98,7 +98,7 @@ fn a_taper_without_softening_is_statically_exact() {
     let body = plate.reduction(Boundary::Tapered).softening(0.0).modes(9).unwrap();
     let x = solve(&body, &body.load(&load).unwrap());
     assert_close(&body.recover_displacement(&x).unwrap(), &plate.solve(&load), 1e-9);
-    assert_eq!(body.accuracy().compliance, 0.0);
+    assert!(body.accuracy().compliance.abs() <= 0.0);
 }
 
 /// The taper adds 2R to the static compliance, R found here from the modes and K⁻¹ by itself.
@@ -127,7 +127,7 @@ fn the_taper_adds_twice_the_residual_flexibility() {
     let accuracy = body.accuracy();
     assert!((accuracy.residual.unwrap() / worst - 1.0).abs() < 1e-9 && accuracy.compliance < 1.0);
     assert!((accuracy.compliance / (2.0 * worst) - 1.0).abs() < 1e-9);
-    assert_eq!(accuracy.cutoff, modes.next_frequency());
+    assert!((accuracy.cutoff - modes.next_frequency()).abs() <= 0.0);
 }
 
 #[test]
