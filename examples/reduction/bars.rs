@@ -115,8 +115,8 @@ pub(crate) fn pairs(quick: bool) -> Table {
     let phases = phases(quick);
     let counts: &[usize] = if quick { &[20] } else { &[20, 50, 100] };
     let mut table = String::from(
-        "Dissimilar bars (E = 49 and 100, h = 0.5 ms): mean error of the force (worst overshoot), worst change of energy; \
-         bouncing bar, 200 steps a contact: mean error of the force\n\n\
+        "Dissimilar bars (E = 49 and 100, h = 0.5 ms): mean error of the force (worst overshoot), worst change of \
+         energy; bouncing bar, 200 steps a contact: mean error of the force\n\n\
          | r | scheme | models | dissimilar bars | energy | bouncing bar |\n| --- | --- | --- | --- | --- | --- |\n",
     );
     let bars = Bars::dissimilar(1);

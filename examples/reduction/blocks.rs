@@ -150,8 +150,8 @@ impl Block {
     }
 }
 
-const HEAD: &str = "| falls | model | tapered: error | largest | energy | untapered: error | largest | energy | massless \
-                    parent, tapered: error | largest | untapered: error | largest |\n\
+const HEAD: &str = "| falls | model | tapered: error | largest | energy | untapered: error | largest | energy | \
+                    massless parent, tapered: error | largest | untapered: error | largest |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 /// The square.
@@ -159,8 +159,8 @@ pub(crate) fn plane(quick: bool) -> Table {
     let (cells, counts): (usize, &[usize]) = if quick { (8, &[20, 50]) } else { (16, &[20, 50, 100, 200, 400]) };
     let force = SOFT.density * SOFT.wave_speed();
     let mut table = format!(
-        "Block of {cells}² quad4 in plane strain on a rigid plane, trapezoidal rule, total force against the full model \
-         with massless contact nodes (its own largest; a plane wave presses with {})\n\n{HEAD}",
+        "Block of {cells}² quad4 in plane strain on a rigid plane, trapezoidal rule, total force against the full \
+         model with massless contact nodes (its own largest; a plane wave presses with {})\n\n{HEAD}",
         decimal(force, 1)
     );
     for (name, tilt) in [("flat", 0.0), ("tilted by 0.02", 0.02)] {

@@ -9,7 +9,7 @@ use crate::system::LinearSystem;
 use faer::sparse::SparseColMatRef;
 use std::ops::Range;
 
-/// Bodies, reduced or not, side by side in one [`LinearSystem`]: block-diagonal matrices, dofs one body after the other.
+/// Bodies, reduced or not, side by side in one [`LinearSystem`]: block-diagonal matrices, one body after the other.
 ///
 /// ```
 /// use contact_dynamics::System;

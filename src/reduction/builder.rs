@@ -23,8 +23,8 @@ pub enum Boundary {
     Tapered,
     /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
     /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
-    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more; not where
-    /// contact dofs of the parent have no mass and the modes are many times as many as these.
+    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more; not
+    /// where contact dofs of the parent have no mass and the modes are many times as many as these.
     Untapered,
     /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6, 1968).
     /// Statically exact; contact dofs have mass. Known failure: that mass is struck, and the force rings and jumps as
@@ -67,7 +67,8 @@ enum Damping<'a> {
 /// \end{aligned}
 /// ```
 ///
-/// (3 R is what is statically exact, and twice as much again: [`softening`](Self::softening)), which over (η, u_b) has M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
+/// (of 3 R one R is what statics ask for, the others are [`softening`](Self::softening)). Over (η, u_b) this has
+/// M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
 /// schemes for [dofs without mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and
 /// no corrector.
 ///

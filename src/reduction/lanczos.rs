@@ -26,7 +26,7 @@ const CONVERGED: f64 = 1e-10;
 pub(super) struct Pairs {
     /// Eigenvalues of K − λM as Ritz's values say.
     pub(super) values: Vec<f64>,
-    /// Their places among the columns of `vectors`.
+    /// Their vectors over the first `size` of the basis, column by column.
     vectors: Vec<f64>,
     size: usize,
 }
@@ -123,7 +123,7 @@ impl Lanczos {
             }
             let norm = norms(n, vector, product)[0];
             if !norm.is_finite() {
-                return Err(Error::Singular { matrix: "stiffness matrix with a share of the mass", dof: 0 });
+                return Err(Error::ModeResidual { mode: self.count, residual: norm, tolerance: NOTHING });
             }
             if norm <= NOTHING * before[k] {
                 continue;
