@@ -20,6 +20,7 @@ pages! {
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";
     Performance = "docs/performance.md";
+    Reduction = "docs/reduction.md";
     Bars = "docs/tutorials/bars.md";
     OwnSystem = "docs/tutorials/own_system.md";
     OwnConstraint = "docs/tutorials/own_constraint.md";

@@ -253,6 +253,33 @@ pub enum Error {
         /// What it must be.
         tolerance: f64,
     },
+    /// A mode does not fulfill K φ = ω² M φ, or is not orthonormal to the others.
+    #[error(
+        "mode {mode} leaves a residual of {residual:e}, tolerance {tolerance:e}; of given modes look at their order of \
+         dofs, their units and their normalization (φᵀMφ = 1), of computed ones at masses or stiffnesses that differ \
+         by many powers of ten"
+    )]
+    ModeResidual {
+        /// The mode, counted from 0.
+        mode: usize,
+        /// What it leaves, relative to itself.
+        residual: f64,
+        /// What it may leave.
+        tolerance: f64,
+    },
+    /// Not all modes below a frequency are there.
+    #[error(
+        "{found} modes below the circular frequency {frequency:e} (1/time) where the inertia of K − ω²M counts \
+         {expected}; give those that are missing, and rigid motions too"
+    )]
+    ModesMissed {
+        /// Modes found or given.
+        found: usize,
+        /// Modes that there are.
+        expected: usize,
+        /// The frequency.
+        frequency: f64,
+    },
     /// A factorization does not fit into memory or its index range.
     #[error("no memory for {what}")]
     OutOfMemory {

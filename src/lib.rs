@@ -24,6 +24,7 @@ pub mod observer;
 pub mod partitioned;
 mod preset;
 mod real;
+pub mod reduction;
 pub mod reference;
 mod scalar;
 mod simulation;

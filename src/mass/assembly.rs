@@ -1,4 +1,4 @@
-//! Mass matrices assembled from lists of entries, and checks of lists of dofs.
+//! Matrices assembled from lists of entries, and checks of lists of dofs.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -23,7 +23,7 @@ pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<V
 }
 
 /// The square matrix of these entries (row, column, value), those in the same place summed in their order.
-pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
+pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
     entries.sort_by_key(|&(row, column, _)| (column, row));
     let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());
     let mut last = None;
@@ -43,6 +43,6 @@ pub(super) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)
     }
     let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
         .to_owned()
-        .map_err(|_| Error::OutOfMemory { what: "the pattern of a mass matrix" })?;
+        .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix" })?;
     Ok(SparseColMat::new(pattern, values))
 }

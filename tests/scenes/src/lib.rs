@@ -28,6 +28,7 @@ pub mod particles;
 pub mod plot;
 pub mod pounding;
 pub mod random;
+pub mod reduced;
 pub mod schemes;
 pub mod second_order;
 pub mod slabs;

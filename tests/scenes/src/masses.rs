@@ -21,6 +21,14 @@ impl MassMatrix {
         }
     }
 
+    /// The matrix.
+    pub fn into_matrix(self) -> SparseColMat<usize, f64> {
+        match self {
+            Self::Lumped(mass) => crate::sparse::diagonal(&mass),
+            Self::Matrix(mass) => mass,
+        }
+    }
+
     /// The sum of each row.
     pub fn row_sums(&self) -> Vec<f64> {
         match self {

@@ -1,0 +1,34 @@
+//! Bodies reduced to a few modes and their contact dofs: how right the contact force is, and what it costs.
+//!
+//! `cargo run --release --example reduction -- --output target/reduction` prints the tables of `docs/reduction.md` and
+//! writes them and a figure; with `--quick` steps, phases and bodies are fewer.
+//!
+//! `bars.rs` has bars against a wall and each other, `blocks.rs` blocks in the plane and in space, `cost.rs` times,
+//! `figure.rs` the force over time.
+
+mod bars;
+mod blocks;
+mod cost;
+mod figure;
+
+use contact_dynamics_scenes::output::Output;
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let output = Output::from_command_line("reduction")?;
+    let quick = output.quick;
+    let tables = [
+        bars::wall(quick)?,
+        bars::exponents(quick)?,
+        bars::resolution(quick)?,
+        bars::pairs(quick)?,
+        blocks::plane(quick)?,
+        blocks::space(quick)?,
+        cost::steps(quick)?,
+        cost::modes(quick)?,
+    ];
+    let page = tables.join("\n");
+    println!("{page}");
+    output.write("reduction.md", &page)?;
+    output.write("reduction.svg", &figure::figure()?)
+}

@@ -1,0 +1,462 @@
+//! How a body is reduced: supports, contact dofs, the treatment of what the modes leave, damping, constant loads.
+
+use super::body::{Parts, ReducedBody};
+use super::modes::{Modes, Wanted};
+use super::pencil::{self, Pencil};
+use super::residual::response;
+use crate::dense::DenseCholesky;
+use crate::error::{Error, Result};
+use crate::kernels::dense::{add_product, transposed_product};
+use crate::real::Real;
+use faer::sparse::SparseColMatRef;
+
+/// What stands between the modes and the contact dofs.
+///
+/// `docs/reduction.md` measures all of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Boundary {
+    /// Massless contact dofs on the residual flexibility, the modes tapered toward the highest: the contact force is
+    /// smooth. Statically a little softer than the body: see [`Accuracy`]. For parents with a plain mass matrix: where
+    /// contact dofs of the parent have no mass already it is too soft.
+    #[default]
+    Tapered,
+    /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
+    /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
+    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more; not
+    /// where contact dofs of the parent have no mass and the modes are many times as many as these.
+    Untapered,
+    /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6, 1968).
+    /// Statically exact; contact dofs have mass. Known failure: that mass is struck, and the force rings and jumps as
+    /// with any scheme on dofs with mass; take it with a corrector.
+    CraigBampton,
+}
+
+/// How far a reduced body is from its parent, as far as the build can tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// The share of the static compliance at a contact dof, without rigid motion, that is not in the modes: the largest
+    /// of all contact dofs. None for [`Boundary::CraigBampton`], whose modes do not see the contact dofs.
+    pub residual: Option<f64>,
+    /// By how much, relatively, that compliance is larger than the parent's: [`Reduction::softening`] times the
+    /// residual if tapered, else zero.
+    pub compliance: f64,
+    /// The first circular frequency that is not in the modes (1/time). A contact that lasts T has its force resolved to
+    /// times of about 1/ω: mean errors were found to be about 2/(ω T) where bodies touch at a point.
+    pub cutoff: f64,
+}
+
+enum Damping<'a> {
+    None,
+    Ratio(Box<dyn Fn(f64) -> f64 + 'a>),
+    Rayleigh([f64; 2]),
+}
+
+/// Reduces a body to normal modes η and its contact dofs u_b, as a builder.
+///
+/// The body is given by M and K as a [`LinearSystem`](crate::LinearSystem) takes them, with or without supports, and
+/// by the dofs that contact acts on: normal ones, and tangential ones if there is friction. With the modes φ_k, ω_k and
+/// weights σ_k² = 1 − (ω_k/ω_c)³, ω_c the first frequency left out,
+///
+/// ```math
+/// \begin{aligned}
+/// & \ddot\eta + \Omega^2 \eta = P^T \lambda + \Sigma \Phi^T f, \qquad u_b = P \eta + F \lambda, \qquad
+///   P = \Phi_b \Sigma \\
+/// & F = \sum_k (1 - \sigma_k^2) \frac{\varphi_{b,k} \varphi_{b,k}^T}{\omega_k^2} + 3 R, \qquad
+///   R = \sum_{\text{left out}} \frac{\varphi_{b,k} \varphi_{b,k}^T}{\omega_k^2}
+/// \end{aligned}
+/// ```
+///
+/// (of 3 R one R is what statics ask for, the others are [`softening`](Self::softening)). Over (η, u_b) this has
+/// M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
+/// schemes for [dofs without mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and
+/// no corrector.
+///
+/// ```
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::reduction::Reduction;
+/// use contact_dynamics::{Bathe, LinearRows, Simulation};
+///
+/// // A bar of 200 elements (c = 100, ρA = 1, L = 10) flies at a wall with v = −1: force ρ A c v = 100 for 2L/c = 0.2.
+/// let (n, size) = (200, 0.05);
+/// let bar = |diagonal: f64, off: f64| {
+///     let element = |e: usize| [(e, e, diagonal), (e + 1, e + 1, diagonal), (e, e + 1, off), (e + 1, e, off)];
+///     let entries: Vec<_> = (0..n).flat_map(element).map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+///     SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &entries)
+/// };
+/// let (m, k) = (bar(size / 3.0, size / 6.0)?, bar(1e4 / size, -1e4 / size)?);
+/// let body = Reduction::new(m.as_ref(), k.as_ref(), &[0]).modes(20)?;
+/// assert_eq!((body.dofs(), body.rigid()), (21, 1));
+///
+/// let end = body.contact_dofs().start;
+/// let mut run = Simulation::builder(body.system()?, Bathe::with_radius(1.0)?, 1e-3)
+///     .velocity(body.velocity(&vec![-1.0; n + 1])?)
+///     .constraint(LinearRows::new().unilateral(&[(end, 1.0)], 0.05))
+///     .build()?;
+/// run.run_until(0.15, &mut ())?;
+/// assert!((run.state().contacts().forces()[0] / 100.0 - 1.0).abs() < 0.05);
+/// run.run_until(0.5, &mut ())?;
+/// let field = body.recover_velocity(run.state().velocity())?;
+/// assert!((field.iter().sum::<f64>() / 201.0 - 1.0).abs() < 0.02); // it flies back
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Reduction<'a, T: Real> {
+    mass: SparseColMatRef<'a, usize, T>,
+    stiffness: SparseColMatRef<'a, usize, T>,
+    contact: Vec<usize>,
+    fixed: Vec<usize>,
+    boundary: Boundary,
+    exponent: f64,
+    softening: f64,
+    damping: Damping<'a>,
+    load: Option<Vec<T>>,
+}
+
+impl<T: Real> std::fmt::Debug for Reduction<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let contact = self.contact.len();
+        f.debug_struct("Reduction").field("contact", &contact).field("boundary", &self.boundary).finish_non_exhaustive()
+    }
+}
+
+/// What the modes leave at the contact dofs, in `f64`: fields on the free dofs.
+struct Interface {
+    /// Weights σ_k of the modes.
+    sigma: Vec<f64>,
+    /// Static responses S to forces at the contact dofs that go along with the modes' ones (to displacements, for
+    /// [`Boundary::CraigBampton`]), column by column.
+    fields: Vec<f64>,
+    /// F⁻¹, row by row; the stiffness of the contact dofs.
+    stiffness: Vec<f64>,
+    accuracy: Accuracy,
+}
+
+impl<'a, T: Real> Reduction<'a, T> {
+    /// Of a body with mass M and stiffness K (both triangles stored), on which contact acts at the dofs `contact`, in
+    /// any order. Everything is checked when modes are asked for.
+    pub fn new(
+        mass: SparseColMatRef<'a, usize, T>,
+        stiffness: SparseColMatRef<'a, usize, T>,
+        contact: &[usize],
+    ) -> Self {
+        Self {
+            mass,
+            stiffness,
+            contact: contact.to_vec(),
+            fixed: Vec::new(),
+            boundary: Boundary::default(),
+            exponent: 3.0,
+            softening: 2.0,
+            damping: Damping::None,
+            load: None,
+        }
+    }
+
+    /// Holds dofs at zero displacement; replaces supports given before.
+    #[must_use]
+    pub fn fix(self, dofs: &[usize]) -> Self {
+        Self { fixed: dofs.to_vec(), ..self }
+    }
+
+    /// What stands between the modes and the contact dofs; default [`Boundary::Tapered`].
+    #[must_use]
+    pub fn boundary(self, boundary: Boundary) -> Self {
+        Self { boundary, ..self }
+    }
+
+    /// The exponent p of the taper σ² = 1 − (ω/ω_c)^p; default 3. The larger, the more modes count fully, and the
+    /// more the force overshoots (`docs/reduction.md`).
+    #[must_use]
+    pub fn exponent(self, exponent: f64) -> Self {
+        Self { exponent, ..self }
+    }
+
+    /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2. With 0
+    /// statics are exact, and the force overshoots several times as far (`docs/reduction.md`).
+    #[must_use]
+    pub fn softening(self, times: f64) -> Self {
+        Self { softening: times, ..self }
+    }
+
+    /// Damping of the modes by a share of the critical one, given for each circular frequency; replaces damping given
+    /// before. Rigid motions are not damped, nor what follows statically.
+    #[must_use]
+    pub fn damping_ratio(self, ratio: impl Fn(f64) -> f64 + 'a) -> Self {
+        Self { damping: Damping::Ratio(Box::new(ratio)), ..self }
+    }
+
+    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s), of the modes alone; replaces damping given
+    /// before.
+    #[must_use]
+    pub fn rayleigh(self, mass: f64, stiffness: f64) -> Self {
+        Self { damping: Damping::Rayleigh([mass, stiffness]), ..self }
+    }
+
+    /// A load that does not change, such as weight: one entry for each dof of the body. The system has it, and
+    /// recovered displacements the static response to it that the modes leave.
+    #[must_use]
+    pub fn constant_load(self, load: &[T]) -> Self {
+        Self { load: Some(load.to_vec()), ..self }
+    }
+
+    /// The body reduced to the `count` modes of least frequency, rigid motions included, and its contact dofs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Modes::lowest`]; for the contact dofs [`Error::Empty`], [`Error::MissingDof`],
+    /// [`Error::RepeatedDof`] and, if one is fixed, [`Error::Incompatible`]; [`Error::Incompatible`] too if the modes
+    /// leave no flexibility between them and some contact dofs; [`Error::Dimension`] and [`Error::NotFinite`] for the
+    /// constant load, [`Error::Parameter`] for exponent and damping; [`Error::LinearNotConverged`] if a static
+    /// response is not found.
+    pub fn modes(&self, count: usize) -> Result<ReducedBody<T>> {
+        self.build(&|pencil| Modes::find(pencil, Wanted::Count(count)))
+    }
+
+    /// The body reduced to all modes with circular frequencies (1/time) up to `frequency`, and its contact dofs.
+    ///
+    /// # Errors
+    ///
+    /// As [`modes`](Self::modes) and [`Modes::up_to`].
+    pub fn up_to(&self, frequency: f64) -> Result<ReducedBody<T>> {
+        self.build(&|pencil| Modes::find(pencil, Wanted::UpTo(frequency)))
+    }
+
+    /// The body reduced to modes that are known: with supports as here; for [`Boundary::CraigBampton`] with the contact
+    /// dofs held as well.
+    ///
+    /// # Errors
+    ///
+    /// As [`modes`](Self::modes), and [`Error::Incompatible`] for modes of a body with other dofs or supports.
+    pub fn with_modes(&self, modes: &Modes) -> Result<ReducedBody<T>> {
+        self.build(&|pencil| match modes.free == pencil.free && modes.dofs() == pencil.dofs {
+            true => Ok(modes.clone()),
+            false => Err(Error::Incompatible {
+                part: format!("a set of {} modes", modes.count()),
+                reason: "they belong to a body with other dofs or supports (Craig and Bampton's modes have the contact \
+                         dofs held)",
+            }),
+        })
+    }
+
+    fn build(&self, find: &dyn Fn(&mut Pencil) -> Result<Modes>) -> Result<ReducedBody<T>> {
+        let dofs = pencil::check(self.mass, self.stiffness)?;
+        let mut free = pencil::free_dofs(dofs, &self.fixed)?;
+        self.check(dofs, &free)?;
+        if self.boundary == Boundary::CraigBampton {
+            free.retain(|dof| !self.contact.contains(dof));
+            if free.is_empty() {
+                return Err(Error::Empty { what: "the list of free dofs", remedy: "leave some for the modes" });
+            }
+        }
+        let mut pencil = Pencil::new(self.mass, self.stiffness, free)?;
+        let modes = find(&mut pencil)?;
+        let interface = match self.boundary {
+            Boundary::CraigBampton => self.held(&mut pencil, &modes)?,
+            Boundary::Tapered | Boundary::Untapered => self.massless(&mut pencil, &modes)?,
+        };
+        let damping = self.modal_damping(&modes)?;
+        let rest = self.rest(&mut pencil, &modes, &interface)?;
+        let (shapes, mut fields) = (pencil.expand(&modes.shapes), pencil.expand(&interface.fields));
+        if self.boundary == Boundary::CraigBampton {
+            self.contact.iter().enumerate().for_each(|(k, &dof)| fields[k * dofs + dof] = 1.0);
+        }
+        ReducedBody::assemble(Parts {
+            contact: self.contact.clone(),
+            fixed: self.fixed.clone(),
+            boundary: self.boundary,
+            frequencies: modes.frequencies.clone(),
+            rigid: modes.rigid(),
+            sigma: interface.sigma,
+            shapes,
+            fields,
+            weights: interface.stiffness,
+            accuracy: interface.accuracy,
+            damping,
+            rayleigh: match self.damping {
+                Damping::Rayleigh(coefficients) => Some(coefficients),
+                Damping::None | Damping::Ratio(_) => None,
+            },
+            load: self.load.clone(),
+            rest: pencil.expand(&rest),
+            mass: self.mass,
+            stiffness: self.stiffness,
+            factorizations: pencil.factorizations,
+        })
+    }
+
+    fn check(&self, dofs: usize, free: &[usize]) -> Result<()> {
+        let what = "the list of contact dofs";
+        if self.contact.is_empty() {
+            return Err(Error::Empty { what, remedy: "name the dofs that contact acts on" });
+        }
+        let mut seen = vec![false; dofs];
+        for &dof in &self.contact {
+            if dof >= dofs {
+                return Err(Error::MissingDof { what, dof, dofs });
+            }
+            if std::mem::replace(&mut seen[dof], true) {
+                return Err(Error::RepeatedDof { what, dof });
+            }
+            if free.binary_search(&dof).is_err() {
+                return Err(Error::Incompatible { part: format!("contact dof {dof}"), reason: "a support holds it" });
+            }
+        }
+        if !(self.exponent >= 1.0 && self.exponent.is_finite()) {
+            let name = "the exponent of the taper";
+            return Err(Error::Parameter { name, value: self.exponent, range: "finite and at least 1" });
+        }
+        if !(self.softening >= 0.0 && self.softening.is_finite()) {
+            let (name, value) = ("the softening of a tapered reduction", self.softening);
+            return Err(Error::Parameter { name, value, range: "finite and not negative" });
+        }
+        let Some(load) = &self.load else { return Ok(()) };
+        let what = "the constant load of a reduced body";
+        if load.len() != dofs {
+            return Err(Error::Dimension { what, expected: dofs, found: load.len() });
+        }
+        match load.iter().position(|x| !x.is_finite()) {
+            Some(index) => Err(Error::NotFinite { what, index, value: load[index].value() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Massless contact dofs on what the modes leave of the flexibility.
+    fn massless(&self, pencil: &mut Pencil, modes: &Modes) -> Result<Interface> {
+        let (n, count, contacts) = (pencil.size(), modes.count(), self.contact.len());
+        let places: Vec<usize> =
+            self.contact.iter().map(|dof| pencil.free.partition_point(|free| free < dof)).collect();
+        let mut units = vec![0.0; n * contacts];
+        places.iter().enumerate().for_each(|(k, &place)| units[k * n + place] = 1.0);
+        let residual = response(pencil, &modes.shapes, &units)?;
+        let tapered = self.boundary == Boundary::Tapered;
+        let cutoff = modes.next_frequency();
+        let square = |omega: f64| match tapered {
+            true => 1.0 - (omega / cutoff).powf(self.exponent),
+            false => 1.0,
+        };
+        let squares: Vec<f64> = modes.frequencies.iter().map(|&omega| square(omega)).collect();
+        // Flexibility of each mode that the taper leaves to the contact dofs, and all of it.
+        let of_mode = |k: usize, share: f64| if k < modes.rigid() { 0.0 } else { share / modes.frequencies[k].powi(2) };
+        let at = |k: usize, contact: usize| modes.shapes[k * n + places[contact]];
+        let mut shares = vec![0.0; count * contacts];
+        for (contact, shares) in shares.chunks_exact_mut(count).enumerate() {
+            for (k, share) in shares.iter_mut().enumerate() {
+                *share = of_mode(k, 1.0 - squares[k]) * at(k, contact);
+            }
+        }
+        let softening = if tapered { self.softening } else { 0.0 };
+        let times = 1.0 + softening;
+        let mut fields: Vec<f64> = residual.iter().map(|x| times * x).collect();
+        add_product(1.0, n, &modes.shapes, &shares, &mut fields);
+        let entry = |i: usize, j: usize| 0.5 * (fields[j * n + places[i]] + fields[i * n + places[j]]);
+        let stiffness = inverse(contacts, count, entry)?;
+        let share = |contact: usize| {
+            let left = residual[contact * n + places[contact]];
+            let taken: f64 = (0..count).map(|k| of_mode(k, 1.0) * at(k, contact).powi(2)).sum();
+            if left > 0.0 { left / (left + taken) } else { 0.0 }
+        };
+        let largest = (0..contacts).map(share).fold(0.0, f64::max);
+        let accuracy = Accuracy { residual: Some(largest), compliance: softening * largest, cutoff };
+        Ok(Interface { sigma: squares.into_iter().map(f64::sqrt).collect(), fields, stiffness, accuracy })
+    }
+
+    /// Static responses to displacements of the contact dofs, beside modes with these held.
+    fn held(&self, pencil: &mut Pencil, modes: &Modes) -> Result<Interface> {
+        let (n, count) = (pencil.size(), modes.count());
+        let coupling = pencil::part(self.stiffness, &pencil.free, &self.contact)?;
+        let mut loads = vec![0.0; n * self.contact.len()];
+        for (j, load) in loads.chunks_exact_mut(n).enumerate() {
+            let column = coupling.as_ref();
+            column.row_idx_of_col_raw(j).iter().zip(column.val_of_col(j)).for_each(|(&row, k)| load[row] = -k);
+        }
+        let mut fields = response(pencil, &modes.shapes, &loads)?;
+        let mut shares = vec![0.0; count * self.contact.len()];
+        transposed_product(n, &modes.shapes, &loads, &mut shares);
+        for shares in shares.chunks_exact_mut(count) {
+            for (k, share) in shares.iter_mut().enumerate() {
+                *share = if k < modes.rigid() { 0.0 } else { *share / modes.frequencies[k].powi(2) };
+            }
+        }
+        add_product(1.0, n, &modes.shapes, &shares, &mut fields);
+        let accuracy = Accuracy { residual: None, compliance: 0.0, cutoff: modes.next_frequency() };
+        Ok(Interface { sigma: vec![1.0; count], fields, stiffness: Vec::new(), accuracy })
+    }
+
+    /// The damping coefficient of each mode.
+    fn modal_damping(&self, modes: &Modes) -> Result<Vec<f64>> {
+        let range = "finite and not negative";
+        let check = |name, value: f64| match value >= 0.0 && value.is_finite() {
+            true => Ok(value),
+            false => Err(Error::Parameter { name, value, range }),
+        };
+        let omegas = modes.frequencies.iter();
+        match &self.damping {
+            Damping::None => Ok(Vec::new()),
+            Damping::Ratio(ratio) => omegas
+                .map(|&omega| match omega > 0.0 {
+                    true => Ok(2.0 * omega * check("the damping ratio of a mode", ratio(omega))?),
+                    false => Ok(0.0),
+                })
+                .collect(),
+            Damping::Rayleigh([mass, stiffness]) => {
+                let mass = check("Rayleigh's mass coefficient", *mass)?;
+                let stiffness = check("Rayleigh's stiffness coefficient", *stiffness)?;
+                Ok(omegas.map(|&omega| mass + stiffness * omega * omega).collect())
+            }
+        }
+    }
+
+    /// The static response to the constant load that modes and contact dofs leave, zero at the contact dofs.
+    fn rest(&self, pencil: &mut Pencil, modes: &Modes, interface: &Interface) -> Result<Vec<f64>> {
+        let n = pencil.size();
+        let Some(load) = &self.load else { return Ok(Vec::new()) };
+        let load: Vec<f64> = pencil.free.iter().map(|&dof| load[dof].value()).collect();
+        let mut rest = response(pencil, &modes.shapes, &load)?;
+        if self.boundary == Boundary::CraigBampton {
+            return Ok(rest);
+        }
+        // As if the load were one more contact force: S of the load, less what the contact dofs have of it.
+        if self.boundary == Boundary::Tapered {
+            for x in &mut rest {
+                *x *= 1.0 + self.softening;
+            }
+        }
+        let mut shares = vec![0.0; modes.count()];
+        transposed_product(n, &modes.shapes, &load, &mut shares);
+        for (k, share) in shares.iter_mut().enumerate() {
+            let left = 1.0 - interface.sigma[k] * interface.sigma[k];
+            *share *= if k < modes.rigid() { 0.0 } else { left / modes.frequencies[k].powi(2) };
+        }
+        add_product(1.0, n, &modes.shapes, &shares, &mut rest);
+        let contacts = self.contact.len();
+        let mut moved = vec![0.0; contacts];
+        transposed_product(n, &interface.fields, &load, &mut moved);
+        let mut forces = vec![0.0; contacts];
+        add_product(1.0, contacts, &interface.stiffness, &moved, &mut forces);
+        add_product(-1.0, n, &interface.fields, &forces, &mut rest);
+        Ok(rest)
+    }
+}
+
+/// F⁻¹, symmetric bit for bit.
+fn inverse(size: usize, modes: usize, entry: impl Fn(usize, usize) -> f64) -> Result<Vec<f64>> {
+    let mut factor = DenseCholesky::<f64>::default();
+    if factor.factorize(size, entry).is_err() || factor.is_singular() {
+        return Err(Error::Incompatible {
+            part: format!("the flexibility that {modes} modes leave at {size} contact dofs"),
+            reason: "it is singular: take fewer modes, or leave out contact dofs that cannot move by themselves",
+        });
+    }
+    let mut inverse = vec![0.0; size * size];
+    for (k, column) in inverse.chunks_exact_mut(size).enumerate() {
+        column[k] = 1.0;
+        factor.solve(column);
+    }
+    for i in 0..size {
+        for j in 0..i {
+            let mean = 0.5 * (inverse[i * size + j] + inverse[j * size + i]);
+            (inverse[i * size + j], inverse[j * size + i]) = (mean, mean);
+        }
+    }
+    Ok(inverse)
+}

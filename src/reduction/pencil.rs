@@ -1,0 +1,250 @@
+//! The pencil K − λM of a body on its free dofs, in `f64`: products, the shifted factor K + σM, counts of eigenvalues.
+//!
+//! Eigenpairs are sought in `f64` whatever the scalar of the run: rigid motions are told from elastic ones by rounding,
+//! and in `f32` a long bar would have none that can be told.
+
+use crate::error::{Error, Result};
+use crate::kernels::inertia::negative_eigenvalues;
+use crate::linear_solver::ordering::symbolic_cholesky;
+use crate::linear_solver::{Automatic, Factorization, LinearSolver, Ordering};
+use crate::memory;
+use crate::real::Real;
+use crate::sparse::{self, Combination, Product, Symmetry};
+use faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
+
+/// The shift σ over the median of K_ii/M_ii, the square of a frequency of single elements: small against all elastic
+/// frequencies but those of the longest chains, and large against the rounding of K.
+const SHIFT: f64 = 1e-8;
+
+/// A motion is rigid if its strain energy is so many units of rounding of the sum that it is.
+const RIGID: f64 = 32.0;
+
+#[derive(Debug)]
+pub(super) struct Pencil {
+    /// Dofs of the body, and those of them that are free, ascending.
+    pub(super) dofs: usize,
+    pub(super) free: Vec<usize>,
+    pub(super) mass: SparseColMat<usize, f64>,
+    pub(super) stiffness: SparseColMat<usize, f64>,
+    by_mass: Product<f64>,
+    by_stiffness: Product<f64>,
+    /// The pattern of both, for K + σM and K − μM.
+    sum: Combination,
+    /// Free dofs with mass: there are so many finite eigenvalues.
+    pub(super) rank: usize,
+    pub(super) shift: f64,
+    /// What rounding of K leaves of an eigenvalue, at most.
+    pub(super) blur: f64,
+    factor: Box<dyn Factorization<f64>>,
+    /// Factorizations so far.
+    pub(super) factorizations: usize,
+    /// Relative rounding of the entries of K.
+    rounding: f64,
+    /// Parts that nothing connects.
+    pub(super) bodies: usize,
+}
+
+/// Checks and lists the free dofs, ascending.
+pub(super) fn free_dofs(dofs: usize, fixed: &[usize]) -> Result<Vec<usize>> {
+    let mut free = vec![true; dofs];
+    for &dof in fixed {
+        if dof >= dofs {
+            return Err(Error::MissingDof { what: "a support", dof, dofs });
+        }
+        if !std::mem::replace(&mut free[dof], false) {
+            return Err(Error::PrescribedTwice { dof });
+        }
+    }
+    let free: Vec<usize> = (0..dofs).filter(|&dof| free[dof]).collect();
+    match free.is_empty() {
+        true => Err(Error::Empty { what: "the list of free dofs", remedy: "leave some dof without a support" }),
+        false => Ok(free),
+    }
+}
+
+/// Checks sizes, symmetry and diagonal masses of M and K.
+pub(super) fn check<T: Real>(
+    mass: SparseColMatRef<'_, usize, T>,
+    stiffness: SparseColMatRef<'_, usize, T>,
+) -> Result<usize> {
+    sparse::check_symmetric("mass", mass)?;
+    sparse::check_symmetric("stiffness", stiffness)?;
+    let dofs = stiffness.nrows();
+    if dofs == 0 {
+        return Err(Error::Empty { what: "the body", remedy: "give it at least one dof" });
+    }
+    if mass.nrows() != dofs {
+        let what = "the mass (the stiffness matrix counts the dofs)";
+        return Err(Error::Dimension { what, expected: dofs, found: mass.nrows() });
+    }
+    for dof in 0..dofs {
+        let m = sparse::entry(mass, dof, dof);
+        if m < T::zero() {
+            return Err(Error::Mass { dof, value: m.value() });
+        }
+    }
+    Ok(dofs)
+}
+
+/// Rows `free` and columns `columns` of a matrix; places beyond them are dropped.
+pub(super) fn part<T: Real>(
+    a: SparseColMatRef<'_, usize, T>,
+    free: &[usize],
+    columns: &[usize],
+) -> Result<SparseColMat<usize, f64>> {
+    let mut place = vec![usize::MAX; a.nrows()];
+    free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
+    let mut entries = Vec::new();
+    for (j, &column) in columns.iter().enumerate() {
+        for (&row, value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
+            if place[row] != usize::MAX {
+                entries.push(Triplet::new(place[row], j, value.value()));
+            }
+        }
+    }
+    SparseColMat::try_new_from_triplets(free.len(), columns.len(), &entries)
+        .map_err(|_| Error::OutOfMemory { what: "the free part of a matrix" })
+}
+
+impl Pencil {
+    /// Of checked matrices.
+    pub(super) fn new<T: Real>(
+        mass: SparseColMatRef<'_, usize, T>,
+        stiffness: SparseColMatRef<'_, usize, T>,
+        free: Vec<usize>,
+    ) -> Result<Self> {
+        let dofs = stiffness.nrows();
+        let (mass, stiffness) = (part(mass, &free, &free)?, part(stiffness, &free, &free)?);
+        let n = free.len();
+        let (k, m) = (stiffness.as_ref(), mass.as_ref());
+        let masses: Vec<f64> = (0..n).map(|dof| sparse::entry(m, dof, dof)).collect();
+        let mut ratios: Vec<f64> =
+            (0..n).filter(|&dof| masses[dof] > 0.0).map(|dof| sparse::entry(k, dof, dof) / masses[dof]).collect();
+        ratios.sort_by(f64::total_cmp);
+        let Some(&median) = ratios.get(ratios.len() / 2) else {
+            return Err(Error::Mass { dof: free[0], value: 0.0 });
+        };
+        let rounding = T::epsilon().value();
+        // Bodies that are all rigid have no frequency, and any shift does.
+        let shift = if median > 0.0 { median * SHIFT.max(64.0 * rounding) } else { 1.0 };
+        let sum = Combination::new(n, &[], &[k.symbolic(), m.symbolic()])?;
+        let mut pencil = Self {
+            dofs,
+            rank: ratios.len(),
+            shift,
+            blur: 16.0 * f64::EPSILON * median,
+            by_mass: Product::new(m, Symmetry::Symmetric),
+            by_stiffness: Product::new(k, Symmetry::Symmetric),
+            factor: Automatic.analyze(sum.pattern(), &[])?,
+            factorizations: 0,
+            rounding,
+            bodies: parts(&sum, n),
+            sum,
+            free,
+            mass,
+            stiffness,
+        };
+        let values = pencil.shifted(shift)?;
+        pencil.factor.factorize(pencil.sum.view(&values)).map_err(|error| match error {
+            Error::Singular { dof, .. } => {
+                Error::Singular { matrix: "stiffness matrix (with a small share of the mass)", dof: pencil.free[dof] }
+            }
+            other => other,
+        })?;
+        pencil.factor.release();
+        pencil.factorizations += 1;
+        Ok(pencil)
+    }
+
+    /// Number of free dofs.
+    pub(super) fn size(&self) -> usize {
+        self.free.len()
+    }
+
+    /// Values of K + σM.
+    fn shifted(&self, shift: f64) -> Result<Vec<f64>> {
+        let mut values = memory::zeros(self.sum.len(), 1, "the shifted stiffness matrix")?;
+        self.sum.fill(&[(1.0, self.stiffness.val()), (shift, self.mass.val())], None, &mut values);
+        Ok(values)
+    }
+
+    /// `out = M x`, column by column.
+    pub(super) fn mass_product(&mut self, x: &[f64], out: &mut [f64]) {
+        let n = self.size();
+        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+            self.by_mass.write(1.0, self.mass.as_ref(), x, out);
+        }
+    }
+
+    /// `out = K x`, column by column.
+    pub(super) fn stiffness_product(&mut self, x: &[f64], out: &mut [f64]) {
+        let n = self.size();
+        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+            self.by_stiffness.write(1.0, self.stiffness.as_ref(), x, out);
+        }
+    }
+
+    /// `x ← (K + σM)⁻¹ x`, column by column.
+    pub(super) fn solve(&mut self, x: &mut [f64]) -> Result<()> {
+        self.factor.solve(x)
+    }
+
+    /// How many eigenvalues are below μ, by the signs of the pivots of K − μM (Sylvester's law of inertia); none if
+    /// that factorization breaks down.
+    pub(super) fn count_below(&mut self, mu: f64) -> Result<Option<usize>> {
+        let values = self.shifted(-mu)?;
+        let symbolic = symbolic_cholesky(&Ordering::default(), self.sum.pattern(), &[])?;
+        self.factorizations += 1;
+        // (Dofs without mass, on which K is positive definite, add positive eigenvalues only.)
+        Ok(negative_eigenvalues(&symbolic, self.sum.view(&values)))
+    }
+
+    /// The Rayleigh quotient of a motion of unit modal mass, zero if it is rigid: then its strain energy is what
+    /// rounding leaves of a sum of larger terms. `product` is K x.
+    pub(super) fn quotient(&self, x: &[f64], product: &[f64]) -> f64 {
+        let energy: f64 = x.iter().zip(product).map(|(x, f)| x * f).sum();
+        let k = self.stiffness.as_ref();
+        let column = |j: usize| -> f64 {
+            let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
+            entries.map(|(&i, &value)| (value * x[i]).abs()).sum::<f64>() * x[j].abs()
+        };
+        let size: f64 = (0..x.len()).map(column).sum();
+        if energy.abs() <= RIGID * self.rounding * size { 0.0 } else { energy }
+    }
+
+    /// Brings columns on the free dofs to all dofs.
+    pub(super) fn expand(&self, x: &[f64]) -> Vec<f64> {
+        let n = self.size();
+        let mut out = vec![0.0; x.len() / n * self.dofs];
+        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(self.dofs)) {
+            self.free.iter().zip(x).for_each(|(&dof, &x)| out[dof] = x);
+        }
+        out
+    }
+
+    /// The free dofs of columns on all of them.
+    pub(super) fn restrict(&self, x: &[f64]) -> Vec<f64> {
+        x.chunks_exact(self.dofs).flat_map(|x| self.free.iter().map(|&dof| x[dof])).collect()
+    }
+}
+
+/// The number of parts of a pattern that nothing connects.
+fn parts(sum: &Combination, n: usize) -> usize {
+    let pattern = sum.pattern();
+    let (mut seen, mut stack, mut count) = (vec![false; n], Vec::new(), 0);
+    for start in 0..n {
+        if std::mem::replace(&mut seen[start], true) {
+            continue;
+        }
+        count += 1;
+        stack.push(start);
+        while let Some(dof) = stack.pop() {
+            for &next in pattern.row_idx_of_col_raw(dof) {
+                if !std::mem::replace(&mut seen[next], true) {
+                    stack.push(next);
+                }
+            }
+        }
+    }
+    count
+}

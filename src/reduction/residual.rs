@@ -1,0 +1,71 @@
+//! Residual flexibility: what a truncated set of modes leaves of the static response.
+
+use super::lanczos::remove;
+use super::pencil::Pencil;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// Steps of the iteration; it gains the factor σ/(ω² + σ) a step, ω the first frequency that is not among the modes.
+const STEPS: usize = 2000;
+
+/// A load of which less than this share is left counts as taken up by the modes.
+const NOTHING: f64 = 1e-12;
+
+/// `(G − Σ φ φᵀ/ω²) f` for columns f on the free dofs, G the flexibility without rigid motion: the static response to
+/// the part of a load that the modes do not take up. It is M-orthogonal to them.
+///
+/// K x = f − M Φ Φᵀ f by Richardson's iteration with the factor of K + σM, in the complement of the modes: exact, with
+/// no other factor and whatever σ.
+pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Result<Vec<f64>> {
+    let n = pencil.size();
+    let columns = loads.len() / n;
+    let mut x = memory::zeros(n, columns, "the residual flexibility")?;
+    if shapes.len() == n * n {
+        return Ok(x);
+    }
+    let (mut products, mut step, mut rest) = (x.clone(), x.clone(), loads.to_vec());
+    let mut inertia = vec![0.0; shapes.len()];
+    pencil.mass_product(shapes, &mut inertia);
+    balance(n, shapes, &inertia, &mut rest);
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // The weight of a free body is taken up by its rigid motions: of such loads rounding is left.
+    let mut loads = loads.to_vec();
+    for (load, rest) in loads.chunks_exact_mut(n).zip(rest.chunks_exact_mut(n)) {
+        if norm(rest) <= NOTHING * norm(load) {
+            load.fill(0.0);
+            rest.fill(0.0);
+        }
+    }
+    let (mut change, mut size) = (f64::INFINITY, 0.0);
+    for _ in 0..STEPS {
+        step.copy_from_slice(&rest);
+        pencil.solve(&mut step)?;
+        for _ in 0..2 {
+            pencil.mass_product(&step, &mut products);
+            remove(n, shapes, &products, &mut step);
+        }
+        x.iter_mut().zip(&step).for_each(|(x, d)| *x += d);
+        let last = std::mem::replace(&mut change, norm(&step));
+        size = norm(&x);
+        // As far as rounding lets it.
+        if change <= 1e-13 * size || (change <= 1e-9 * size && change >= 0.5 * last) {
+            return Ok(x);
+        }
+        pencil.stiffness_product(&x, &mut products);
+        rest.copy_from_slice(&loads);
+        rest.iter_mut().zip(&products).for_each(|(r, f)| *r -= f);
+        balance(n, shapes, &inertia, &mut rest);
+    }
+    let (method, residual) = ("the iteration for the residual flexibility", change / size);
+    Err(Error::LinearNotConverged { method, iterations: STEPS, residual, tolerance: 1e-13 })
+}
+
+/// Takes from loads what modes take up: `f − M Φ Φᵀ f`.
+fn balance(n: usize, shapes: &[f64], inertia: &[f64], loads: &mut [f64]) {
+    let columns = loads.len() / n;
+    let mut shares = vec![0.0; shapes.len() / n * columns];
+    if !shares.is_empty() {
+        crate::kernels::dense::transposed_product(n, shapes, loads, &mut shares);
+        crate::kernels::dense::add_product(-1.0, n, inertia, &shares, loads);
+    }
+}
