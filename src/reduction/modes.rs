@@ -29,7 +29,7 @@ const ATTEMPTS: usize = 8;
 /// M may be singular: dofs without mass ([`mass::redistribute`](crate::mass::redistribute)) have no modes of their own,
 /// and follow the others statically. Modes are `f64` whatever the scalar of the matrices.
 ///
-/// Memory: two to three vectors for each mode while they are sought. For a few hundred modes at most; they are not
+/// Memory: two to four vectors for each mode while they are sought. For a few hundred modes at most; they are not
 /// meant to be all modes of a large body.
 ///
 /// ```

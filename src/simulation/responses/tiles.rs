@@ -8,6 +8,9 @@ use std::ops::Range;
 /// Places of a tile.
 const TILE: usize = 128;
 
+/// Rows whose responses are brought from one order into the other together: as many as fill a line of a cache.
+const FEW: usize = 8;
+
 /// The entries of some rows, and responses at the places of a tile.
 #[derive(Debug, Default)]
 pub(super) struct Tiles<T> {
@@ -16,7 +19,7 @@ pub(super) struct Tiles<T> {
     starts: Vec<usize>,
     /// Of each row the first entry at the places of the present tile, or behind it.
     next: Vec<usize>,
-    /// The response to one row at the places of the tile, and at each of them those to all rows.
+    /// The responses to a few rows at the places of the tile, and at each of them those to all rows.
     own: Vec<T>,
     all: Vec<T>,
 }
@@ -28,7 +31,7 @@ impl<T: Real> Tiles<T> {
             entries: Vec::with_capacity(size * size),
             starts: Vec::with_capacity(size + 1),
             next: Vec::with_capacity(size),
-            own: Vec::with_capacity(TILE.min(size)),
+            own: Vec::with_capacity(FEW * TILE.min(size)),
             all: Vec::with_capacity(size * TILE.min(size)),
         }
     }
@@ -49,12 +52,19 @@ impl<T: Real> Tiles<T> {
         let count = rows.len();
         while let Some(first) = next.iter().zip(&starts[1..]).filter_map(|(&k, &end)| first(entries, k..end)).min() {
             let tile = first..(first + TILE).min(size);
-            own.resize(tile.len(), T::zero());
-            all.resize(tile.len() * count, T::zero());
-            for (j, range) in starts.windows(2).enumerate() {
+            let width = tile.len();
+            own.resize(FEW * width, T::zero());
+            all.resize(width * count, T::zero());
+            for (block, begins) in starts[..count].chunks(FEW).enumerate() {
                 own.fill(T::zero());
-                add(&entries[range[0]..range[1]], |place| &column(place)[tile.clone()], own);
-                all[j..].iter_mut().step_by(count).zip(&*own).for_each(|(x, &own)| *x = own);
+                for (k, (&begin, own)) in begins.iter().zip(own.chunks_exact_mut(width)).enumerate() {
+                    let end = starts[block * FEW + k + 1];
+                    add(&entries[begin..end], |place| &column(place)[tile.clone()], own);
+                }
+                for (place, all) in all.chunks_exact_mut(count).enumerate() {
+                    let all = all[block * FEW..].iter_mut().take(begins.len()).enumerate();
+                    all.for_each(|(k, x)| *x = own[k * width + place]);
+                }
             }
             for (next, (w, range)) in next.iter_mut().zip(w.chunks_exact_mut(count).zip(starts.windows(2))) {
                 let there = entries[*next..range[1]].partition_point(|&(place, _)| place < tile.end);
