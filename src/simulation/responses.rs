@@ -42,11 +42,16 @@ pub(super) struct Responses<T> {
     columns: usize,
     /// The dofs or rows whose columns are missing.
     missing: Vec<usize>,
+    /// The response to a row.
+    whole: Vec<T>,
     tiles: Tiles<T>,
 }
 
 /// Dofs of an interface whose responses take little memory, all together.
 const SMALL: usize = 256;
+
+/// Entries of a row, in the mean, up to which the response to each is formed as a whole: those of nodes on obstacles.
+const SHORT: usize = 8;
 
 /// A dof or row without a column, and one that is about to get one.
 const NONE: usize = usize::MAX;
@@ -64,6 +69,7 @@ impl<T: Real> Responses<T> {
             blocks,
             columns: 0,
             missing: Vec::with_capacity(small),
+            whole: Vec::with_capacity(size),
             tiles: Tiles::for_interface(small),
         }
     }
@@ -142,21 +148,29 @@ impl<T: Real> Responses<T> {
 
     /// W = G A⁻¹ Gᵀ of some rows, row by row.
     pub(super) fn couple(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
-        match self.unit {
-            Unit::Row => {
-                for (k, &j) in rows.iter().enumerate() {
-                    let response = self.column(j);
-                    for (entry, &i) in w[k..].iter_mut().step_by(rows.len()).zip(rows) {
-                        *entry = g.interface_product(i, response);
-                    }
+        let entries: usize = rows.iter().map(|&row| g.located(row).count()).sum();
+        if self.unit == Unit::Dof && entries > SHORT * rows.len() {
+            let mut tiles = std::mem::take(&mut self.tiles);
+            tiles.couple(g, rows, self.size, |place| self.column(place), w);
+            self.tiles = tiles;
+            return;
+        }
+        let mut whole = std::mem::take(&mut self.whole);
+        for (k, &j) in rows.iter().enumerate() {
+            let response = match self.unit {
+                Unit::Row => self.column(j),
+                Unit::Dof => {
+                    whole.clear();
+                    whole.resize(self.size, T::zero());
+                    g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place), &mut whole));
+                    &whole
                 }
-            }
-            Unit::Dof => {
-                let mut tiles = std::mem::take(&mut self.tiles);
-                tiles.couple(g, rows, self.size, |place| self.column(place), w);
-                self.tiles = tiles;
+            };
+            for (entry, &i) in w[k..].iter_mut().step_by(rows.len()).zip(rows) {
+                *entry = g.interface_product(i, response);
             }
         }
+        self.whole = whole;
     }
 
     /// A⁻¹ Gᵀ λ of some rows, whose forces Gᵀ λ on the interface are known.
