@@ -34,6 +34,7 @@ pub enum Boundary {
 
 /// How far a reduced body is from its parent, as far as the build can tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Accuracy {
     /// The share of the static compliance at a contact dof, without rigid motion, that is not in the modes: the largest
     /// of all contact dofs. None for [`Boundary::CraigBampton`], whose modes do not see the contact dofs.
