@@ -65,7 +65,7 @@ pub struct JumpProjection<T: Real> {
     factors: Vec<DenseCholesky<T>>,
     /// The right-hand side of a group.
     gathered: Vec<T>,
-    /// M⁻¹ G_iᵀ of a row; lumped masses only.
+    /// A row by dof; lumped masses only.
     spread: SpreadRow<T>,
     /// Whether roots and factors belong to `closed`.
     factored: bool,
@@ -432,12 +432,15 @@ impl<T: Real> JumpProjection<T> {
     ) {
         let pairs = out.iter_mut().zip(others);
         match &self.inverse {
-            InverseMass::Lumped(inverse) => spread.of(
-                || g.row(i).map(|(dof, weight)| (dof, weight * inverse[dof])),
-                |response| {
-                    pairs.for_each(|(entry, j)| *entry = g.product(j, response));
-                },
-            ),
+            InverseMass::Lumped(inverse) => pairs.for_each(|(entry, j)| {
+                spread.of(
+                    || g.row(j),
+                    |other| {
+                        *entry = T::zero();
+                        g.row(i).for_each(|(dof, weight)| *entry += weight * other[dof] * inverse[dof]);
+                    },
+                );
+            }),
             InverseMass::Consistent(inverse) => {
                 pairs.for_each(|(entry, j)| *entry = self.columns[self.slots[j]].product(inverse, g.row(i)));
             }
