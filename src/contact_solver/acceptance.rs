@@ -181,6 +181,13 @@ impl<T: Real> Acceptance<'_, T> {
         })
     }
 
+    /// Whether what every row misses is no more than a contradiction that nobody would notice: √ε of the way by which
+    /// what is asked of the others may move it.
+    pub(super) fn is_negligible(&self, multipliers: &[T]) -> bool {
+        let share = T::epsilon().powf(T::of(0.1));
+        (0..self.problem.size()).all(|i| self.bears(i, self.problem.miss(i, multipliers) / share))
+    }
+
     /// The failure that names the worst row.
     pub(super) fn failure(&self, iterations: usize, multipliers: &[T]) -> ContactFailure<T> {
         let misses = (0..self.problem.size()).map(|i| (i, self.problem.miss(i, multipliers)));

@@ -29,7 +29,8 @@ use crate::real::Real;
 /// them. What W leaves of nearly dependent rows may be rounding, on which multipliers grow beyond all bounds and
 /// pretend to meet what cannot be met: a pivot must exceed the rounding of the combination of rows that it measures,
 /// and a solution is accepted only if every row misses complementarity by less than a small share of what moves it
-/// without contact, whatever the multipliers.
+/// without contact, whatever the multipliers. Rows that agree but for a small angle, and of which neither the steps nor
+/// pivoting find an exact solution, are met as well as the steps could if no row misses more than √ε of that.
 ///
 /// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant
 /// rows always go the way of proximal steps.
@@ -243,7 +244,7 @@ impl<T: Real> ActiveSet<T> {
         &mut self,
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
-        mut acceptance: Acceptance<'_, T>,
+        acceptance: &mut Acceptance<'_, T>,
         mut iterations: usize,
     ) -> Result<usize, ContactFailure<T>> {
         let size = problem.size();
@@ -263,7 +264,7 @@ impl<T: Real> ActiveSet<T> {
             self.offset.clear();
             let pulled = problem.offset.iter().zip(&self.shift).zip(&self.center);
             self.offset.extend(pulled.map(|((&q, &d), &c)| q - d * c));
-            match self.exchange(problem, multipliers, Form::Proximal, &mut acceptance)? {
+            match self.exchange(problem, multipliers, Form::Proximal, acceptance)? {
                 Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
             }
             if acceptance.is_exact(multipliers) {
@@ -287,6 +288,34 @@ impl<T: Real> ActiveSet<T> {
         }
         let (row, residual) = problem.residual(multipliers);
         Err(ContactFailure::NotConverged { iterations, row, residual })
+    }
+
+    /// What proximal steps could not solve: exactly by pivoting, or else as the steps left it, if no row misses more
+    /// than counts.
+    ///
+    /// Two nodes that face each other, each of them on the facets of the other, have rows that differ by the angle
+    /// between these facets, be it 1e-8, and gaps that differ by as much: no force that either could bear closes both
+    /// exactly.
+    fn settle(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        multipliers: &mut [T],
+        acceptance: &Acceptance<'_, T>,
+        failure: ContactFailure<T>,
+    ) -> Result<usize, ContactFailure<T>> {
+        self.center.clear();
+        self.center.extend_from_slice(multipliers);
+        if self.symmetry.1 == Symmetry::Symmetric
+            && let Ok(iterations) = self.pivoting.solve(problem, multipliers)
+        {
+            return Ok(iterations);
+        }
+        // (Of a contradiction the proximal steps know the least violation.)
+        multipliers.copy_from_slice(&self.center);
+        match failure {
+            ContactFailure::Contradictory { .. } if acceptance.is_negligible(multipliers) => Ok(PROXIMAL_STEPS),
+            failure => Err(failure),
+        }
     }
 }
 
@@ -344,12 +373,9 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         }
         match self.exchange(problem, multipliers, Form::Given, &mut acceptance)? {
             Exchanges::Solved(iterations) => Ok(iterations),
-            Exchanges::Stuck(iterations) => match self.proximal(problem, multipliers, acceptance, iterations) {
-                Err(failure) if self.symmetry.1 == Symmetry::Symmetric => {
-                    // (Of a contradiction the proximal steps know the least violation.)
-                    self.pivoting.solve(problem, multipliers).map_err(|_| failure)
-                }
-                result => result,
+            Exchanges::Stuck(iterations) => match self.proximal(problem, multipliers, &mut acceptance, iterations) {
+                Err(failure) => self.settle(problem, multipliers, &acceptance, failure),
+                solved => solved,
             },
         }
     }

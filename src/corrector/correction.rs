@@ -181,6 +181,17 @@ impl<T: Real> Correction<'_, T> {
         per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row])
     }
 
+    /// A share of the rates that a jump is made of. Nodes that face each other, each of them on the facets of the other,
+    /// have rows that differ by the angle between these facets, and so do their rates: a square of it in S that is below
+    /// ε^⅔ counts as none ([`DenseCholesky`](crate::dense::DenseCholesky)).
+    fn share_of_rate(&self, row: usize, jump: Jump) -> T {
+        let (values, own) = match jump {
+            Jump::Velocity => (&self.new.v, self.buffers.rates[row].rate),
+            Jump::Acceleration => (&self.new.a, self.buffers.rates[row].acceleration),
+        };
+        T::epsilon().cbrt() * (self.g.magnitude(row, values) + own.abs())
+    }
+
     /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
     fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
         let mut sets = std::mem::take(&mut self.buffers.sets);
@@ -204,10 +215,13 @@ impl<T: Real> Correction<'_, T> {
         x.clear();
         x.resize(rows.len(), T::zero());
         let mut result = read.and_then(|()| self.solve(rows, &sets, x));
-        if matches!(result, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
+        for excuse in [Self::rounding_of_gap, Self::share_of_rate] {
+            if !matches!(result, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
+                break;
+            }
             for (k, &row) in rows.iter().enumerate() {
-                let noise = self.rounding_of_gap(row, jump);
-                self.buffers.tolerance[k] += noise;
+                let miss = excuse(self, row, jump);
+                self.buffers.tolerance[k] += miss;
             }
             x.fill(T::zero());
             result = self.solve(rows, &sets, x);

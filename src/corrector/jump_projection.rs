@@ -432,15 +432,12 @@ impl<T: Real> JumpProjection<T> {
     ) {
         let pairs = out.iter_mut().zip(others);
         match &self.inverse {
-            InverseMass::Lumped(inverse) => pairs.for_each(|(entry, j)| {
-                spread.of(
-                    || g.row(j),
-                    |other| {
-                        *entry = T::zero();
-                        g.row(i).for_each(|(dof, weight)| *entry += weight * other[dof] * inverse[dof]);
-                    },
-                );
-            }),
+            InverseMass::Lumped(inverse) => spread.of(
+                || g.row(i).map(|(dof, weight)| (dof, weight * inverse[dof])),
+                |response| {
+                    pairs.for_each(|(entry, j)| *entry = g.product(j, response));
+                },
+            ),
             InverseMass::Consistent(inverse) => {
                 pairs.for_each(|(entry, j)| *entry = self.columns[self.slots[j]].product(inverse, g.row(i)));
             }

@@ -478,6 +478,41 @@ fn small_contradictions_among_nearly_dependent_rows_are_no_rounding() {
     assert!(refused == 3000 && solved == 3000);
 }
 
+/// Equalities of which each is there twice, by rows that differ by a small angle, as of nodes that face each other and
+/// lie each on facets of the other. Gaps that differ by less than anyone could notice are shared; more is refused.
+#[test]
+fn equalities_that_nearly_agree_are_met_as_well_as_can_be() {
+    let mut numbers = Congruential(29);
+    for case in 0..400_usize {
+        let pairs = 1 + case % 6;
+        let angle = 10_f64.powf(numbers.within(-12.0, -8.5));
+        let mut twice = |angle: f64, of: Vec<f64>| -> Vec<f64> {
+            of.iter().map(|x| x + angle * numbers.within(-1.0, 1.0)).collect()
+        };
+        let mut base = Congruential(1000 + case as u64);
+        let rows: Vec<Vec<f64>> =
+            (0..pairs).map(|_| (0..2 * pairs + 2).map(|_| base.within(-1.0, 1.0)).collect()).collect();
+        let others: Vec<Vec<f64>> = rows.iter().map(|row| twice(angle, row.clone())).collect();
+        let gaps: Vec<f64> = (0..pairs).map(|_| base.within(-1.0, 1.0)).collect();
+        for (share, agrees) in [(0.0, true), (1e-9, true), (1e-5, false)] {
+            let largest = gaps.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
+            let offset: Vec<f64> = gaps.iter().copied().chain(gaps.iter().map(|gap| gap + share * largest)).collect();
+            let all: Vec<Vec<f64>> = rows.iter().chain(&others).cloned().collect();
+            let mut problem = Problem::unilateral(&gram(&all), &offset);
+            problem.sets.fill(AdmissibleSet::Free);
+            match (solve(&mut ActiveSet::default(), &problem, &vec![0.0; 2 * pairs]), agrees) {
+                (Ok((lambda, _)), true) => {
+                    // (Equal gaps of rows that differ contradict each other by the angle.)
+                    let residual = problem.residual(&lambda);
+                    assert!(residual < 0.51 * share + 1e-8, "case {case}, share {share:e}: {residual:e}");
+                }
+                (Err(ContactFailure::Contradictory { .. }), false) => {}
+                (found, _) => panic!("case {case}, share {share:e}, angle {angle:e}: {found:?}"),
+            }
+        }
+    }
+}
+
 /// Many rows that all push one another, in single precision: what the sums of hundreds of terms lose is no violation.
 #[test]
 fn single_precision_judges_many_coupled_rows() {

@@ -67,19 +67,19 @@ impl<T: Real> Correction<'_, T> {
         self.read_rates()?;
         self.read_slip_rates()?;
         self.pose_rubbing(rows, (jump, pressed), share);
-        let solved = self.solve_posed();
-        match solved {
-            Err(Error::ContradictoryContacts { .. } | Error::Contact { .. }) => {
-                for k in 0..self.buffers.rubbing.blocks.len() {
-                    let Block { row, .. } = self.buffers.rubbing.blocks[k];
-                    let (noise, place) =
-                        (self.rounding_of_gap(row, jump), self.buffers.rubbing.blocks[k].places().start);
-                    self.buffers.rubbing.tolerance[place] += noise;
-                }
-                self.solve_posed()
+        let mut solved = self.solve_posed();
+        for excuse in [Self::rounding_of_gap, Self::share_of_rate] {
+            if !matches!(solved, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
+                break;
             }
-            other => other,
+            for k in 0..self.buffers.rubbing.blocks.len() {
+                let Block { row, .. } = self.buffers.rubbing.blocks[k];
+                let (miss, place) = (excuse(self, row, jump), self.buffers.rubbing.blocks[k].places().start);
+                self.buffers.rubbing.tolerance[place] += miss;
+            }
+            solved = self.solve_posed();
         }
+        solved
     }
 
     /// Writes down the problem of the contacts `rows`, of which raw multipliers have given `share` times theirs.
