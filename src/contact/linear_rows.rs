@@ -11,6 +11,9 @@ use std::ops::Range;
 type OffsetFunction<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 type Drag<'a, T> = Box<dyn FnMut(f64) -> [[T; 2]; 2] + Send + 'a>;
 
+/// The (dof, weight) pairs of a row that needs nothing else, and its law.
+pub(crate) type PlainRow<T> = (Vec<(usize, T)>, ContactLaw);
+
 /// The friction of a row.
 struct Friction<'a, T> {
     row: usize,
@@ -306,6 +309,25 @@ impl<'a, T: Real> LinearRows<'a, T> {
             }
         }
         Ok(())
+    }
+
+    /// The rows, if they are rigid and equality ones and nothing else.
+    pub(crate) fn plain(&self) -> Result<Vec<PlainRow<T>>> {
+        self.check()?;
+        let refused = |reason| Err(Error::Incompatible { part: "the contact rows".into(), reason });
+        if !self.frictions.is_empty() {
+            return refused("exact propagation knows no friction; take a scheme");
+        }
+        if !self.bonds.is_empty() {
+            return refused("exact propagation knows no bonds; take a scheme");
+        }
+        let plain = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
+        if !self.laws.iter().all(plain) {
+            return refused("exact propagation knows rigid and equality rows; take a scheme for other laws");
+        }
+        let dofs = self.dofs.as_slice();
+        let entries = |row| self.jacobian.row(row).map(|(place, weight)| (dofs[place], weight)).collect();
+        Ok(self.laws.iter().enumerate().map(|(row, &law)| (entries(row), law)).collect())
     }
 
     /// Number of rows.

@@ -12,6 +12,14 @@ pub(crate) fn transposed_product(rows: usize, a: &[f64], b: &[f64], out: &mut [f
     let (m, n) = (a.len() / rows, b.len() / rows);
     let left = MatRef::from_column_major_slice(a, rows, m);
     let right = MatRef::from_column_major_slice(b, rows, n);
+    if n < m {
+        // The kernel copies the factor on the left into an order of its own: that with few columns.
+        let mut transposed = vec![0.0; out.len()];
+        let product = MatMut::from_column_major_slice_mut(&mut transposed, n, m);
+        matmul(product, Accum::Replace, right.transpose(), left, 1.0, Par::Seq);
+        out.iter_mut().enumerate().for_each(|(k, x)| *x = transposed[k % m * n + k / m]);
+        return;
+    }
     let out = MatMut::from_column_major_slice_mut(out, m, n);
     matmul(out, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
 }

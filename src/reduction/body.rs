@@ -52,7 +52,7 @@ pub struct ReducedBody<T: Real> {
     parent: usize,
     contact: Vec<usize>,
     fixed: Vec<usize>,
-    boundary: Boundary,
+    pub(super) boundary: Boundary,
     frequencies: Vec<f64>,
     rigid: usize,
     /// σ_k.
@@ -60,8 +60,8 @@ pub struct ReducedBody<T: Real> {
     shapes: Vec<T>,
     fields: Vec<T>,
     /// F⁻¹ row by row, P contact dof by contact dof.
-    weights: Vec<T>,
-    coupling: Vec<T>,
+    pub(super) weights: Vec<T>,
+    pub(super) coupling: Vec<T>,
     mass: SparseColMat<usize, T>,
     stiffness: SparseColMat<usize, T>,
     damping: Option<SparseColMat<usize, T>>,

@@ -10,6 +10,7 @@
 //! mode is multiplied once more.
 
 use super::pencil::Pencil;
+use crate::dense::dot;
 use crate::error::{Error, Result};
 use crate::kernels::dense::{add_product, symmetric_eigen, transposed_product};
 use crate::memory;
@@ -17,6 +18,12 @@ use crate::sparse::scattered_signed;
 
 /// What is left of a product beside the basis counts as nothing below this share.
 const NOTHING: f64 = 1e-14;
+
+/// A vector that keeps this share of its length has lost nothing of its orthogonality.
+const ENOUGH: f64 = 0.7;
+
+/// One that keeps less than this share is computed anew.
+const SMALL: f64 = 0.1;
 
 /// Residual of a pair that counts as converged, over its eigenvalue of (K + σM)⁻¹ M.
 const CONVERGED: f64 = 1e-10;
@@ -38,11 +45,17 @@ pub(super) struct Lanczos {
     locked: Vec<f64>,
     basis: Vec<f64>,
     count: usize,
+    /// M times the vectors of the basis from the `kept`-th on: those of the band.
+    products: Vec<f64>,
+    kept: usize,
     /// How many vectors have been multiplied, and the coefficients of their products by the basis.
     done: usize,
     columns: Vec<Vec<f64>>,
     /// Number of random vectors so far.
     drawn: usize,
+    /// Memory for what is to be appended, and M times it.
+    vectors: Vec<f64>,
+    images: Vec<f64>,
     pub(super) block: usize,
     /// No vector is left beside the basis.
     pub(super) exhausted: bool,
@@ -51,7 +64,21 @@ pub(super) struct Lanczos {
 impl Lanczos {
     /// With a band of `block`.
     pub(super) fn new(n: usize, block: usize, locked: Vec<f64>) -> Self {
-        Self { n, locked, basis: Vec::new(), count: 0, done: 0, columns: Vec::new(), drawn: 0, block, exhausted: false }
+        Self {
+            n,
+            locked,
+            basis: Vec::new(),
+            count: 0,
+            products: Vec::new(),
+            kept: 0,
+            done: 0,
+            columns: Vec::new(),
+            drawn: 0,
+            vectors: Vec::new(),
+            images: Vec::new(),
+            block,
+            exhausted: false,
+        }
     }
 
     /// Vectors in the basis.
@@ -68,7 +95,7 @@ impl Lanczos {
         pencil.mass_product(&numbers, &mut vectors);
         pencil.solve(&mut vectors)?;
         let before = self.count;
-        self.append(pencil, &mut vectors, 0)?;
+        self.append(pencil, &mut vectors, self.count)?;
         self.exhausted = self.count == before;
         Ok(())
     }
@@ -83,13 +110,18 @@ impl Lanczos {
             return Ok(());
         }
         let n = self.n;
-        let mut vectors = memory::zeros(n, ahead.len(), "Lanczos vectors")?;
-        pencil.mass_product(&self.basis[ahead.start * n..ahead.end * n], &mut vectors);
+        let mut vectors = std::mem::take(&mut self.vectors);
+        vectors.clear();
+        vectors.extend_from_slice(&self.products[(ahead.start - self.kept) * n..(ahead.end - self.kept) * n]);
         pencil.solve(&mut vectors)?;
         // (But for rounding these have parts of the last vectors of the basis only.)
         let columns = self.append(pencil, &mut vectors, ahead.start.saturating_sub(2 * self.block))?;
         self.columns.extend(columns);
+        self.vectors = vectors;
         self.done = ahead.end;
+        let kept = self.done.saturating_sub(2 * self.block).max(self.kept);
+        self.products.drain(..(kept - self.kept) * n);
+        self.kept = kept;
         Ok(())
     }
 
@@ -98,59 +130,158 @@ impl Lanczos {
     fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64], recent: usize) -> Result<Vec<Vec<f64>>> {
         let n = self.n;
         let width = vectors.len() / n;
-        let mut products = memory::zeros(n, width, "Lanczos vectors")?;
+        let mut products = std::mem::take(&mut self.images);
+        products.clear();
+        memory::grow(&mut products, n, width, "Lanczos vectors")?;
         pencil.mass_product(vectors, &mut products);
         let before: Vec<f64> = norms(n, vectors, &products);
         let mut columns = vec![vec![0.0; self.count]; width];
-        // Twice is enough (Kahan; Giraud, Langou, Rozložník, van den Eshof 2005).
-        for from in [recent, 0] {
+        self.clear_recent(pencil, recent, [vectors, &mut products], &mut columns);
+        // Once is enough where little is taken, twice elsewhere (Kahan; Giraud, Langou, Rozložník, van den Eshof 2005).
+        let mut lengths = norms(n, vectors, &products);
+        for _ in 0..3 {
             remove(n, &self.locked, &products, vectors);
-            let coefficients = remove(n, &self.basis[from * n..], &products, vectors);
-            for (column, added) in columns.iter_mut().zip(coefficients.chunks_exact((self.count - from).max(1))) {
-                column[from..].iter_mut().zip(added).for_each(|(c, x)| *c += x);
-            }
+            let coefficients = remove(n, &self.basis, &products, vectors);
+            add(&mut columns, 0, &coefficients);
             pencil.mass_product(vectors, &mut products);
+            let last = std::mem::replace(&mut lengths, norms(n, vectors, &products));
+            let kept = |k: usize| lengths[k] >= ENOUGH * last[k] || lengths[k] <= NOTHING * before[k];
+            if (0..width).all(kept) {
+                break;
+            }
         }
-        let first = self.count;
+        if !self.append_together([vectors, &products], [&before, &lengths], &mut columns)? {
+            self.append_singly(pencil, [vectors, &mut products], [&before, &lengths], &mut columns)?;
+        }
+        self.images = products;
+        Ok(columns)
+    }
+
+    /// Takes what vectors have of the basis from `recent` on, and keeps their products with M up to date.
+    fn clear_recent(
+        &self,
+        pencil: &mut Pencil,
+        recent: usize,
+        [vectors, products]: [&mut [f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) {
+        let n = self.n;
+        let recent = recent.max(self.kept);
+        if recent == self.count {
+            return;
+        }
+        let before = norms(n, vectors, products);
+        let coefficients = remove(n, &self.basis[recent * n..], products, vectors);
+        add_product(-1.0, n, &self.products[(recent - self.kept) * n..], &coefficients, products);
+        add(columns, recent, &coefficients);
+        // Of large ones rounding is left, which the updated products do not have.
+        let after = norms(n, vectors, products);
+        if after.iter().zip(&before).any(|(after, before)| *after < SMALL * before) {
+            pencil.mass_product(vectors, products);
+        }
+    }
+
+    /// Makes vectors that are orthogonal to the basis so to each other by the Cholesky factor of their products, and
+    /// appends them; does nothing unless all are far from each other. `lengths` are those that they had before they
+    /// were made orthogonal to the basis, and have now.
+    fn append_together(
+        &mut self,
+        [vectors, products]: [&[f64]; 2],
+        [before, lengths]: [&[f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) -> Result<bool> {
+        let (n, width) = (self.n, columns.len());
+        let mut gram = vec![0.0; width * width];
+        transposed_product(n, vectors, products, &mut gram);
+        // U with UᵀU = VᵀMV, column by column, and U⁻¹.
+        let (mut upper, mut inverse) = (vec![0.0; width * width], vec![0.0; width * width]);
+        for k in 0..width {
+            for j in 0..k {
+                let known = dot(&upper[j * width..j * width + j], &upper[k * width..k * width + j]);
+                upper[k * width + j] = (gram[k * width + j] - known) / upper[j * width + j];
+            }
+            let column = &upper[k * width..k * width + k];
+            let pivot = (gram[k * width + k] - dot(column, column)).max(0.0).sqrt();
+            let apart = pivot >= SMALL * lengths[k] && lengths[k] >= SMALL * before[k] && pivot.is_normal();
+            if !apart {
+                return Ok(false);
+            }
+            upper[k * width + k] = pivot;
+            inverse[k * width + k] = 1.0 / pivot;
+            for j in (0..k).rev() {
+                let known: f64 = (j + 1..=k).map(|i| upper[i * width + j] * inverse[k * width + i]).sum();
+                inverse[k * width + j] = -known / upper[j * width + j];
+            }
+        }
+        for (k, column) in columns.iter_mut().enumerate() {
+            column.extend(&upper[k * width..=k * width + k]);
+        }
+        memory::grow(&mut self.basis, n, self.count + width, "Lanczos vectors")?;
+        add_product(1.0, n, vectors, &inverse, &mut self.basis[self.count * n..]);
+        memory::grow(&mut self.products, n, self.count - self.kept + width, "Lanczos vectors")?;
+        add_product(1.0, n, products, &inverse, &mut self.products[(self.count - self.kept) * n..]);
+        self.count += width;
+        Ok(true)
+    }
+
+    /// Makes vectors that are orthogonal to the basis so to each other, one after the other, and appends those that are
+    /// something; `lengths` as above.
+    fn append_singly(
+        &mut self,
+        pencil: &mut Pencil,
+        [vectors, products]: [&mut [f64]; 2],
+        [before, lengths]: [&[f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) -> Result<()> {
+        let (n, first) = (self.n, self.count);
         for (k, column) in columns.iter_mut().enumerate() {
             let vector = &mut vectors[k * n..(k + 1) * n];
             let product = &mut products[k * n..(k + 1) * n];
             column.resize(self.count, 0.0);
             for _ in 0..2 {
                 let coefficients = remove(n, &self.basis[first * n..], product, vector);
+                if !coefficients.is_empty() {
+                    add_product(-1.0, n, &self.products[(first - self.kept) * n..], &coefficients, product);
+                }
                 column[first..].iter_mut().zip(&coefficients).for_each(|(c, x)| *c += x);
-                pencil.mass_product(vector, product);
             }
-            let norm = norms(n, vector, product)[0];
+            let mut norm = norms(n, vector, product)[0];
             if !norm.is_finite() {
                 return Err(Error::ModeResidual { mode: self.count, residual: norm, tolerance: NOTHING });
+            }
+            let small = norm < SMALL * lengths[k];
+            if small {
+                pencil.mass_product(vector, product);
+                norm = norms(n, vector, product)[0];
             }
             if norm <= NOTHING * before[k] {
                 continue;
             }
-            // A small rest is orthogonal to rounding of what it was before only: once more, at its own length.
-            for x in vector.iter_mut() {
+            for x in vector.iter_mut().chain(product.iter_mut()) {
                 *x /= norm;
             }
-            let mut length = 1.0;
-            if norm < 0.1 * before[k] {
+            // A small rest is orthogonal to rounding of what it was before only: once more, at its own length.
+            if small {
                 for _ in 0..2 {
-                    pencil.mass_product(vector, product);
                     remove(n, &self.locked, product, vector);
                     remove(n, &self.basis, product, vector);
+                    pencil.mass_product(vector, product);
                 }
-                pencil.mass_product(vector, product);
-                length = norms(n, vector, product)[0];
+                let length = norms(n, vector, product)[0];
+                if length <= SMALL {
+                    continue;
+                }
+                for x in vector.iter_mut().chain(product.iter_mut()) {
+                    *x /= length;
+                }
             }
-            if length > 0.1 {
-                memory::grow(&mut self.basis, n, self.count + 1, "Lanczos vectors")?;
-                let place = self.count * n;
-                self.basis[place..].iter_mut().zip(&*vector).for_each(|(b, x)| *b = *x / length);
-                column.push(norm);
-                self.count += 1;
-            }
+            memory::grow(&mut self.basis, n, self.count + 1, "Lanczos vectors")?;
+            self.basis[self.count * n..].copy_from_slice(vector);
+            self.products.extend_from_slice(product);
+            column.push(norm);
+            self.count += 1;
         }
-        Ok(columns)
+        Ok(())
     }
 
     /// The pairs of least frequency that have converged, up to the first that has not.
@@ -210,8 +341,16 @@ pub(super) fn remove(n: usize, basis: &[f64], products: &[f64], vectors: &mut [f
     coefficients
 }
 
+/// Adds the coefficients of vectors by a basis to their columns, from one row on.
+fn add(columns: &mut [Vec<f64>], first: usize, coefficients: &[f64]) {
+    let height = coefficients.len() / columns.len();
+    for (column, added) in columns.iter_mut().zip(coefficients.chunks(height.max(1))) {
+        column[first..].iter_mut().zip(added).for_each(|(c, x)| *c += x);
+    }
+}
+
 /// Lengths in the inner product of M.
-fn norms(n: usize, vectors: &[f64], products: &[f64]) -> Vec<f64> {
-    let dot = |(x, y): (&[f64], &[f64])| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>().max(0.0).sqrt();
-    vectors.chunks_exact(n).zip(products.chunks_exact(n)).map(dot).collect()
+pub(super) fn norms(n: usize, vectors: &[f64], products: &[f64]) -> Vec<f64> {
+    let pairs = vectors.chunks_exact(n).zip(products.chunks_exact(n));
+    pairs.map(|(x, y)| dot(x, y).max(0.0).sqrt()).collect()
 }

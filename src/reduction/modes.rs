@@ -1,6 +1,6 @@
 //! Normal modes: the lowest eigenpairs of K φ = ω² M φ, computed or taken from another code, and checked.
 
-use super::lanczos::{Lanczos, Pairs, remove};
+use super::lanczos::{Lanczos, Pairs, norms, remove};
 use super::pencil::{self, Pencil};
 use crate::error::{Error, Result};
 use crate::kernels::dense::transposed_product;
@@ -527,8 +527,7 @@ fn lengths(pencil: &mut Pencil, vectors: &[f64]) -> Vec<f64> {
     let n = pencil.size();
     let mut products = vec![0.0; vectors.len()];
     pencil.mass_product(vectors, &mut products);
-    let square = |(x, m): (&[f64], &[f64])| x.iter().zip(m).map(|(x, m)| x * m).sum::<f64>();
-    vectors.chunks_exact(n).zip(products.chunks_exact(n)).map(|pair| square(pair).max(0.0).sqrt()).collect()
+    norms(n, vectors, &products)
 }
 
 /// Refuses a residual beyond a tolerance, or one that is not a number.

@@ -27,6 +27,7 @@ pub mod output;
 pub mod particles;
 pub mod plot;
 pub mod pounding;
+pub mod propagated;
 pub mod random;
 pub mod reduced;
 pub mod schemes;

@@ -13,7 +13,7 @@ use contact_dynamics::{
 pub const PARENT: usize = 1000;
 
 /// Velocity of the paper's bars, and the time of their impact.
-const SPEED: f64 = 0.05;
+pub(crate) const SPEED: f64 = 0.05;
 const IMPACT: f64 = 0.1;
 
 /// Exponent and softening of the taper as they are by default.
@@ -148,7 +148,7 @@ pub fn paper_bar(elements: usize) -> WallBar {
 }
 
 /// The error of forces, and the overshoot.
-fn errors(forces: &Forces, exact: &CollidingBars, h: f64) -> [f64; 2] {
+pub(crate) fn errors(forces: &Forces, exact: &CollidingBars, h: f64) -> [f64; 2] {
     let (start, end) = exact.contact_intervals()[0];
     let largest = exact.contact_force(start + 1e-6 * (end - start));
     let travel = 0.5 * (end - start);
@@ -207,7 +207,7 @@ pub fn wall_impact(
     Ok(summary(&all))
 }
 
-fn summary(all: &[([f64; 2], f64)]) -> Struck {
+pub(crate) fn summary(all: &[([f64; 2], f64)]) -> Struck {
     Struck {
         error: all.iter().map(|of| of.0[0]).sum::<f64>() / all.len() as f64,
         overshoot: all.iter().map(|of| of.0[1]).fold(f64::NEG_INFINITY, f64::max),
@@ -295,8 +295,7 @@ pub fn bounces(unknowns: usize, model: Model, scheme: fn() -> Box<dyn TimeIntegr
     let load = striker.load.clone();
     let mut run = striker.flying(0.0, bar.height, scheme(), h)?;
     let (period, late) = (exact.period(), late(&*scheme(), h));
-    let [t1, t2, ..] = exact.events();
-    let (mut sum, mut size) = (0.0, 0.0);
+    let mut forces = Vec::new();
     let total = |run: &mut Simulation<'_, f64>| {
         let work: f64 = load.iter().zip(run.state().displacement()).map(|(f, u)| f * u).sum();
         run.energy().total() - work + bar.weight() * bar.height
@@ -304,12 +303,21 @@ pub fn bounces(unknowns: usize, model: Model, scheme: fn() -> Box<dyn TimeIntegr
     let start = total(&mut run);
     while run.time() < 6.0 * period - 0.5 * h {
         run.step()?;
-        let (t, force) = (run.time() + late, run.state().contacts().forces()[0]);
+        forces.push((run.time() + late, run.state().contacts().forces()[0]));
+    }
+    Ok(Bounced { error: share_of_misses(&forces, &exact, h), energy: total(&mut run) / start })
+}
+
+/// The mean error of forces near the first contact of the bouncing bar, over the mean force there.
+pub(crate) fn share_of_misses(forces: &Forces, exact: &BouncingBar, h: f64) -> f64 {
+    let [t1, t2, ..] = exact.events();
+    let (mut sum, mut size) = (0.0, 0.0);
+    for &(t, force) in forces {
         if t > t1 - 0.1 && t < t2 + 0.1 && (t - t1).abs() > h && (t - t2).abs() > h {
             let expected = exact.contact_force(t);
             sum += (force - expected).abs();
             size += expected;
         }
     }
-    Ok(Bounced { error: sum / size, energy: total(&mut run) / start })
+    sum / size
 }

@@ -1,0 +1,141 @@
+//! The exact step of one mode whose force is linear in time (Nigam and Jennings, Bull. Seism. Soc. Am. 59, 1969).
+
+/// `η̈ + c η̇ + k η = f` with f linear over a step h: values at its end from those at its start, rows of η and η̇.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ExactStep {
+    /// By η and η̇ at the start.
+    pub(super) motion: [[f64; 2]; 2],
+    /// By f at the start and at the end.
+    pub(super) force: [[f64; 2]; 2],
+}
+
+/// The response to a unit impulse, its rate, and its first two integrals, over a time h; in units of h.
+///
+/// (`kept` is `rate + damping · value`, but with strong damping not in digits.)
+#[derive(Clone, Copy, Debug)]
+struct Impulse {
+    damping: f64,
+    stiffness: f64,
+    /// What is left of a displacement.
+    kept: f64,
+    rate: f64,
+    value: f64,
+    once: f64,
+    twice: f64,
+}
+
+/// From c h + k h² below this on, series converge within `TERMS`.
+const SHORT: f64 = 0.5;
+const TERMS: u32 = 20;
+
+impl Impulse {
+    /// By their series about zero: derivatives of the response to an impulse follow from the equation of motion.
+    fn series(damping: f64, stiffness: f64) -> Self {
+        let (mut last, mut derivative) = (0.0, 1.0);
+        let mut sums = Self { damping, stiffness, kept: 0.0, rate: 0.0, value: 0.0, once: 0.0, twice: 0.0 };
+        // 1/n! for the n-th derivative.
+        let mut share = 1.0;
+        for n in 1..TERMS {
+            let n = f64::from(n);
+            sums.rate += derivative * share;
+            share /= n;
+            sums.value += derivative * share;
+            sums.once += derivative * share / (n + 1.0);
+            sums.twice += derivative * share / ((n + 1.0) * (n + 2.0));
+            (last, derivative) = (derivative, -damping * derivative - stiffness * last);
+        }
+        sums.kept = sums.rate + damping * sums.value;
+        sums
+    }
+
+    /// Over twice the time: the second half starts from the state and the force that the first one ends with. In units
+    /// of the whole time.
+    fn doubled(self) -> Self {
+        let after = |[value, rate]: [f64; 2]| self.kept * value + self.value * rate;
+        let elastic = self.stiffness * self.value * self.value;
+        Self {
+            damping: 2.0 * self.damping,
+            stiffness: 4.0 * self.stiffness,
+            kept: self.kept * self.kept - elastic,
+            rate: self.rate * self.rate - elastic,
+            value: 0.5 * after([self.value, self.rate]),
+            once: 0.25 * (after([self.once, self.value]) + self.once),
+            twice: 0.125 * (after([self.twice, self.once]) + self.once + self.twice),
+        }
+    }
+}
+
+impl ExactStep {
+    /// Of a mode with damping c (1/time) and the square k of its circular frequency, both not negative.
+    pub(super) fn new(damping: f64, stiffness: f64, h: f64) -> Self {
+        let (mut c, mut k, mut doublings) = (damping * h, stiffness * h * h, 0);
+        while c + k > SHORT {
+            (c, k, doublings) = (0.5 * c, 0.25 * k, doublings + 1);
+        }
+        let mut impulse = Impulse::series(c, k);
+        for _ in 0..doublings {
+            impulse = impulse.doubled();
+        }
+        let Impulse { stiffness, kept, rate, value, once, twice, .. } = impulse;
+        Self {
+            motion: [[kept, h * value], [-stiffness * value / h, rate]],
+            force: [[h * h * (once - twice), h * h * twice], [h * (value - once), h * once]],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ExactStep;
+    use crate::reference::single_oscillator;
+
+    #[test]
+    fn free_motion_is_that_of_an_oscillator() {
+        for (omega, ratio) in [(0.0, 0.0), (1e-6, 0.0), (2.0, 0.0), (31.4, 0.0), (3.0, 0.3), (5.0, 1.0), (9.0, 40.0)] {
+            let h = 0.1;
+            let step = ExactStep::new(2.0 * ratio * omega, omega * omega, h);
+            // Each doubling of the time doubles the rounding; strong damping takes eight of them.
+            let rounding = if ratio > 1.0 { 1e-13 } else { 4e-15 };
+            for (column, start) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                let [u, v, _] = single_oscillator(omega, ratio, start[0], start[1], h);
+                assert!((step.motion[0][column] - u).abs() <= rounding, "{omega} {ratio}: {step:?} {u}");
+                assert!(
+                    (step.motion[1][column] - v).abs() <= rounding * omega.max(1.0),
+                    "{omega} {ratio}: {step:?} {v}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn forces_that_are_linear_are_met_exactly() {
+        for (damping, stiffness) in [(0.0, 4.0), (0.6, 4.0), (0.0, 900.0), (80.0, 900.0), (30.0, 1e-9)] {
+            let (h, [start, end]) = (0.1, [3.0, 5.0]);
+            let step = ExactStep::new(damping, stiffness, h);
+            // A motion a + b t with k a + c b + k b t = f.
+            let b = (end - start) / (h * stiffness);
+            let a = (start - damping * b) / stiffness;
+            let at = |row: usize| {
+                let [by_value, by_rate] = step.motion[row];
+                let [by_start, by_end] = step.force[row];
+                [by_value * a, by_rate * b, by_start * start, by_end * end]
+            };
+            for (row, exact) in [a + b * h, b].into_iter().enumerate() {
+                let terms = at(row);
+                let size = terms.iter().fold(0.0_f64, |sum, x| sum + x.abs());
+                assert!((terms.iter().sum::<f64>() - exact).abs() <= 1e-14 * size, "{damping} {stiffness} {row}");
+            }
+        }
+    }
+
+    #[test]
+    fn rigid_motions_have_the_step_of_a_mass() {
+        let h = 0.25;
+        let step = ExactStep::new(0.0, 0.0, h);
+        assert_eq!(step.motion, [[1.0, h], [0.0, 1.0]]);
+        let exact = [[h * h / 3.0, h * h / 6.0], [h / 2.0, h / 2.0]];
+        for (row, exact) in step.force.iter().zip(exact) {
+            assert!(row.iter().zip(exact).all(|(x, exact)| (x - exact).abs() < 1e-17), "{step:?}");
+        }
+    }
+}

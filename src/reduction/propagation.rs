@@ -1,0 +1,635 @@
+//! Reduced bodies in steps that are exact between contacts: no scheme, but the solution of each mode itself.
+
+use super::body::ReducedBody;
+use super::builder::Boundary;
+use super::exact_step::ExactStep;
+use crate::contact::{ContactConstraint, LinearRows};
+use crate::contact_id::ContactId;
+use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, contact_error};
+use crate::dense::{DenseCholesky, dot};
+use crate::error::{Error, Result, step_size};
+use crate::memory;
+use crate::real::Real;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
+
+/// Share of the rounding of a gap's terms below which it is zero.
+const ROUNDING: f64 = 16.0;
+
+/// Names of the two matrices of contact, for solvers that keep what they have computed: at the start, and of the steps.
+const VERSIONS: [u64; 2] = [1, 2];
+
+/// Reduced bodies, propagated exactly: between the ends of a step every mode moves as its equation says, under a
+/// contact force that is linear in time.
+///
+/// ```math
+/// \begin{aligned}
+/// & \ddot\eta + 2 \xi \omega \dot\eta + \omega^2 \eta = P^T \left( \lambda_n + (\lambda_{n+1} - \lambda_n) \, t / h
+///   \right) + \ldots \\
+/// & u_b = P \eta_{n+1} + F \lambda_{n+1}, \qquad 0 \le G u_b + g_0 \perp \lambda_{n+1} \ge 0
+/// \end{aligned}
+/// ```
+///
+/// The recurrence of each mode is that of Nigam and Jennings (Bull. Seism. Soc. Am. 59, 1969), also known as the
+/// piecewise exact method; contact acts at the end of the step. It is no [`TimeIntegrator`](crate::TimeIntegrator):
+/// its coefficients differ from mode to mode, which rows of a tableau do not. Dofs are those of
+/// [`Blocks`](super::Blocks): one body after the other, its modes, then its contact dofs.
+///
+/// * Free motion is exact, damped or not, in steps of any length up to the limit below, and so is motion under loads
+///   that are linear in each step. In contact the force is of second order where it is smooth.
+/// * The step is limited: ω_r h ≤ π, ω_r the largest frequency of the modes, and refused beyond: a mode that turns by
+///   more than half a circle in a step is not controlled by one value of the force.
+/// * No theorem says that energy is kept in contact, nor that it does not grow. Known failures, measured in
+///   `docs/reduction.md`: the force overshoots the more, the more modes there are, and bodies that are not tapered
+///   gain energy without bound near ω_r h = π. Take tapered ones.
+/// * Without friction, bonds and compliant laws; G is constant (the obstacle may move).
+///
+/// ```
+/// use contact_dynamics::LinearRows;
+/// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+/// use contact_dynamics::reduction::{ModalPropagation, Reduction};
+///
+/// // A free chain of 400 springs and masses flies at a wall: k = m = 1, and the wall presses with √(k m) v.
+/// let n = 400;
+/// let springs = (1..=n).flat_map(|i| [(i - 1, i - 1, 1.0), (i, i, 1.0), (i - 1, i, -1.0), (i, i - 1, -1.0)]);
+/// let entries: Vec<_> = springs.map(|(i, j, k)| Triplet::new(i, j, k)).collect();
+/// let k = SparseColMat::<usize, f64>::try_new_from_triplets(n + 1, n + 1, &entries)?;
+/// let masses: Vec<_> = (0..=n).map(|i| Triplet::new(i, i, 1.0)).collect();
+/// let m = SparseColMat::try_new_from_triplets(n + 1, n + 1, &masses)?;
+/// let body = Reduction::new(m.as_ref(), k.as_ref(), &[0]).modes(40)?;
+///
+/// let wall = LinearRows::new().unilateral(&[(body.contact_dofs().start, 1.0)], 0.02);
+/// let mut run = ModalPropagation::builder(&[&body], 4.0)
+///     .velocity(body.velocity(&vec![-0.01; n + 1])?)
+///     .constraint(wall)
+///     .build()?;
+/// let before = run.kinetic_energy() + run.elastic_energy();
+/// run.run_until(400.0)?;
+/// assert!((run.forces()[0] / 0.01 - 1.0).abs() < 0.02);
+/// run.run_until(2000.0)?;
+/// let after = run.kinetic_energy() + run.elastic_energy();
+/// assert!((after / before - 1.0).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ModalPropagation<'a, T: Real> {
+    h: f64,
+    start: f64,
+    steps: u64,
+    bodies: Vec<Body<T>>,
+    loads: Loads<'a, T>,
+    contact: Contact<'a, T>,
+    state: Motion<T>,
+    /// What a step writes; it becomes the state if nothing fails.
+    next: Motion<T>,
+}
+
+/// Builds a [`ModalPropagation`]; everything is checked by [`build`](Self::build).
+#[derive(Debug)]
+pub struct ModalPropagationBuilder<'a, T: Real> {
+    bodies: Vec<&'a ReducedBody<T>>,
+    h: f64,
+    start: f64,
+    displacement: Option<Vec<T>>,
+    velocity: Option<Vec<T>>,
+    rows: LinearRows<'a, T>,
+    load: Option<LoadFunction<'a, T>>,
+    solver: Box<dyn ContactSolver<T> + 'a>,
+}
+
+/// A load that changes in time.
+struct LoadFunction<'a, T>(Load<'a, T>);
+
+impl<T> std::fmt::Debug for LoadFunction<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("LoadFunction")
+    }
+}
+
+/// A body: where its modes and contact dofs stand, and how they answer.
+#[derive(Debug)]
+struct Body<T> {
+    modes: Range<usize>,
+    contact: Range<usize>,
+    /// P, contact dof by contact dof, and F.
+    coupling: Vec<T>,
+    flexibility: Vec<T>,
+    squares: Vec<T>,
+    steps: Vec<ModeStep<T>>,
+}
+
+/// [`ExactStep`] in the scalar of the run.
+#[derive(Clone, Copy, Debug)]
+struct ModeStep<T> {
+    motion: [[T; 2]; 2],
+    force: [[T; 2]; 2],
+}
+
+#[derive(Debug)]
+struct Loads<'a, T> {
+    function: Option<LoadFunction<'a, T>>,
+    /// On all dofs: the constant one, or that at the end of the step.
+    values: Vec<T>,
+}
+
+#[derive(Debug)]
+struct Contact<'a, T: Real> {
+    rows: LinearRows<'a, T>,
+    /// G over all dofs.
+    entries: Vec<Vec<(usize, T)>>,
+    sets: Vec<AdmissibleSet>,
+    /// W of a step.
+    delassus: Vec<T>,
+    offset: Vec<T>,
+    tolerance: Vec<T>,
+    solver: Box<dyn ContactSolver<T> + 'a>,
+}
+
+/// A state, on all dofs.
+#[derive(Clone, Debug)]
+struct Motion<T> {
+    displacement: Vec<T>,
+    velocity: Vec<T>,
+    /// What acts on the modes, and on the contact dofs, there with the contact forces.
+    force: Vec<T>,
+    multipliers: Vec<T>,
+    gaps: Vec<T>,
+}
+
+impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
+    /// The time at the start; default 0.
+    #[must_use]
+    pub fn start_time(self, start: f64) -> Self {
+        Self { start, ..self }
+    }
+
+    /// Displacements of all dofs at the start ([`ReducedBody::displacement`]); zero by default. Those of the contact
+    /// dofs follow from the modes, loads and contact.
+    #[must_use]
+    pub fn displacement(self, displacement: Vec<T>) -> Self {
+        Self { displacement: Some(displacement), ..self }
+    }
+
+    /// Velocities of all dofs at the start ([`ReducedBody::velocity`]); zero by default. Those of the contact dofs
+    /// follow.
+    #[must_use]
+    pub fn velocity(self, velocity: Vec<T>) -> Self {
+        Self { velocity: Some(velocity), ..self }
+    }
+
+    /// The rows of contact, over contact dofs of the bodies: rigid and equality ones.
+    #[must_use]
+    pub fn constraint(self, rows: LinearRows<'a, T>) -> Self {
+        Self { rows, ..self }
+    }
+
+    /// A load on all dofs that replaces the constant ones of the bodies: the closure writes it at t, into zeros. It is
+    /// taken as linear between the ends of a step, exactly if it is.
+    #[must_use]
+    pub fn load(self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
+        Self { load: Some(LoadFunction(Box::new(load))), ..self }
+    }
+
+    /// The solver of the contact problems; default [`ActiveSet`].
+    #[must_use]
+    pub fn contact_solver(self, solver: impl ContactSolver<T> + 'a) -> Self {
+        Self { solver: Box::new(solver), ..self }
+    }
+
+    /// The propagation, with contact at the start solved.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for a step size that is not positive and finite, and for one with ω_r h > π (the product is
+    /// given); [`Error::Empty`] without a body; [`Error::Incompatible`] for [`Boundary::CraigBampton`], whose contact
+    /// dofs have mass, for rows on other dofs, under other laws, with friction or bonds, and for a solver that does not
+    /// take them;
+    /// [`Error::Dimension`] and [`Error::NotFinite`] for displacements, velocities and loads; contact errors as of a
+    /// [`step`](ModalPropagation::step).
+    pub fn build(self) -> Result<ModalPropagation<'a, T>> {
+        step_size::<T>(self.h)?;
+        if self.bodies.is_empty() {
+            return Err(Error::Empty { what: "the list of reduced bodies", remedy: "give at least one" });
+        }
+        if !self.start.is_finite() {
+            return Err(Error::Parameter { name: "the start time", value: self.start, range: "finite" });
+        }
+        let (mut bodies, mut constant, mut dofs) = (Vec::new(), Vec::new(), 0);
+        for &body in &self.bodies {
+            bodies.push(Body::new(body, dofs, self.h)?);
+            constant.extend_from_slice(body.constant_load().unwrap_or(&vec![T::zero(); body.dofs()]));
+            dofs += body.dofs();
+        }
+        let contact = Contact::new(self.rows, self.solver, &bodies, dofs)?;
+        let start = |what, given: Option<Vec<T>>| -> Result<Vec<T>> {
+            let values = given.unwrap_or_else(|| vec![T::zero(); dofs]);
+            if values.len() != dofs {
+                return Err(Error::Dimension { what, expected: dofs, found: values.len() });
+            }
+            finite(what, &values)?;
+            Ok(values)
+        };
+        let state = Motion {
+            displacement: start("the displacements at the start", self.displacement)?,
+            velocity: start("the velocities at the start", self.velocity)?,
+            force: vec![T::zero(); dofs],
+            multipliers: vec![T::zero(); contact.sets.len()],
+            gaps: vec![T::zero(); contact.sets.len()],
+        };
+        let mut run = ModalPropagation {
+            h: self.h,
+            start: self.start,
+            steps: 0,
+            bodies,
+            loads: Loads { function: self.load, values: constant },
+            contact,
+            next: state.clone(),
+            state,
+        };
+        run.begin()?;
+        Ok(run)
+    }
+}
+
+impl<'a, T: Real> ModalPropagation<'a, T> {
+    /// Bodies side by side, in steps of h; see [`ModalPropagationBuilder`] for what else there is.
+    pub fn builder(bodies: &[&'a ReducedBody<T>], h: f64) -> ModalPropagationBuilder<'a, T> {
+        ModalPropagationBuilder {
+            bodies: bodies.to_vec(),
+            h,
+            start: 0.0,
+            displacement: None,
+            velocity: None,
+            rows: LinearRows::new(),
+            load: None,
+            solver: Box::new(ActiveSet::default()),
+        }
+    }
+
+    /// Time.
+    pub fn time(&self) -> f64 {
+        self.start + self.steps as f64 * self.h
+    }
+
+    /// The step size h.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// Displacements of all dofs: of each body its modes, then its contact dofs.
+    pub fn displacement(&self) -> &[T] {
+        &self.state.displacement
+    }
+
+    /// Velocities of all dofs; those of contact dofs P η̇ + F λ̇, with λ̇ of the step before.
+    pub fn velocity(&self) -> &[T] {
+        &self.state.velocity
+    }
+
+    /// The contact forces λ of all rows, at the present time.
+    pub fn forces(&self) -> &[T] {
+        &self.state.multipliers
+    }
+
+    /// The gaps of all rows.
+    pub fn gaps(&self) -> &[T] {
+        &self.state.gaps
+    }
+
+    /// Kinetic energy.
+    pub fn kinetic_energy(&self) -> T {
+        let modes = self.bodies.iter().flat_map(|body| &self.state.velocity[body.modes.clone()]);
+        T::of(0.5) * modes.map(|&v| v * v).sum::<T>()
+    }
+
+    /// Elastic energy: of the modes, and of what follows the contact forces statically.
+    pub fn elastic_energy(&self) -> T {
+        let of_body = |body: &Body<T>| {
+            let modes = self.state.displacement[body.modes.clone()].iter().zip(&body.squares);
+            let force = &self.state.force[body.contact.clone()];
+            let rows = body.flexibility.chunks_exact(force.len()).zip(force);
+            modes.map(|(&x, &square)| square * x * x).sum::<T>() + rows.map(|(row, &f)| f * dot(row, force)).sum::<T>()
+        };
+        T::of(0.5) * self.bodies.iter().map(of_body).sum::<T>()
+    }
+
+    /// Steps until the time is reached or passed, to rounding of the step.
+    ///
+    /// # Errors
+    ///
+    /// As [`step`](Self::step); the state is that of the last step that did not fail.
+    pub fn run_until(&mut self, time: f64) -> Result<()> {
+        while time - self.time() > 1e-6 * self.h {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// One step.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotFinite`] for a load, [`Error::StepNotFinite`], [`Error::Contact`] and
+    /// [`Error::ContradictoryContacts`]; the state is then as it was.
+    pub fn step(&mut self) -> Result<()> {
+        let time = self.start + (self.steps + 1) as f64 * self.h;
+        self.loads.evaluate(time)?;
+        let Self { bodies, state, next, loads, contact, h, .. } = self;
+        for body in bodies.iter() {
+            body.take_loads(&loads.values, &mut next.force);
+            body.move_freely(state, next);
+            body.follow(&next.force, &mut next.displacement);
+        }
+        next.multipliers.copy_from_slice(&state.multipliers);
+        contact.solve(time, None, next)?;
+        let rate = T::of(1.0 / *h);
+        for body in bodies.iter() {
+            body.push(&contact.forces_on(&body.contact, &next.multipliers), next);
+            body.follow(&next.force, &mut next.displacement);
+            let change: Vec<T> = body.contact.clone().map(|dof| rate * (next.force[dof] - state.force[dof])).collect();
+            body.follow_with(&change, &mut next.velocity);
+        }
+        for (what, values) in [("displacement", &next.displacement), ("velocity", &next.velocity)] {
+            if let Some(dof) = values.iter().position(|x| !x.is_finite()) {
+                let value = values[dof].value();
+                return Err(Error::StepNotFinite { t: time - *h, h: *h, what, dof, value });
+            }
+        }
+        contact.gaps(time, next)?;
+        std::mem::swap(&mut self.state, &mut self.next);
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// Contact dofs and forces at the start, from those of the modes: static.
+    fn begin(&mut self) -> Result<()> {
+        self.loads.evaluate(self.start)?;
+        let Self { bodies, state, loads, contact, .. } = self;
+        for body in bodies.iter() {
+            body.take_loads(&loads.values, &mut state.force);
+            body.follow(&state.force, &mut state.displacement);
+        }
+        let delassus = contact.delassus(bodies, |body| body.flexibility.clone())?;
+        contact.solve(self.start, Some(&delassus), state)?;
+        for body in bodies.iter() {
+            let forces = contact.forces_on(&body.contact, &state.multipliers);
+            body.press(&forces, &mut state.force);
+            body.follow(&state.force, &mut state.displacement);
+            body.follow_with(&vec![T::zero(); forces.len()], &mut state.velocity);
+        }
+        contact.gaps(self.start, state)
+    }
+}
+
+impl<T: Real> Loads<'_, T> {
+    fn evaluate(&mut self, time: f64) -> Result<()> {
+        let Some(LoadFunction(load)) = &mut self.function else { return Ok(()) };
+        self.values.fill(T::zero());
+        load(time, &mut self.values);
+        finite("the load on reduced bodies", &self.values)
+    }
+}
+
+/// Refuses values that are not finite.
+fn finite<T: Real>(what: &'static str, values: &[T]) -> Result<()> {
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
+        None => Ok(()),
+    }
+}
+
+impl<T: Real> Body<T> {
+    fn new(body: &ReducedBody<T>, first: usize, h: f64) -> Result<Self> {
+        if body.boundary == Boundary::CraigBampton {
+            return Err(Error::Incompatible {
+                part: "a reduced body by Craig and Bampton".into(),
+                reason: "its contact dofs have mass; propagate a tapered or an untapered one",
+            });
+        }
+        let omegas = body.frequencies();
+        let (count, contacts) = (omegas.len(), body.dofs() - omegas.len());
+        let value = omegas.last().map_or(0.0, |omega| omega * h);
+        if value > PI {
+            let name = "the highest circular frequency of the modes times the step size";
+            return Err(Error::Parameter { name, value, range: "at most π: take smaller steps, or fewer modes" });
+        }
+        let damping = |k: usize| body.damping().map_or(0.0, |c| crate::sparse::entry(c, k, k).value());
+        let scalars = |rows: [[f64; 2]; 2]| rows.map(|row| row.map(T::of));
+        let step = |(k, &omega): (usize, &f64)| {
+            let step = ExactStep::new(damping(k), omega * omega, h);
+            ModeStep { motion: scalars(step.motion), force: scalars(step.force) }
+        };
+        // F from its inverse.
+        let mut factor = DenseCholesky::default();
+        let singular = || Error::Incompatible {
+            part: "the flexibility of a reduced body".into(),
+            reason: "it is singular to rounding; take fewer modes",
+        };
+        factor.factorize(contacts, |i, j| body.weights[i * contacts + j]).map_err(|_| singular())?;
+        if factor.is_singular() {
+            return Err(singular());
+        }
+        let mut flexibility = memory::zeros(contacts, contacts, "the flexibility of a reduced body")?;
+        for (k, column) in flexibility.chunks_exact_mut(contacts).enumerate() {
+            column[k] = T::one();
+            factor.solve(column);
+        }
+        symmetrize(contacts, &mut flexibility);
+        Ok(Self {
+            modes: first..first + count,
+            contact: first + count..first + count + contacts,
+            coupling: body.coupling.clone(),
+            flexibility,
+            squares: omegas.iter().map(|omega| T::of(omega * omega)).collect(),
+            steps: omegas.iter().enumerate().map(step).collect(),
+        })
+    }
+
+    /// The compliance of the contact dofs over a step: P diag(what a unit force at its end moves each mode) Pᵀ + F.
+    fn compliance(&self) -> Vec<T> {
+        let (count, contacts) = (self.modes.len(), self.contact.len());
+        let mut out = self.flexibility.clone();
+        for (i, row) in out.chunks_exact_mut(contacts).enumerate() {
+            let own = &self.coupling[i * count..(i + 1) * count];
+            let moved: Vec<T> = own.iter().zip(&self.steps).map(|(&p, step)| p * step.force[0][1]).collect();
+            for (x, other) in row.iter_mut().zip(self.coupling.chunks_exact(count)) {
+                *x += dot(&moved, other);
+            }
+        }
+        symmetrize(contacts, &mut out);
+        out
+    }
+
+    /// Loads as forces on modes and contact dofs.
+    fn take_loads(&self, loads: &[T], force: &mut [T]) {
+        force[self.modes.clone()].copy_from_slice(&loads[self.modes.clone()]);
+        force[self.contact.clone()].fill(T::zero());
+        self.press(&loads[self.contact.clone()], force);
+    }
+
+    /// Adds forces on the contact dofs, and what they do to the modes.
+    fn press(&self, forces: &[T], out: &mut [T]) {
+        let (modes, contact) = (self.modes.clone(), self.contact.clone());
+        for (row, &force) in self.coupling.chunks_exact(modes.len()).zip(forces) {
+            T::axpy(force, row, &mut out[modes.clone()]);
+        }
+        T::axpy(T::one(), forces, &mut out[contact]);
+    }
+
+    /// The modes at the end of a step without contact forces there.
+    fn move_freely(&self, state: &Motion<T>, next: &mut Motion<T>) {
+        for (dof, step) in self.modes.clone().zip(&self.steps) {
+            let (u, v, forces) = (state.displacement[dof], state.velocity[dof], [state.force[dof], next.force[dof]]);
+            let row = |k: usize| {
+                let ([by_u, by_v], [by_start, by_end]) = (step.motion[k], step.force[k]);
+                by_u * u + by_v * v + by_start * forces[0] + by_end * forces[1]
+            };
+            (next.displacement[dof], next.velocity[dof]) = (row(0), row(1));
+        }
+    }
+
+    /// What contact forces at the end of the step add.
+    fn push(&self, forces: &[T], next: &mut Motion<T>) {
+        let mut pushed = vec![T::zero(); self.modes.len()];
+        for (row, &force) in self.coupling.chunks_exact(pushed.len()).zip(forces) {
+            T::axpy(force, row, &mut pushed);
+        }
+        for ((dof, step), &force) in self.modes.clone().zip(&self.steps).zip(&pushed) {
+            next.displacement[dof] += step.force[0][1] * force;
+            next.velocity[dof] += step.force[1][1] * force;
+        }
+        self.press(forces, &mut next.force);
+    }
+
+    /// u_b = P η + F f.
+    fn follow(&self, force: &[T], values: &mut [T]) {
+        self.follow_with(&force[self.contact.clone()], values);
+    }
+
+    fn follow_with(&self, forces: &[T], values: &mut [T]) {
+        let (modes, contact) = values.split_at_mut(self.contact.start);
+        let modes = &modes[self.modes.clone()];
+        let rows = self.coupling.chunks_exact(modes.len()).zip(self.flexibility.chunks_exact(forces.len()));
+        for (u, (p, f)) in contact[..forces.len()].iter_mut().zip(rows) {
+            *u = dot(p, modes) + dot(f, forces);
+        }
+    }
+}
+
+fn symmetrize<T: Real>(size: usize, a: &mut [T]) {
+    for i in 0..size {
+        for j in 0..i {
+            let mean = T::of(0.5) * (a[i * size + j] + a[j * size + i]);
+            (a[i * size + j], a[j * size + i]) = (mean, mean);
+        }
+    }
+}
+
+impl<'a, T: Real> Contact<'a, T> {
+    fn new(
+        rows: LinearRows<'a, T>,
+        solver: Box<dyn ContactSolver<T> + 'a>,
+        bodies: &[Body<T>],
+        dofs: usize,
+    ) -> Result<Self> {
+        let plain = rows.plain()?.into_iter().map(|(entries, law)| (entries, AdmissibleSet::from(law)));
+        let (entries, sets): (Vec<_>, Vec<AdmissibleSet>) = plain.unzip();
+        for (dof, row) in entries.iter().enumerate().flat_map(|(row, of)| of.iter().map(move |&(dof, _)| (dof, row))) {
+            if !bodies.iter().any(|body| body.contact.contains(&dof)) {
+                return Err(Error::Incompatible {
+                    part: format!("dof {dof} of contact row {row} ({dofs} dofs in all)"),
+                    reason: "it is no contact dof of a reduced body",
+                });
+            }
+        }
+        if let Some(set) = sets.iter().find(|&&set| !solver.admits(set)) {
+            return Err(Error::Incompatible {
+                part: "the contact solver".into(),
+                reason: match set {
+                    AdmissibleSet::Free => "it takes no equality rows; use ActiveSet or GaussSeidel",
+                    _ => "it takes no unilateral rows; use ActiveSet or GaussSeidel",
+                },
+            });
+        }
+        let size = sets.len();
+        let (offset, tolerance) = (vec![T::zero(); size], vec![T::zero(); size]);
+        let mut contact = Self { rows, entries, sets, delassus: Vec::new(), offset, tolerance, solver };
+        contact.solver.reserve(size);
+        contact.delassus = contact.delassus(bodies, Body::compliance)?;
+        Ok(contact)
+    }
+
+    /// G C Gᵀ, C the compliances of the bodies.
+    fn delassus(&self, bodies: &[Body<T>], compliance: impl Fn(&Body<T>) -> Vec<T>) -> Result<Vec<T>> {
+        let size = self.sets.len();
+        let mut out = memory::zeros(size, size, "the Delassus operator")?;
+        for body in bodies {
+            let (contacts, first) = (body.contact.len(), body.contact.start);
+            let compliance = compliance(body);
+            let of_body = |row: &'_ [(usize, T)]| -> Vec<(usize, T)> {
+                let entries = row.iter().filter(|(dof, _)| body.contact.contains(dof));
+                entries.map(|&(dof, weight)| (dof - first, weight)).collect()
+            };
+            let rows: Vec<Vec<(usize, T)>> = self.entries.iter().map(|row| of_body(row)).collect();
+            for (i, row) in rows.iter().enumerate() {
+                let mut moved = vec![T::zero(); contacts];
+                for &(place, weight) in row {
+                    T::axpy(weight, &compliance[place * contacts..(place + 1) * contacts], &mut moved);
+                }
+                for (x, other) in out[i * size..=i * size + i].iter_mut().zip(&rows) {
+                    *x += other.iter().map(|&(place, weight)| weight * moved[place]).sum::<T>();
+                }
+            }
+        }
+        for i in 0..size {
+            for j in 0..i {
+                out[j * size + i] = out[i * size + j];
+            }
+        }
+        Ok(out)
+    }
+
+    /// G u + g0, and for each row the size of the terms.
+    fn gaps(&mut self, time: f64, motion: &mut Motion<T>) -> Result<()> {
+        self.rows.gaps(time, &vec![T::zero(); self.rows.dofs().len()], &mut motion.gaps)?;
+        for ((gap, size), entries) in motion.gaps.iter_mut().zip(&mut self.tolerance).zip(&self.entries) {
+            let terms = || entries.iter().map(|&(dof, weight)| weight * motion.displacement[dof]);
+            *size = gap.abs() + terms().map(T::abs).sum::<T>();
+            *gap += terms().sum::<T>();
+        }
+        Ok(())
+    }
+
+    /// The multipliers at the end of a step, from displacements without them; with another W at the start.
+    fn solve(&mut self, time: f64, delassus: Option<&[T]>, motion: &mut Motion<T>) -> Result<()> {
+        self.gaps(time, motion)?;
+        let share = T::of(ROUNDING) * T::epsilon();
+        for size in &mut self.tolerance {
+            *size *= share;
+        }
+        self.offset.copy_from_slice(&motion.gaps);
+        let (matrix, version) = match delassus {
+            Some(delassus) => (delassus, VERSIONS[0]),
+            None => (&self.delassus[..], VERSIONS[1]),
+        };
+        let problem = ContactProblem::new(matrix, &self.offset, &self.sets, &self.tolerance)?.with_version(version);
+        let id = |feature: usize| ContactId { feature, ..ContactId::default() };
+        match self.solver.solve(&problem, &mut motion.multipliers) {
+            Ok(_) => Ok(()),
+            Err(failure) => Err(contact_error(time, failure, id)),
+        }
+    }
+
+    /// Gᵀ λ on the contact dofs of a body.
+    fn forces_on(&self, contact: &Range<usize>, multipliers: &[T]) -> Vec<T> {
+        let mut forces = vec![T::zero(); contact.len()];
+        for (row, &multiplier) in self.entries.iter().zip(multipliers) {
+            for &(dof, weight) in row.iter().filter(|(dof, _)| contact.contains(dof)) {
+                forces[dof - contact.start] += weight * multiplier;
+            }
+        }
+        forces
+    }
+}
