@@ -48,7 +48,10 @@ impl Chance {
         let sizes: Vec<usize> = (0..bodies).map(|body| 4 + body % 3).collect();
         let flexibilities = sizes.iter().map(|&n| flexibility(random, n, n)).collect();
         let free = sizes.iter().map(|&n| (0..n).map(|_| random() - 0.5).collect()).collect();
-        let pick = |random: &mut dyn FnMut() -> f64, n: usize| (random() * n as f64) as usize % n;
+        let pick = |random: &mut dyn FnMut() -> f64, n: usize| {
+            let place = random() * n as f64;
+            (1..n).filter(|&k| place >= k as f64).count()
+        };
         let row = |random: &mut dyn FnMut() -> f64| {
             (0..4)
                 .map(|k| {

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::scene::{Comparison, H, motion};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::partitioned::{Assembly, Coupling};
-use contact_dynamics::{Automatic, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
+use contact_dynamics::{LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::diagonal;
 use std::ops::Range;
