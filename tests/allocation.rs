@@ -7,7 +7,7 @@ use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::linear_solver::Preconditioner;
-use contact_dynamics::partitioned::{self, Frame};
+use contact_dynamics::partitioned::{self, Assembly, Coupling, Frame};
 use contact_dynamics::{
     ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
     LinearSolver, LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
@@ -35,6 +35,7 @@ fn steps_do_not_allocate() {
     bodies_apart();
     iterations();
     frames();
+    assemblies();
     rotors();
     friction();
     weighted_gaps();
@@ -419,6 +420,33 @@ fn frames() {
             let found = frame.solve([first, second], &gaps).unwrap();
             assert_eq!(found.closed().iter().filter(|closed| **closed).count(), closed);
             frame.hold([first, second], &gaps, &held).unwrap();
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+}
+
+/// Three bodies whose rows close one by one, and are held one by one, as a body softens.
+fn assemblies() {
+    let n = 6_usize;
+    let flexibility = |size: f64| -> Vec<f64> {
+        (0..n * n)
+            .map(|k| (if k / n == k % n { size } else { 0.0 }) + 1.0 / (1 + (k / n).abs_diff(k % n)) as f64)
+            .collect()
+    };
+    let (stiff, soft) = (flexibility(2.0), flexibility(5.0));
+    let row = |i: usize| Coupling::unilateral(&[(0, i, -1.0), (1, i, 0.5), (2, (i + 1) % n, 0.5)]);
+    let rows: Vec<_> = (0..n).map(row).collect();
+    let mut assembly = Assembly::new(&[&stiff, &stiff, &stiff], &rows).unwrap();
+    let (mut free, still, mut held) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
+    let counted = allocation_counter::measure(|| {
+        for closed in 0..=n {
+            for row in 0..n {
+                (free[row], held[row]) = (if row < closed { 1.0 } else { -9.0 }, row >= closed);
+            }
+            assembly.set_flexibility(1, if closed % 2 == 0 { &stiff } else { &soft }).unwrap();
+            let found = assembly.solve(&[&free, &still, &still], &still).unwrap();
+            assert_eq!(found.closed().iter().filter(|closed| **closed).count(), closed);
+            assembly.hold(&[&free, &still, &still], &still, &held).unwrap();
         }
     });
     assert_eq!(counted.count_total, 0);

@@ -1,105 +1,18 @@
 //! Bodies in codes of their own that meet at a frame: as in one code, and the equations of the frame.
 
+use crate::body::{Body, flexibility};
 use crate::scene::{Comparison, H, Scene, motion};
 use contact_dynamics::contact_solver::{ContactFailure, Pivoting};
-use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::partitioned::{Frame, Interface, Side};
-use contact_dynamics::{Automatic, Error, Factorization, Newmark};
+use contact_dynamics::{Automatic, Error, Newmark};
 use contact_dynamics_scenes::random::xorshift;
-use contact_dynamics_scenes::sparse::{block, factorized, product};
 use contact_dynamics_scenes::{Bars, MassKind};
 
-/// A body in a code of its own: Newmark's rows, its own factors of M + ¼ h² K and M, and its side of the frame.
-struct Body {
-    stiffness: SparseColMat<usize, f64>,
-    factor: Box<dyn Factorization<f64>>,
-    mass: Box<dyn Factorization<f64>>,
-    /// Its contact dofs, and the sign of a compressive force on them.
-    contact: Vec<usize>,
-    sign: f64,
-    /// What unit forces do to displacements, and to velocities and accelerations, at the interface.
-    flexibility: Vec<f64>,
-    inertia: Vec<f64>,
-    u: Vec<f64>,
-    v: Vec<f64>,
-    a: Vec<f64>,
-}
+/// What a compressive force is on the dofs of both bodies.
+const SIGNS: [f64; 2] = [-1.0, 1.0];
 
-/// The block of `scale` A⁻¹ on some dofs.
-fn on_interface(factor: &mut dyn Factorization<f64>, n: usize, dofs: &[usize], scale: f64) -> Vec<f64> {
-    let column = |&dof: &usize| {
-        let mut x = vec![0.0; n];
-        x[dof] = scale;
-        factor.solve(&mut x).unwrap();
-        dofs.iter().map(|&dof| x[dof]).collect::<Vec<_>>()
-    };
-    dofs.iter().flat_map(column).collect()
-}
-
-impl Body {
-    fn new(scene: &Scene, number: usize) -> Self {
-        let n = scene.velocity.len();
-        let range = [0..scene.split, scene.split..n][number].clone();
-        let quarter = 0.25 * H * H;
-        let mut factor = factorized(&Automatic, &block(&range, &[(1.0, &scene.mass), (quarter, &scene.stiffness)]));
-        let mut mass = factorized(&Automatic, &block(&range, &[(1.0, &scene.mass)]));
-        let contact: Vec<usize> = scene.pairs.iter().map(|pair| pair[number] - range.start).collect();
-        Self {
-            stiffness: block(&range, &[(1.0, &scene.stiffness)]),
-            flexibility: on_interface(&mut *factor, range.len(), &contact, quarter),
-            inertia: on_interface(&mut *mass, range.len(), &contact, 1.0),
-            factor,
-            mass,
-            contact,
-            sign: [-1.0, 1.0][number],
-            u: vec![0.0; range.len()],
-            v: scene.velocity[range.clone()].to_vec(),
-            a: vec![0.0; range.len()],
-        }
-    }
-
-    fn at_interface(&self, x: &[f64]) -> Vec<f64> {
-        self.contact.iter().map(|&dof| x[dof]).collect()
-    }
-
-    /// A step without contact.
-    fn advance(&mut self) {
-        for i in 0..self.u.len() {
-            self.u[i] += H * self.v[i] + 0.25 * H * H * self.a[i];
-            self.v[i] += 0.5 * H * self.a[i];
-        }
-        self.a = product(self.stiffness.as_ref(), &self.u);
-        self.a.iter_mut().for_each(|f| *f = -*f);
-        self.factor.solve(&mut self.a).unwrap();
-        let Self { u, v, a, .. } = self;
-        for i in 0..u.len() {
-            u[i] += 0.25 * H * H * a[i];
-            v[i] += 0.5 * H * a[i];
-        }
-    }
-
-    fn forces(&self, l: &[f64]) -> Vec<f64> {
-        let mut f = vec![0.0; self.u.len()];
-        self.contact.iter().zip(l).for_each(|(&dof, l)| f[dof] = self.sign * l);
-        f
-    }
-
-    /// Adds the response to the forces of the frame.
-    fn push(&mut self, l: &[f64]) {
-        let mut a = self.forces(l);
-        self.factor.solve(&mut a).unwrap();
-        for (i, a) in a.into_iter().enumerate() {
-            self.u[i] += 0.25 * H * H * a;
-            self.v[i] += 0.5 * H * a;
-            self.a[i] += a;
-        }
-    }
-
-    fn jump(&mut self, l: &[f64]) -> Vec<f64> {
-        let mut x = self.forces(l);
-        self.mass.solve(&mut x).unwrap();
-        x
-    }
+fn signed(sign: f64, forces: &[f64]) -> Vec<f64> {
+    forces.iter().map(|force| sign * force).collect()
 }
 
 /// Both codes and the frames between them: one for displacements, one for rates.
@@ -115,7 +28,11 @@ impl Host {
     fn new(scene: &Scene) -> Self {
         let nodes = scene.pairs.len();
         Self {
-            bodies: [0, 1].map(|number| Body::new(scene, number)),
+            bodies: [0..scene.split, scene.split..scene.velocity.len()].map(|range| {
+                let number = usize::from(range.start > 0);
+                let contact = scene.pairs.iter().map(|pair| pair[number] - range.start).collect();
+                Body::new([&scene.mass, &scene.stiffness], &scene.velocity, range, contact)
+            }),
             frames: [0, 1].map(|_| Frame::new(nodes).unwrap()),
             gaps: scene.gaps.clone(),
             force: vec![0.0; nodes],
@@ -130,8 +47,8 @@ impl Host {
         let sides = [0, 1].map(|s| Side::new(&free[s], &bodies[s].flexibility));
         let interface = frame.solve(sides, gaps).unwrap().clone();
         // Both sides are where the frame says.
-        for body in &mut *bodies {
-            body.push(interface.forces());
+        for (body, sign) in bodies.iter_mut().zip(SIGNS) {
+            body.push(&signed(sign, interface.forces()));
         }
         for (body, values) in bodies.iter().zip(interface.values()) {
             let there = body.at_interface(&body.u);
@@ -154,16 +71,16 @@ impl Host {
         let held = engaged(interface.closed(), &v);
         let sides = [0, 1].map(|s| Side::new(&v[s], &bodies[s].inertia));
         let impulses = rates.hold(sides, &still, &held).unwrap().forces().to_vec();
-        for body in &mut *bodies {
-            let jump = body.jump(&impulses);
+        for (body, sign) in bodies.iter_mut().zip(SIGNS) {
+            let jump = body.jump(&signed(sign, &impulses));
             body.v.iter_mut().zip(jump).for_each(|(v, x)| *v += x);
         }
         let a = rate(bodies, |body| &body.a);
         let held = engaged(&held, &a);
         let sides = [0, 1].map(|s| Side::new(&a[s], &bodies[s].inertia));
         let forces = rates.hold(sides, &still, &held).unwrap().forces().to_vec();
-        for body in &mut *bodies {
-            let jump = body.jump(&forces);
+        for (body, sign) in bodies.iter_mut().zip(SIGNS) {
+            let jump = body.jump(&signed(sign, &forces));
             body.a.iter_mut().zip(jump).for_each(|(a, x)| *a += x);
         }
         force.iter_mut().zip(forces).for_each(|(force, l)| *force += l);
@@ -229,12 +146,6 @@ fn blocks_in_their_own_codes_collide_as_in_one() {
         compare(&format!("blocks, phase {phase}"), &blocks, true, 400);
         compare(&format!("blocks, phase {phase}"), &blocks, false, 400);
     }
-}
-
-/// A random flexibility of full rank, or of one dimension less.
-fn flexibility(random: &mut impl FnMut() -> f64, n: usize, rank: usize) -> Vec<f64> {
-    let b: Vec<f64> = (0..n * rank).map(|_| random() - 0.3).collect();
-    (0..n * n).map(|k| (0..rank).map(|r| b[k % n + r * n] * b[k / n + r * n]).sum()).collect()
 }
 
 /// The equations of the frame, and what it says of both sides.

@@ -1,0 +1,146 @@
+//! A dam of twenty blocks in a valley, whose joints open and close in an earthquake: in one factor, by bodies, by bodies
+//! on two threads, body by body with a frame between them, and with reduced blocks.
+//!
+//! `cargo run --release --features rayon --example dam -- --output target/dam` prints the tables of
+//! `docs/scenes/dam.md` and writes them and the record of the earthquake; with `--quick` the mesh is coarse and the run
+//! short. Without the feature everything takes one thread.
+//!
+//! `valley.rs` has the blocks, their joints and loads, `record.rs` what is written down of a run, `whole.rs` the runs of
+//! one system, `split.rs` the loop body by body, `threads.rs` the threads.
+
+mod record;
+mod split;
+mod threads;
+mod valley;
+mod whole;
+
+use contact_dynamics::Automatic;
+use contact_dynamics::{ByBody, Cholesky};
+use contact_dynamics_scenes::ground::Ground;
+use contact_dynamics_scenes::output::Output;
+use contact_dynamics_scenes::tables::decimal;
+use record::Record;
+use std::error::Error;
+use std::fmt::Write;
+use valley::{Dam, Loading, Plan};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let output = Output::from_command_line("dam")?;
+    let plan = if output.quick { Plan::QUICK } else { Plan::FULL };
+    let loading = Loading { ramp: plan.seconds(plan.ramp), ground: earthquake(&output, plan.seconds(plan.shaking))? };
+    let dam = Dam::new(&plan);
+    let records = records(&dam, &loading, &plan)?;
+    let page = [scene(&dam, &plan, &records[0])?, costs(&records)?, joints(&records)?].join("\n");
+    println!("{page}");
+    output.write("dam.md", &page)
+}
+
+/// The ground motion across the valley, downstream and upward: made, written, and read again.
+fn earthquake(output: &Output, duration: f64) -> Result<[Ground; 3], Box<dyn Error>> {
+    let mut read = Vec::new();
+    for (name, seed, peak) in [("across", 11, 3.5), ("downstream", 12, 3.5), ("upward", 13, 2.0)] {
+        let file = format!("ground_{name}.txt");
+        let made = Ground::kanai_tajimi(seed, peak, duration);
+        output.write(&file, &made.to_text(&format!("Kanai-Tajimi noise, seed {seed}, {name}")))?;
+        read.push(Ground::from_text(&std::fs::read_to_string(output.directory.join(&file))?)?);
+    }
+    read.try_into().map_err(|_| "three components".into())
+}
+
+/// All variants, the monolithic one first.
+fn records(dam: &Dam, loading: &Loading, plan: &Plan) -> Result<Vec<Record>, Box<dyn Error>> {
+    let cholesky = || Box::new(Cholesky::default());
+    let by_body = || Box::new(ByBody::new(Automatic));
+    let mut records = vec![
+        threads::in_pool(1, || whole::meshes("one factor", dam, loading, plan, cholesky()))?,
+        threads::in_pool(1, || whole::meshes("by bodies", dam, loading, plan, by_body()))?,
+        threads::in_pool(1, || split::run("body by body, a frame between them", dam, loading, plan))?,
+    ];
+    if threads::THERE {
+        records.push(threads::in_pool(2, || whole::meshes("by bodies, two threads", dam, loading, plan, by_body()))?);
+        records.push(threads::in_pool(2, || split::run("body by body, two threads", dam, loading, plan))?);
+    } else {
+        println!("without the feature `rayon` there are no runs on two threads\n");
+    }
+    for &way in plan.reduced {
+        records.push(threads::in_pool(1, || whole::reduced(dam, loading, plan, way))?);
+    }
+    Ok(records)
+}
+
+/// What is computed, and what the dam does.
+fn scene(dam: &Dam, plan: &Plan, record: &Record) -> Result<String, Box<dyn Error>> {
+    let mut table = String::from(
+        "The dam, and what its joints do (one factor)\n\n\
+         | blocks | dofs | contacts | steps | closed at most | at least | openings and closings | largest force of a \
+         joint, MN | of them before the earthquake | largest opening, mm |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let before = plan.ramp;
+    let closed = |pick: fn(usize, usize) -> usize| record.closed[before..].iter().copied().reduce(pick).unwrap_or(0);
+    writeln!(
+        table,
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+        dam.blocks.len(),
+        dam.dofs(),
+        dam.contacts.len(),
+        record.forces.len(),
+        closed(usize::max),
+        closed(usize::min),
+        record.changes,
+        decimal(1e-6 * record::largest(&record.forces), 1),
+        decimal(1e-6 * record::largest(&record.forces[..before]), 1),
+        decimal(1e3 * record::largest(&record.openings), 2)
+    )?;
+    Ok(table)
+}
+
+/// All variants side by side.
+fn costs(records: &[Record]) -> Result<String, Box<dyn Error>> {
+    let mut table = String::from(
+        "Differences from the first row (largest over joints and time, of the largest force and opening), time and \
+         memory\n\n\
+         | variant | unknowns | forces | openings | build, s | step, ms | factors, MB | held, MB |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let mega = |bytes: usize| decimal(1e-6 * bytes as f64, 1);
+    for record in records {
+        let differences = [
+            record::difference(&record.forces, &records[0].forces),
+            record::difference(&record.openings, &records[0].openings),
+        ]
+        .map(|difference| if difference > 0.0 { format!("{difference:.0e}") } else { "–".into() });
+        writeln!(
+            table,
+            "| {} | {} | {} | {} | {} | {} | {} | {} |",
+            record.name,
+            record.unknowns,
+            differences[0],
+            differences[1],
+            decimal(record.build, 2),
+            decimal(1e3 * record.stepping / record.forces.len() as f64, 1),
+            mega(record.factor),
+            record.held.map_or("–".into(), mega)
+        )?;
+    }
+    Ok(table)
+}
+
+/// Largest force and opening of some joints, of the meshes and of the reduced blocks.
+fn joints(records: &[Record]) -> Result<String, Box<dyn Error>> {
+    let shown: Vec<&Record> = records.iter().take(1).chain(records.iter().filter(|r| r.is_reduced)).collect();
+    let heads = shown.iter().map(|record| format!(" {}: force, MN | opening, mm |", record.name));
+    let mut table =
+        format!("Largest force and opening of every third joint\n\n| joint |{}\n", heads.collect::<String>());
+    writeln!(table, "| --- |{}", " --- | --- |".repeat(shown.len()))?;
+    let count = records[0].forces.first().map_or(0, Vec::len);
+    for joint in (0..count).step_by(3) {
+        let of = |rows: &[Vec<f64>]| rows.iter().fold(0.0_f64, |most, row| most.max(row[joint]));
+        let cell = |record: &&Record| {
+            let [force, opening] = [1e-6 * of(&record.forces), 1e3 * of(&record.openings)];
+            format!(" {} | {} |", decimal(force, 1), decimal(opening, 2))
+        };
+        writeln!(table, "| {} |{}", joint + 1, shown.iter().map(cell).collect::<String>())?;
+    }
+    Ok(table)
+}

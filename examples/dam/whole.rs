@@ -1,0 +1,122 @@
+//! The dam as one system: of meshes, or of reduced blocks.
+
+use crate::record::{Record, Steps};
+use crate::valley::{Block, Dam, Loading, Plan, RAYLEIGH};
+use contact_dynamics::faer::sparse::SparseColMat;
+use contact_dynamics::reduction::{Blocks, Boundary, Reduction};
+use contact_dynamics::{LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection, Result, Simulation};
+use contact_dynamics_scenes::reduced::Model;
+use contact_dynamics_scenes::sparse::diagonal;
+
+/// A run, and the contacts closed in its last step.
+struct Whole<'a> {
+    run: Simulation<'a, f64>,
+    unknowns: usize,
+}
+
+impl Steps for Whole<'_> {
+    fn step(&mut self) -> Result<()> {
+        self.run.step()
+    }
+
+    fn contacts(&self) -> [&[f64]; 2] {
+        let contacts = self.run.state().contacts();
+        [contacts.forces(), contacts.gaps()]
+    }
+
+    fn is_closed(&self, contact: usize) -> bool {
+        self.run.state().contacts().closed()[contact]
+    }
+
+    fn changes(&self) -> u64 {
+        self.run.statistics().contact_changes
+    }
+
+    fn factor(&self) -> usize {
+        self.run.factor_size()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.unknowns
+    }
+}
+
+/// The four loads on all dofs, scaled by what they are at t.
+fn under<'a>(system: LinearSystem<'a, f64>, loading: &'a Loading, loads: [Vec<f64>; 4]) -> LinearSystem<'a, f64> {
+    system.load(move |t, out| {
+        for (load, scale) in loads.iter().zip(loading.at(t)) {
+            out.iter_mut().zip(load).for_each(|(out, load)| *out += scale * load);
+        }
+    })
+}
+
+/// Rows of all contacts, from the place of the contact dofs of each block.
+fn rows(dam: &Dam, place: impl Fn((usize, usize)) -> usize) -> LinearRows<'static, f64> {
+    dam.contacts.iter().fold(LinearRows::new(), |rows, &[left, right]| {
+        rows.unilateral(&[(place(left), -1.0), (place(right), 1.0)], 0.0)
+    })
+}
+
+/// All meshes, with one linear solver.
+pub(crate) fn meshes(
+    name: &str,
+    dam: &Dam,
+    loading: &Loading,
+    plan: &Plan,
+    solver: Box<dyn LinearSolver<f64> + Send>,
+) -> Result<Record> {
+    Record::of(name, dam, plan.steps(), || {
+        let (mut blocks, mut firsts) = (Blocks::new(), Vec::new());
+        for block in &dam.blocks {
+            let mass: SparseColMat<usize, f64> = diagonal(&block.mass);
+            firsts.push(blocks.body(mass.as_ref(), block.stiffness.as_ref(), None)?.start);
+        }
+        let loads = [0, 1, 2, 3].map(|k| dam.blocks.iter().flat_map(|block| block.loads[k].clone()).collect());
+        let [of_mass, of_stiffness] = RAYLEIGH;
+        let system = under(blocks.system()?.rayleigh(of_mass, of_stiffness)?, loading, loads);
+        let run = Simulation::builder(system, Newmark::trapezoidal(), plan.step)
+            .constraint(rows(dam, |(block, dof)| firsts[block] + dof))
+            .corrector(PersistencyCorrection::new())
+            .linear_solver(solver)
+            .build()?;
+        Ok(Whole { run, unknowns: dam.dofs() })
+    })
+}
+
+/// All blocks reduced to so many modes each, and their contact dofs.
+pub(crate) fn reduced(
+    dam: &Dam,
+    loading: &Loading,
+    plan: &Plan,
+    (boundary, modes): (Boundary, usize),
+) -> Result<Record> {
+    let name = format!("{}, {modes} modes a block", Model::Reduced(boundary).name());
+    let mut record = Record::of(&name, dam, plan.steps(), || {
+        let (mut blocks, mut firsts, mut loads) = (Blocks::new(), Vec::new(), [const { Vec::new() }; 4]);
+        for block in &dam.blocks {
+            let mass: SparseColMat<usize, f64> = diagonal(&block.mass);
+            let [of_mass, of_stiffness] = RAYLEIGH;
+            let body = Reduction::new(mass.as_ref(), block.stiffness.as_ref(), &block.contact())
+                .boundary(boundary)
+                .rayleigh(of_mass, of_stiffness)
+                .modes(modes)?;
+            firsts.push(blocks.reduced(&body)?.start + body.contact_dofs().start);
+            for (all, own) in loads.iter_mut().zip(&block.loads) {
+                all.extend(body.load(own)?);
+            }
+        }
+        let contact: Vec<Vec<usize>> = dam.blocks.iter().map(Block::contact).collect();
+        let place = |(block, dof): (usize, usize)| firsts[block] + contact[block].partition_point(|&own| own < dof);
+        let builder = Simulation::builder(under(blocks.system()?, loading, loads), Newmark::trapezoidal(), plan.step)
+            .constraint(rows(dam, place));
+        // Contact dofs without mass leave nothing to correct.
+        let run = match boundary {
+            Boundary::CraigBampton => builder.corrector(PersistencyCorrection::new()),
+            _ => builder.uncorrected(),
+        }
+        .build()?;
+        Ok(Whole { run, unknowns: blocks.dofs() })
+    })?;
+    record.is_reduced = true;
+    Ok(record)
+}

@@ -1,0 +1,248 @@
+//! A frame between two sides whose nodes match, with localized Lagrange multipliers.
+
+use super::problem::{Problem, check_finite, check_flexibility, check_length, rounding};
+use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver};
+use crate::error::Result;
+use crate::real::Real;
+
+/// The interface of a body: its values without contact, and its flexibility.
+///
+/// Values are those along the normal of each frame node. The normal points from the first side to the second, for both.
+/// They may be displacements, velocities or accelerations, with the flexibility to match.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Side<'a, T> {
+    /// Values along the normals without contact.
+    pub free: &'a [T],
+    /// Entry i + j n: what a unit force along the normal on node j adds to the value of node i (n nodes, symmetric,
+    /// positive semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix A of the
+    /// body, for velocities and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid obstacle.
+    pub flexibility: &'a [T],
+}
+
+impl<'a, T> Side<'a, T> {
+    /// A side with these values without contact and this flexibility.
+    pub const fn new(free: &'a [T], flexibility: &'a [T]) -> Self {
+        Self { free, flexibility }
+    }
+}
+
+/// The solution of a [`Frame`].
+#[derive(Clone, Debug, Default)]
+pub struct Interface<T> {
+    forces: Vec<T>,
+    positions: Vec<T>,
+    values: [Vec<T>; 2],
+    gaps: Vec<T>,
+    closed: Vec<bool>,
+    iterations: usize,
+}
+
+impl<T: Real> Interface<T> {
+    /// The force l on each node, positive in compression (of either sign where [`Frame::hold`] holds): the second side
+    /// gets +l along the normal, the first −l. The multipliers of both sides are equal, because the frame has no mass.
+    pub fn forces(&self) -> &[T] {
+        &self.forces
+    }
+
+    /// Positions of the frame, in the values of the first side: where closed, those of both sides; where open, halfway
+    /// between them (no force acts there, and any position between them would do).
+    pub fn positions(&self) -> &[T] {
+        &self.positions
+    }
+
+    /// Values of both sides with contact.
+    pub fn values(&self) -> [&[T]; 2] {
+        [&self.values[0], &self.values[1]]
+    }
+
+    /// Gaps between both sides, zero up to rounding where closed, positive where open.
+    pub fn gaps(&self) -> &[T] {
+        &self.gaps
+    }
+
+    /// Where the sides are closed: pressed by a force, or with a gap within the rounding of the numbers that it was
+    /// computed from. (After [`Frame::hold`]: the nodes held.)
+    pub fn closed(&self) -> &[bool] {
+        &self.closed
+    }
+
+    /// Iterations of the contact solver.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+}
+
+/// A frame between two bodies whose contact nodes match: the interface problem of localized Lagrange multipliers (Park,
+/// Felippa, Gumaste, Comput. Mech. 24, 2000; with contact Rebel, Park, Felippa, Int. J. Numer. Methods Eng. 54, 2002).
+///
+/// Each side s is tied to the frame by multipliers of its own, l_s, the frame has displacements x and no mass. With d_s
+/// the values of the sides under their forces, and all of the gap between the frame and the second side:
+///
+/// ```text
+/// d_1 = free_1 − F_1 l_1,   d_2 = free_2 + F_2 l_2
+/// 0 ≤ x − d_1 ⊥ l_1 ≥ 0,    0 ≤ d_2 + gap − x ⊥ l_2 ≥ 0,    l_1 − l_2 = 0 (equilibrium of the frame)
+/// ```
+///
+/// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes.
+/// A body needs to know neither the other one nor its code: its step goes on with the forces of the frame. Results are
+/// those of the monolithic form up to rounding (`tests/partitioned/frames.rs`).
+///
+/// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one
+/// belongs to the first side. Three bodies that touch each other, and nodes that do not match, take an
+/// [`Assembly`](super::Assembly).
+///
+/// An explicit or implicit step of the host:
+///
+/// 1. each body advances without contact, `free`, and solves for unit forces on its interface (once while its matrix
+///    stays);
+/// 2. [`solve`](Self::solve);
+/// 3. each body adds the response to its forces;
+/// 4. if velocities (then accelerations) are to agree with the contact, as of
+///    [`PersistencyCorrection`](crate::PersistencyCorrection): [`hold`](Self::hold) on the closed nodes. A second frame
+///    for that keeps the factors of both.
+///
+/// ```
+/// use contact_dynamics::partitioned::{Frame, Side};
+///
+/// // Masses 2 and 1 on springs, in units of a step: responses to unit forces ½ and 1. The gap is 0.1.
+/// let mut frame = Frame::<f64>::new(1)?;
+/// let first = Side::new(&[0.3], &[0.5]);
+/// let second = Side::new(&[-0.1], &[1.0]);
+/// let interface = frame.solve([first, second], &[0.1])?;
+/// assert!((interface.forces()[0] - 0.2).abs() < 1e-15); // (0.3 + 0.1 − 0.1)/(½ + 1)
+/// assert!((interface.positions()[0] - 0.2).abs() < 1e-15); // 0.3 − ½ · 0.2 = −0.1 + 1 · 0.2 + 0.1
+///
+/// // Velocities 1 and −2 become their common one, (2 · 1 − 1 · 2)/3, by an impulse of 2.
+/// let first = Side::new(&[1.0], &[0.5]);
+/// let second = Side::new(&[-2.0], &[1.0]);
+/// let interface = frame.hold([first, second], &[0.0], &[true])?;
+/// assert!((interface.forces()[0] - 2.0).abs() < 1e-15 && interface.positions()[0].abs() < 1e-15);
+/// # Ok::<(), contact_dynamics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Frame<T: Real> {
+    problem: Problem<T>,
+    interface: Interface<T>,
+}
+
+impl<T: Real> Frame<T> {
+    /// A frame of so many nodes, solved by [`ActiveSet`]. A node of a tie in several directions counts once for each of
+    /// them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem of so many nodes does not fit.
+    pub fn new(nodes: usize) -> Result<Self> {
+        Self::with_solver(nodes, ActiveSet::default())
+    }
+
+    /// The same with a solver of the host's choice.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem of so many nodes does not fit.
+    pub fn with_solver(nodes: usize, solver: impl ContactSolver<T> + 'static) -> Result<Self> {
+        let problem = Problem::new(nodes, Box::new(solver), "a frame")?;
+        let zero = || vec![T::zero(); nodes];
+        let interface = Interface {
+            forces: zero(),
+            positions: zero(),
+            values: [zero(), zero()],
+            gaps: zero(),
+            closed: vec![false; nodes],
+            iterations: 0,
+        };
+        Ok(Self { problem, interface })
+    }
+
+    /// Contact: forces that press, on nodes whose gap would close. `gaps` are those at zero values of both sides,
+    /// positive when open.
+    ///
+    /// Forces of the call before are the first guess; they may change the work, not the result. Does not allocate.
+    ///
+    /// # Errors
+    ///
+    /// `Dimension`, `NotFinite`, `Asymmetric` and `Singular` (`dof` is the frame node) of [`Error`](crate::Error) for
+    /// wrong sides, `Frame` if no forces were found. The frame can be used again.
+    pub fn solve(&mut self, sides: [Side<'_, T>; 2], gaps: &[T]) -> Result<&Interface<T>> {
+        self.run(sides, gaps, None)
+    }
+
+    /// Both sides together on the nodes of which `held` is true, whatever force that takes, and no force on the others:
+    /// ties, and jumps of velocity or acceleration (`gaps` zero), whose forces are then impulses or forces.
+    ///
+    /// With flexibilities G M⁻¹Gᵀ this is the projection of [`JumpProjection`](crate::JumpProjection), S = F_1 + F_2:
+    /// momentum is conserved, kinetic energy falls.
+    ///
+    /// # Errors
+    ///
+    /// As for [`solve`](Self::solve).
+    pub fn hold(&mut self, sides: [Side<'_, T>; 2], gaps: &[T], held: &[bool]) -> Result<&Interface<T>> {
+        self.run(sides, gaps, Some(held))
+    }
+
+    fn run(&mut self, sides: [Side<'_, T>; 2], gaps: &[T], held: Option<&[bool]>) -> Result<&Interface<T>> {
+        let n = self.interface.forces.len();
+        check_length("gaps of the frame", gaps.len(), n)?;
+        check_length("the list of nodes held", held.map_or(n, <[bool]>::len), n)?;
+        check_finite("gaps of the frame", gaps)?;
+        sides.iter().try_for_each(|side| check(side, n))?;
+        let Self { problem, interface } = self;
+        let Interface { forces, positions, values, gaps: open, closed, iterations } = interface;
+        let [first, second] = &sides;
+        let Problem { rows: nodes, multipliers, delassus, version, offset, tolerance, sets, .. } = problem;
+        nodes.clear();
+        nodes.extend((0..n).filter(|&node| held.is_none_or(|held| held[node])));
+        // A version number for each W, so that the solver can keep its factor while W stays.
+        let size = nodes.len();
+        let mut changed = delassus.len() != size * size;
+        delassus.resize(size * size, T::zero());
+        let places = nodes.iter().flat_map(|&j| nodes.iter().map(move |&i| i + j * n));
+        for (w, at) in delassus.iter_mut().zip(places) {
+            let value = first.flexibility[at] + second.flexibility[at];
+            changed |= *w != value;
+            *w = value;
+        }
+        *version += u64::from(changed);
+        let of_gap = |node: usize| rounding(first.free[node].abs() + second.free[node].abs() + gaps[node].abs());
+        offset.clear();
+        offset.extend(nodes.iter().map(|&node| second.free[node] - first.free[node] + gaps[node]));
+        tolerance.clear();
+        tolerance.extend(nodes.iter().map(|&node| of_gap(node)));
+        sets.clear();
+        sets.resize(size, if held.is_some() { AdmissibleSet::Free } else { AdmissibleSet::NonNegative });
+        multipliers.clear();
+        multipliers.extend(nodes.iter().map(|&node| forces[node]));
+        forces.fill(T::zero());
+        *iterations = problem.solve()?;
+
+        for (&node, &multiplier) in problem.rows.iter().zip(&problem.multipliers) {
+            forces[node] = multiplier;
+        }
+        for ((values, side), sign) in values.iter_mut().zip(&sides).zip([-T::one(), T::one()]) {
+            values.copy_from_slice(side.free);
+            for (column, &force) in side.flexibility.chunks_exact(n.max(1)).zip(&*forces) {
+                T::axpy(sign * force, column, values);
+            }
+        }
+        for node in 0..n {
+            let [first, second] = [values[0][node], values[1][node] + gaps[node]];
+            open[node] = second - first;
+            positions[node] = T::of(0.5) * (first + second);
+            closed[node] = match held {
+                Some(held) => held[node],
+                None => forces[node] > T::zero() || open[node] <= of_gap(node),
+            };
+        }
+        Ok(interface)
+    }
+}
+
+/// Refuses sides of wrong sizes, and flexibilities that are none.
+fn check<T: Real>(side: &Side<'_, T>, n: usize) -> Result<()> {
+    let Side { free, flexibility } = side;
+    check_length("free values of a side", free.len(), n)?;
+    check_finite("free values of a side", free)?;
+    check_flexibility("flexibility of a side", flexibility, n)
+}

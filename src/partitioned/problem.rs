@@ -1,0 +1,109 @@
+//! What the frames share: the contact problem of the rows chosen, its solver and its memory, and checks of what hosts
+//! hand over.
+
+use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::real::Real;
+
+/// The contact problem of some of the rows.
+#[derive(Debug)]
+pub(super) struct Problem<T: Real> {
+    solver: Box<dyn ContactSolver<T>>,
+    /// The rows in the problem, and their multipliers.
+    pub(super) rows: Vec<usize>,
+    pub(super) multipliers: Vec<T>,
+    /// W of these rows, and how often it has changed.
+    pub(super) delassus: Vec<T>,
+    pub(super) version: u64,
+    pub(super) offset: Vec<T>,
+    pub(super) tolerance: Vec<T>,
+    pub(super) sets: Vec<AdmissibleSet>,
+}
+
+impl<T: Real> Problem<T> {
+    /// Memory for so many rows; `what` names it if there is not enough.
+    pub(super) fn new(rows: usize, mut solver: Box<dyn ContactSolver<T>>, what: &'static str) -> Result<Self> {
+        // Memory is tried first, that of the solver included (its `reserve` cannot fail), so that an absurd number is
+        // an error and not an abort.
+        memory::reserve::<T>(rows, rows.saturating_mul(8), what)?;
+        let delassus = memory::reserve(rows, rows, what)?;
+        solver.reserve(rows);
+        Ok(Self {
+            solver,
+            rows: Vec::with_capacity(rows),
+            multipliers: Vec::with_capacity(rows),
+            delassus,
+            version: 0,
+            offset: Vec::with_capacity(rows),
+            tolerance: Vec::with_capacity(rows),
+            sets: Vec::with_capacity(rows),
+        })
+    }
+
+    /// Finds the multipliers, from those that are there.
+    pub(super) fn solve(&mut self) -> Result<usize> {
+        let Self { solver, rows, multipliers, delassus, version, offset, tolerance, sets } = self;
+        let problem = ContactProblem::of(delassus, offset, sets, tolerance, *version);
+        solver.solve(&problem, multipliers).map_err(|failure| Error::Frame { failure: of_frame(failure, rows) })
+    }
+}
+
+/// What of a value that is a sum of terms of this size is rounding.
+pub(super) fn rounding<T: Real>(size: T) -> T {
+    T::of(64.0) * T::epsilon() * size
+}
+
+/// The failure in the numbering of the frame.
+fn of_frame<T: Real>(failure: ContactFailure<T>, rows: &[usize]) -> ContactFailure<f64> {
+    match failure {
+        ContactFailure::Contradictory { row, other, residual } => {
+            ContactFailure::Contradictory { row: rows[row], other: rows[other], residual: residual.value() }
+        }
+        ContactFailure::NotConverged { iterations, row, residual } => {
+            ContactFailure::NotConverged { iterations, row: rows[row], residual: residual.value() }
+        }
+        ContactFailure::Jammed { row, friction, normal, coupling } => {
+            let [normal, coupling] = [normal, coupling].map(Real::value);
+            ContactFailure::Jammed { row: rows[row], friction, normal, coupling }
+        }
+        ContactFailure::Friction { row } => ContactFailure::Friction { row: rows[row] },
+        ContactFailure::Unsymmetric { row, other } => {
+            ContactFailure::Unsymmetric { row: rows[row], other: rows[other] }
+        }
+    }
+}
+
+pub(super) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
+    if found == expected { Ok(()) } else { Err(Error::Dimension { what, expected, found }) }
+}
+
+pub(super) fn check_finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
+    match x.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: x[index].value() }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses flexibilities of another number of dofs than n, with a negative diagonal entry, or that are not symmetric
+/// (columns may have been stored as rows, or solved for with other normals).
+pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], n: usize) -> Result<()> {
+    check_length(what, flexibility.len(), n * n)?;
+    check_finite(what, flexibility)?;
+    let entry = |i: usize, j: usize| flexibility[i + j * n];
+    for column in 0..n {
+        if entry(column, column) < T::zero() {
+            return Err(Error::Singular { matrix: what, dof: column });
+        }
+        for row in 0..column {
+            // Columns come from solves, whose error depends on the condition of the body's matrix.
+            let scale = entry(row, row).max(entry(column, column));
+            let (value, mirrored) = (entry(row, column), entry(column, row));
+            if (value - mirrored).abs() > T::epsilon().sqrt() * scale {
+                let (value, mirrored) = (value.value(), mirrored.value());
+                return Err(Error::Asymmetric { matrix: "flexibility", row, column, value, mirrored });
+            }
+        }
+    }
+    Ok(())
+}
