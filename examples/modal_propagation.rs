@@ -7,7 +7,7 @@ use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, TimeIntegrator};
 use contact_dynamics_scenes::output::Output;
 use contact_dynamics_scenes::propagated;
-use contact_dynamics_scenes::reduced::{Model, Struck, TAPER, bounces, wall_exact, wall_impact};
+use contact_dynamics_scenes::reduced::{Model, PARENT, Struck, TAPER, bounces, wall_exact, wall_impact};
 use contact_dynamics_scenes::tables::decimal;
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
@@ -18,11 +18,22 @@ fn bathe() -> Box<dyn TimeIntegrator> {
     Box::new(Bathe::with_radius(1.0).expect("a radius in [0, 1]"))
 }
 
+/// Elements of parents whose own dispersion is small; that of schemes hides that of `PARENT`.
+const FINE: usize = 4 * PARENT;
+
 /// Steps, and as many of them in a contact of the paper's bars.
 const STEPS: [(f64, f64); 2] = [(1e-3, 200.0), (2.5e-4, 800.0)];
 
 fn cells(struck: Struck) -> String {
     format!("{} ({} %) | {}", decimal(struck.error, 4), decimal(100.0 * struck.overshoot, 1), decimal(struck.energy, 5))
+}
+
+/// The cell of a step that is refused.
+fn refusal(error: &contact_dynamics::Error, rest: &str) -> String {
+    match error {
+        contact_dynamics::Error::Parameter { value, .. } => format!("refused: ω_r h = {}{rest}", decimal(*value, 2)),
+        other => format!("{other}{rest}"),
+    }
 }
 
 /// The paper's bar against a wall, and the bar that bounces.
@@ -37,17 +48,30 @@ fn walls(phases: &[f64], counts: &[usize]) -> Result<String, Box<dyn Error>> {
     for &count in counts {
         for boundary in [Boundary::Tapered, Boundary::Untapered] {
             let model = Model::Reduced(boundary);
-            let mut exact = Vec::new();
+            let mut rows = Vec::new();
+            for elements in [FINE, PARENT] {
+                let mut cells_of_row = Vec::new();
+                for (h, _) in STEPS {
+                    let struck = propagated::wall(elements, count, boundary, h, phases);
+                    cells_of_row.push(struck.map_or_else(|refused| refusal(&refused, " |"), cells));
+                }
+                for (_, steps) in STEPS {
+                    let bounced = propagated::bounces(elements, count, boundary, steps);
+                    cells_of_row.push(
+                        bounced.map_or_else(|refused| refusal(&refused, ""), |bounced| decimal(bounced.energy, 4)),
+                    );
+                }
+                rows.push((format!("exact, {elements} elements"), cells_of_row));
+            }
             let mut scheme = Vec::new();
             for (h, _) in STEPS {
-                exact.push(cells(propagated::wall(count, boundary, h, phases)?));
                 scheme.push(cells(wall_impact(count + 1, model, bathe, h, (phases, TAPER))?));
             }
             for (_, steps) in STEPS {
-                exact.push(decimal(propagated::bounces(count, boundary, steps)?.energy, 4));
                 scheme.push(decimal(bounces(count + 1, model, bathe, steps)?.energy, 4));
             }
-            for (name, row) in [("exact", exact), ("ρ∞-Bathe(1)", scheme)] {
+            rows.push((format!("ρ∞-Bathe(1), {PARENT} elements"), scheme));
+            for (name, row) in rows {
                 writeln!(table, "| {count} | {name} | {} | {} |", model.name(), row.join(" | "))?;
             }
         }
@@ -75,7 +99,7 @@ fn resolution(phases: &[f64], counts: &[usize]) -> Result<String, Box<dyn Error>
                 cells.push(format!("refused: ω_r h = {}", decimal(highest, 2)));
                 continue;
             }
-            let Struck { error, overshoot, .. } = propagated::wall(count, Boundary::Tapered, h, phases)?;
+            let Struck { error, overshoot, .. } = propagated::wall(FINE, count, Boundary::Tapered, h, phases)?;
             let [error, overshoot] = [decimal(error * cutoff * duration, 2), decimal(100.0 * overshoot, 1)];
             cells.push(format!("{error} ({overshoot} %), {}", decimal(cutoff * h, 2)));
         }

@@ -8,6 +8,7 @@ use contact_dynamics::corrector::{
 };
 use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::partitioned::{self, Assembly, Coupling, Frame};
+use contact_dynamics::reduction::{ModalPropagation, Reduction};
 use contact_dynamics::{
     ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
     LinearSolver, LinearSystem, Lu, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Simulation,
@@ -36,6 +37,7 @@ fn steps_do_not_allocate() {
     iterations();
     frames();
     assemblies();
+    modes_propagated();
     rotors();
     friction();
     weighted_gaps();
@@ -450,4 +452,26 @@ fn assemblies() {
         }
     });
     assert_eq!(counted.count_total, 0);
+}
+
+/// Two chains of springs and masses, reduced, that meet and part.
+fn modes_propagated() {
+    let n = 60;
+    let springs: Vec<_> = (1..n).flat_map(|i| spring(i - 1, i, 1.0)).collect();
+    let masses: Vec<_> = (0..n).map(|i| (i, i, 1.0)).collect();
+    let [mass, stiffness] = [masses, springs].map(|entries| matrix(n, entries));
+    let body = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).modes(20).unwrap();
+    let second = body.dofs() + body.contact_dofs().start;
+    let velocity = [body.velocity(&vec![-0.01; n]).unwrap(), vec![0.0; body.dofs()]].concat();
+    let row = LinearRows::new().unilateral(&[(body.contact_dofs().start, 1.0), (second, -1.0)], 0.05);
+    let mut run = ModalPropagation::builder(&[&body, &body], 1.0).velocity(velocity).constraint(row).build().unwrap();
+    let mut pressed = 0;
+    let counted = allocation_counter::measure(|| {
+        for _ in 0..300 {
+            run.step().unwrap();
+            pressed += usize::from(run.forces()[0] > 0.0);
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+    assert!(pressed > 50 && pressed < 250, "{pressed}");
 }

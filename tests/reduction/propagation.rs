@@ -117,13 +117,14 @@ fn an_oscillator_in_contact_is_followed_with_order_two() {
 #[test]
 fn bars_strike_with_a_clean_force() {
     let phases = [0.15, 0.45, 0.75];
-    let struck = [20, 50, 100].map(|modes| wall(modes, Boundary::Tapered, 1e-3, &phases).unwrap());
+    // (Frequencies of coarser parents are so much too high at the end that fronts return torn apart.)
+    let struck = [20, 50, 100].map(|modes| wall(4000, modes, Boundary::Tapered, 1e-3, &phases).unwrap());
     for pair in struck.windows(2) {
         assert!(pair[1].error < 0.6 * pair[0].error, "{struck:?}");
     }
     // A hundred modes at ω_r h = 3.1.
-    assert!(struck[2].error < 1e-3 && struck[2].overshoot < 0.13 && struck[2].energy < 2e-3, "{struck:?}");
-    let bounced = bounces(16, Boundary::Tapered, 200.0).unwrap();
+    assert!(struck[2].error < 1e-3 && struck[2].overshoot < 0.08 && struck[2].energy < 2e-3, "{struck:?}");
+    let bounced = bounces(1000, 16, Boundary::Tapered, 200.0).unwrap();
     assert!(bounced.error < 0.045 && (bounced.energy - 1.0).abs() < 2e-3, "{bounced:?}");
 }
 
@@ -185,6 +186,14 @@ fn what_is_refused() {
         Err(Error::Parameter { value, .. }) => assert!((value / (1.01 * PI) - 1.0).abs() < 1e-12),
         other => panic!("{other:?}"),
     }
+    // Untapered bodies gain energy with longer steps.
+    let (mass, stiffness) = (diagonal::<f64>(&[1.0; 30]), matrix(30, springs(30, 1.0)));
+    let untapered =
+        Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(Boundary::Untapered).modes(8).unwrap();
+    for (share, admitted) in [(0.249, true), (0.251, false)] {
+        let run = ModalPropagation::builder(&[&untapered], share * PI / untapered.frequencies()[7]).build();
+        assert_eq!(run.is_ok(), admitted, "{run:?}");
+    }
     for h in [0.0, -1.0, f64::NAN] {
         assert!(matches!(ModalPropagation::builder(&[&body], h).build(), Err(Error::Parameter { .. })), "{h}");
     }
@@ -196,7 +205,6 @@ fn what_is_refused() {
     assert!(matches!(rubbing, Err(Error::Incompatible { .. })));
     let short = ModalPropagation::builder(&[&body], 1.0).velocity(vec![0.0; 3]).build();
     assert!(matches!(short, Err(Error::Dimension { expected: 9, found: 3, .. })));
-    let (mass, stiffness) = (diagonal::<f64>(&[1.0; 30]), matrix(30, springs(30, 1.0)));
     let reduction = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(Boundary::CraigBampton);
     let held = reduction.modes(5).unwrap();
     assert!(matches!(ModalPropagation::builder(&[&held], 0.1).build(), Err(Error::Incompatible { .. })));

@@ -1,6 +1,6 @@
-//! The reduced bars of `reduced`, propagated exactly instead of by a scheme.
+//! The reduced bars of `reduced`, propagated exactly instead of by a scheme, from parents of any fineness.
 
-use crate::reduced::{Bounced, PARENT, SPEED, Struck, errors, paper_bar, share_of_misses, summary, wall_exact};
+use crate::reduced::{Bounced, SPEED, Struck, errors, paper_bar, share_of_misses, summary, wall_exact};
 use crate::wall_bar::WallBar;
 use contact_dynamics::reduction::{Boundary, ModalPropagation, ReducedBody, Reduction};
 use contact_dynamics::reference::BouncingBar;
@@ -19,10 +19,10 @@ fn energy(run: &ModalPropagation<'_, f64>) -> f64 {
 }
 
 /// The paper's bar against a wall, as [`wall_impact`](crate::reduced::wall_impact).
-pub fn wall(modes: usize, boundary: Boundary, h: f64, phases: &[f64]) -> Result<Struck> {
-    let bar = paper_bar(PARENT);
+pub fn wall(elements: usize, modes: usize, boundary: Boundary, h: f64, phases: &[f64]) -> Result<Struck> {
+    let bar = paper_bar(elements);
     let body = reduced(&bar, modes, boundary)?;
-    let velocity = body.velocity(&vec![-SPEED; PARENT + 1])?;
+    let velocity = body.velocity(&vec![-SPEED; elements + 1])?;
     let mut all = Vec::new();
     for &phase in phases {
         let gap = bar.height + phase * h * SPEED;
@@ -41,8 +41,8 @@ pub fn wall(modes: usize, boundary: Boundary, h: f64, phases: &[f64]) -> Result<
 }
 
 /// The bouncing bar, as [`bounces`](crate::reduced::bounces).
-pub fn bounces(modes: usize, boundary: Boundary, steps: f64) -> Result<Bounced> {
-    let bar = WallBar::bouncing(PARENT);
+pub fn bounces(elements: usize, modes: usize, boundary: Boundary, steps: f64) -> Result<Bounced> {
+    let bar = WallBar::bouncing(elements);
     let exact = BouncingBar::doyen();
     let h = 2.0 * bar.length / bar.wave_speed() / steps;
     let body = reduced(&bar, modes, boundary)?;
