@@ -6,7 +6,7 @@ use crate::threads::try_each;
 use crate::valley::{Block, Dam, Loading, Plan, RAYLEIGH};
 use contact_dynamics::partitioned::{Assembly, Coupling};
 use contact_dynamics::{Automatic, Error, Factorization, LinearSolver, Result};
-use contact_dynamics_scenes::sparse::{entries, matrix};
+use contact_dynamics_scenes::sparse::{entries, matrix, product};
 
 /// A block in a code of its own.
 struct Body<'a> {
@@ -54,7 +54,7 @@ impl<'a> Body<'a> {
             *v += 0.5 * h * a;
             *x = -(*u + of_stiffness * *v);
         }
-        stiffness_times(block, scratch, rhs);
+        *rhs = product(block.stiffness.as_ref(), scratch);
         for (dof, rhs) in rhs.iter_mut().enumerate() {
             let load: f64 = block.loads.iter().zip(loads).map(|(load, scale)| scale * load[dof]).sum();
             *rhs += load - of_mass * block.mass[dof] * v[dof];
@@ -87,7 +87,7 @@ impl<'a> Body<'a> {
             return Ok(());
         }
         let [of_mass, of_stiffness] = RAYLEIGH;
-        stiffness_times(block, scratch, rhs);
+        *rhs = product(block.stiffness.as_ref(), scratch);
         for ((rhs, jump), mass) in rhs.iter_mut().zip(&*scratch).zip(&block.mass) {
             *rhs = of_stiffness * *rhs + of_mass * mass * jump;
         }
@@ -104,17 +104,6 @@ type Rate<'a> = for<'b> fn(&'b mut Body<'a>, usize) -> &'b mut f64;
 fn condensed(factor: &mut dyn Factorization<f64>) -> Result<&mut dyn contact_dynamics::Condensation<f64>> {
     let reason = "it does not condense";
     factor.condensation().ok_or(Error::Incompatible { part: "the factor of a block".into(), reason })
-}
-
-/// y = K x.
-fn stiffness_times(block: &Block, x: &[f64], y: &mut [f64]) {
-    y.fill(0.0);
-    let k = block.stiffness.as_ref();
-    for (j, x) in x.iter().enumerate() {
-        for (&i, k) in k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)) {
-            y[i] += k * x;
-        }
-    }
 }
 
 /// All blocks, and the frame between them.

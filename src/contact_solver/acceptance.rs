@@ -184,6 +184,7 @@ impl<T: Real> Acceptance<'_, T> {
     /// Whether what every row misses is no more than a contradiction that nobody would notice: √ε of the way by which
     /// what is asked of the others may move it.
     pub(super) fn is_negligible(&self, multipliers: &[T]) -> bool {
+        // (`bears` grants ε^0.4.)
         let share = T::epsilon().powf(T::of(0.1));
         (0..self.problem.size()).all(|i| self.bears(i, self.problem.miss(i, multipliers) / share))
     }

@@ -245,8 +245,8 @@ impl<T: Real> ActiveSet<T> {
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
         acceptance: &mut Acceptance<'_, T>,
-        mut iterations: usize,
-    ) -> Result<usize, ContactFailure<T>> {
+        iterations: &mut usize,
+    ) -> Result<(), ContactFailure<T>> {
         let size = problem.size();
         let largest = (0..size).fold(T::zero(), |m, i| m.max(problem.delassus(i, i)));
         // Small enough to converge in a few steps, large enough for a well-posed factorization.
@@ -265,16 +265,16 @@ impl<T: Real> ActiveSet<T> {
             let pulled = problem.offset.iter().zip(&self.shift).zip(&self.center);
             self.offset.extend(pulled.map(|((&q, &d), &c)| q - d * c));
             match self.exchange(problem, multipliers, Form::Proximal, acceptance)? {
-                Exchanges::Solved(count) | Exchanges::Stuck(count) => iterations += count,
+                Exchanges::Solved(count) | Exchanges::Stuck(count) => *iterations += count,
             }
             if acceptance.is_exact(multipliers) {
-                return Ok(iterations);
+                return Ok(());
             }
             let (row, residual) = problem.residual(multipliers);
             // What the multipliers gain no longer lowers the residual: it is rounding, or there is no solution.
             if step >= 3 && residual > T::of(0.5) * before {
                 if acceptance.accepts(multipliers) {
-                    return Ok(iterations);
+                    return Ok(());
                 }
                 let push = |i: usize| (problem.delassus(row, i) * multipliers[i]).abs();
                 let other = (0..size).filter(|&i| i != row).fold(row, |o, i| match o != row && push(o) >= push(i) {
@@ -287,7 +287,7 @@ impl<T: Real> ActiveSet<T> {
             self.center.copy_from_slice(multipliers);
         }
         let (row, residual) = problem.residual(multipliers);
-        Err(ContactFailure::NotConverged { iterations, row, residual })
+        Err(ContactFailure::NotConverged { iterations: *iterations, row, residual })
     }
 
     /// What proximal steps could not solve: exactly by pivoting, or else as the steps left it, if no row misses more
@@ -301,7 +301,7 @@ impl<T: Real> ActiveSet<T> {
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
         acceptance: &Acceptance<'_, T>,
-        failure: ContactFailure<T>,
+        (failure, iterations): (ContactFailure<T>, usize),
     ) -> Result<usize, ContactFailure<T>> {
         self.center.clear();
         self.center.extend_from_slice(multipliers);
@@ -313,7 +313,7 @@ impl<T: Real> ActiveSet<T> {
         // (Of a contradiction the proximal steps know the least violation.)
         multipliers.copy_from_slice(&self.center);
         match failure {
-            ContactFailure::Contradictory { .. } if acceptance.is_negligible(multipliers) => Ok(PROXIMAL_STEPS),
+            ContactFailure::Contradictory { .. } if acceptance.is_negligible(multipliers) => Ok(iterations),
             failure => Err(failure),
         }
     }
@@ -373,10 +373,12 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         }
         match self.exchange(problem, multipliers, Form::Given, &mut acceptance)? {
             Exchanges::Solved(iterations) => Ok(iterations),
-            Exchanges::Stuck(iterations) => match self.proximal(problem, multipliers, &mut acceptance, iterations) {
-                Err(failure) => self.settle(problem, multipliers, &acceptance, failure),
-                solved => solved,
-            },
+            Exchanges::Stuck(mut iterations) => {
+                match self.proximal(problem, multipliers, &mut acceptance, &mut iterations) {
+                    Err(failure) => self.settle(problem, multipliers, &acceptance, (failure, iterations)),
+                    Ok(()) => Ok(iterations),
+                }
+            }
         }
     }
 }

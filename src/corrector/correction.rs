@@ -8,7 +8,7 @@ mod past;
 
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactJacobian, ErasedGaps, rounding};
+use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -117,6 +117,16 @@ enum Jump {
     Acceleration,
 }
 
+impl Jump {
+    /// The rates of the dofs that it is made of, and what the gap of a row adds of its own.
+    fn terms<'m, T: Real>(self, motion: &'m Motion<T>, gap: &GapRates<T>) -> (&'m [T], T) {
+        match self {
+            Self::Velocity => (&motion.v, gap.rate),
+            Self::Acceleration => (&motion.a, gap.acceleration),
+        }
+    }
+}
+
 /// What pressed contacts may do with the velocities that they are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
@@ -185,10 +195,7 @@ impl<T: Real> Correction<'_, T> {
     /// have rows that differ by the angle between these facets, and so do their rates: a square of it in S that is below
     /// ε^⅔ counts as none ([`DenseCholesky`](crate::dense::DenseCholesky)).
     fn share_of_rate(&self, row: usize, jump: Jump) -> T {
-        let (values, own) = match jump {
-            Jump::Velocity => (&self.new.v, self.buffers.rates[row].rate),
-            Jump::Acceleration => (&self.new.a, self.buffers.rates[row].acceleration),
-        };
+        let (values, own) = jump.terms(self.new, &self.buffers.rates[row]);
         T::epsilon().cbrt() * (self.g.magnitude(row, values) + own.abs())
     }
 
@@ -205,10 +212,7 @@ impl<T: Real> Correction<'_, T> {
         jumps.clear();
         tolerance.clear();
         for &row in rows {
-            let (values, own) = match jump {
-                Jump::Velocity => (&self.new.v, rates[row].rate),
-                Jump::Acceleration => (&self.new.a, rates[row].acceleration),
-            };
+            let (values, own) = jump.terms(self.new, &rates[row]);
             jumps.push(self.g.product(row, values) + own);
             tolerance.push(rounding(self.g.magnitude(row, values) + own.abs()));
         }

@@ -65,7 +65,7 @@ pub struct JumpProjection<T: Real> {
     factors: Vec<DenseCholesky<T>>,
     /// The right-hand side of a group.
     gathered: Vec<T>,
-    /// A row by dof; lumped masses only.
+    /// M⁻¹ G_iᵀ of a row; lumped masses only.
     spread: SpreadRow<T>,
     /// Whether roots and factors belong to `closed`.
     factored: bool,

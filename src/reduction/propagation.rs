@@ -41,7 +41,7 @@ const VERSIONS: [u64; 2] = [1, 2];
 ///   that are linear in each step. In contact the force is of second order where it is smooth.
 /// * The step is limited: ω_r h ≤ π, ω_r the largest frequency of the modes, and refused beyond: a mode that turns by
 ///   more than half a circle in a step is not controlled by one value of the force. Of bodies that are not tapered
-///   a quarter of that: from half of it on they gain energy.
+///   a quarter of that: with longer steps they gained energy when tried.
 /// * No theorem says that energy is kept in contact, nor that it does not grow; what it does is measured in
 ///   `docs/reduction.md`.
 /// * What is exact are the modes that were given: those of a mesh are late by its dispersion, which no scheme hides

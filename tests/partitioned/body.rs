@@ -105,3 +105,15 @@ pub(crate) fn flexibility(random: &mut impl FnMut() -> f64, n: usize, rank: usiz
     let b: Vec<f64> = (0..n * rank).map(|_| random() - 0.3).collect();
     (0..n * n).map(|k| (0..rank).map(|r| b[k % n + r * n] * b[k / n + r * n]).sum()).collect()
 }
+
+/// Puts bodies, whose dofs come one after the other, into a motion.
+pub(crate) fn go_to(bodies: &mut [Body], [u, v, a, _]: [&[f64]; 4]) {
+    let mut first = 0;
+    for body in bodies {
+        let range = first..first + body.u.len();
+        first = range.end;
+        for (own, all) in [(&mut body.u, u), (&mut body.v, v), (&mut body.a, a)] {
+            own.copy_from_slice(&all[range.clone()]);
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Bodies in codes of their own that meet at a frame: as in one code, and the equations of the frame.
 
-use crate::body::{Body, flexibility};
+use crate::body::{self, Body, flexibility};
 use crate::scene::{Comparison, H, Scene, motion};
 use contact_dynamics::contact_solver::{ContactFailure, Pivoting};
 use contact_dynamics::partitioned::{Frame, Interface, Side};
@@ -86,15 +86,8 @@ impl Host {
         force.iter_mut().zip(forces).for_each(|(force, l)| *force += l);
     }
 
-    fn go_to(&mut self, [u, v, a, _]: [&[f64]; 4]) {
-        let mut first = 0;
-        for body in &mut self.bodies {
-            let range = first..first + body.u.len();
-            first = range.end;
-            for (own, all) in [(&mut body.u, u), (&mut body.v, v), (&mut body.a, a)] {
-                own.copy_from_slice(&all[range.clone()]);
-            }
-        }
+    fn go_to(&mut self, motion: [&[f64]; 4]) {
+        body::go_to(&mut self.bodies, motion);
     }
 
     fn motion(&self) -> [Vec<f64>; 4] {

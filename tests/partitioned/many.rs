@@ -1,6 +1,6 @@
 //! Scenes of three and four bodies, and a host that lets each of them advance in a code of its own.
 
-use crate::body::Body;
+use crate::body::{self, Body};
 use crate::scene::{Comparison, H, motion};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::partitioned::{Assembly, Coupling};
@@ -256,15 +256,8 @@ impl Host {
         self.force.iter_mut().zip(forces).for_each(|(force, l)| *force += l);
     }
 
-    fn go_to(&mut self, [u, v, a, _]: [&[f64]; 4]) {
-        let mut first = 0;
-        for body in &mut self.bodies {
-            let range = first..first + body.u.len();
-            first = range.end;
-            for (own, all) in [(&mut body.u, u), (&mut body.v, v), (&mut body.a, a)] {
-                own.copy_from_slice(&all[range.clone()]);
-            }
-        }
+    fn go_to(&mut self, motion: [&[f64]; 4]) {
+        body::go_to(&mut self.bodies, motion);
     }
 
     fn motion(&self) -> [Vec<f64>; 4] {
