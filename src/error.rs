@@ -558,6 +558,26 @@ pub enum Error {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A step, or another call of all ranks, has failed on another rank and therefore on this one.
+    #[error("rank {rank} has failed: {message}")]
+    OtherRank {
+        /// Number of the rank (the first of those that failed).
+        rank: usize,
+        /// Whether a smaller step may help.
+        recoverable: bool,
+        /// Its error in words, cut where it is long.
+        message: String,
+    },
+    /// Something that must be the same on all ranks is not.
+    #[error("ranks differ: {what} lies between {smallest:e} and {largest:e}")]
+    RanksDiffer {
+        /// What they have to agree on.
+        what: &'static str,
+        /// The smallest value found.
+        smallest: f64,
+        /// The largest, or the value that it must have.
+        largest: f64,
+    },
     /// A callback of the host has panicked in an earlier call, and the host's own parts may have stopped half way.
     #[error(
         "a callback of the host has panicked in an earlier call: this simulation does not go on; its state and \
@@ -619,6 +639,7 @@ impl Error {
                 | Self::ContactNotFinite { .. }
                 | Self::EnergyNotFinite { .. }
                 | Self::SupportNotFinite { .. }
+                | Self::OtherRank { recoverable: true, .. }
         )
     }
 }

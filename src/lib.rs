@@ -23,6 +23,7 @@ mod memory;
 pub mod observer;
 pub mod partitioned;
 mod preset;
+pub mod ranks;
 mod real;
 pub mod reduction;
 pub mod reference;

@@ -58,6 +58,13 @@ pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
     /// that names no dofs, a dof twice, or is not ascending.
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize])
     -> Result<Box<dyn Factorization<T>>>;
+
+    /// Whether it solves for the rows of all [`Ranks`](crate::ranks::Ranks), each of which hands over its own. The
+    /// default is no: a run over ranks then refuses it, but for diagonal matrices. All methods of such a solver are
+    /// called by all ranks at the same time, and return an error on all of them if on one.
+    fn spans_ranks(&self) -> bool {
+        false
+    }
 }
 
 impl<T: Real, L: LinearSolver<T> + ?Sized> LinearSolver<T> for Box<L> {
@@ -67,6 +74,10 @@ impl<T: Real, L: LinearSolver<T> + ?Sized> LinearSolver<T> for Box<L> {
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
         (**self).analyze(pattern, last)
+    }
+
+    fn spans_ranks(&self) -> bool {
+        (**self).spans_ranks()
     }
 }
 

@@ -8,9 +8,11 @@ pub use linear::LinearSystem;
 
 use crate::error::{Error, Result};
 use crate::mass::Mass;
+use crate::ranks::Ranks;
 use crate::real::Real;
 use crate::sparse;
 use faer::sparse::SymbolicSparseColMatRef;
+use std::sync::Arc;
 
 /// How the force of a system depends on displacements and velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,6 +160,12 @@ pub trait System<T: Real>: Send {
         None
     }
 
+    /// The ranks that the system is spread over; none by default. What the other methods have to give then is said by
+    /// [`Ranks`].
+    fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
+        None
+    }
+
     /// Degrees of freedom whose motion is given, ascending.
     fn prescribed(&self) -> &[usize] {
         &[]
@@ -258,6 +266,10 @@ macro_rules! forward {
             fn highest_frequency(&mut self) -> Option<f64> {
                 (**self).highest_frequency()
             }
+            fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
+                (**self).ranks()
+            }
+
             fn prescribed(&self) -> &[usize] {
                 (**self).prescribed()
             }

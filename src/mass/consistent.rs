@@ -21,13 +21,14 @@ pub(super) fn without_response<T: Real>(mass: SparseColMatRef<'_, usize, T>, pre
 
 /// A factor of M with identity on some dofs.
 pub(super) fn factor<T: Real>(
+    solver: &dyn LinearSolver<T>,
     mass: SparseColMatRef<'_, usize, T>,
     fixed: &[usize],
 ) -> Result<Box<dyn Factorization<T>>> {
     let reduced = sparse::Combination::new(mass.ncols(), fixed, &[mass.symbolic()])?;
     let mut values = vec![T::zero(); reduced.len()];
     reduced.fill(&[(T::one(), mass.val())], None, &mut values);
-    let mut factor = Automatic.analyze(reduced.pattern(), &[])?;
+    let mut factor = solver.analyze(reduced.pattern(), &[])?;
     factor.factorize(reduced.view(&values)).map_err(|error| match error {
         Error::Singular { dof, .. } => Error::Singular { matrix: "mass matrix", dof },
         other => other,
@@ -59,6 +60,9 @@ enum Method<T: Real> {
         factor: Box<dyn Factorization<T>>,
         /// Force and response by dofs.
         vector: Vec<T>,
+        /// Whether the factor has rows of other ranks too. All ranks then solve together, whatever their own parts of
+        /// force and response are, and leave nothing out: each would leave out something else.
+        spans_ranks: bool,
     },
     /// Entries of the scaled M below its diagonal, row by row, and five vectors; five for several forces once there
     /// are any.
@@ -117,17 +121,46 @@ impl<T: Real> ConsistentInverse<T> {
             if tried.is_definite() {
                 return Ok(tried);
             }
-            return Self::factored(mass, tried.fixed, tried.layers);
+            return Self::factored(&Automatic, mass, tried.fixed, tried.layers);
         }
-        Self::factored(mass, fixed, layers)
+        Self::factored(&Automatic, mass, fixed, layers)
     }
 
-    fn factored(mass: SparseColMatRef<'_, usize, T>, fixed: Vec<usize>, layers: Layers) -> Result<Self> {
-        let factor = factor(mass, &fixed)?;
+    /// The same by a solver that is given: of bodies over ranks, whose rows only that solver has together.
+    pub(super) fn through(
+        solver: &dyn LinearSolver<T>,
+        mass: SparseColMatRef<'_, usize, T>,
+        prescribed: &[usize],
+    ) -> Result<Self> {
+        // (Dofs whose mass is on other ranks look as if they had none, and couplings of other ranks lead anywhere.)
+        let fixed = prescribed.to_vec();
+        let layers = Layers::around(&[], mass, &fixed)?;
+        let mut inverse = Self::factored(solver, mass, fixed, layers)?;
+        inverse.scaling.fill(T::one());
+        if let Method::Factor { spans_ranks, .. } = &mut inverse.method {
+            *spans_ranks = true;
+        }
+        Ok(inverse)
+    }
+
+    fn factored(
+        solver: &dyn LinearSolver<T>,
+        mass: SparseColMatRef<'_, usize, T>,
+        fixed: Vec<usize>,
+        layers: Layers,
+    ) -> Result<Self> {
+        let factor = factor(solver, mass, &fixed)?;
         let scaling = layers.order().iter().map(|&dof| sparse::entry(mass, dof as usize, dof as usize).sqrt().recip());
         let (scaling, vector) = (scaling.collect(), vec![T::zero(); mass.ncols()]);
         let [force, response] = [(); 2].map(|()| vec![T::zero(); layers.order().len()]);
-        Ok(Self { fixed, layers, scaling, method: Method::Factor { factor, vector }, force, response })
+        Ok(Self {
+            fixed,
+            layers,
+            scaling,
+            method: Method::Factor { factor, vector, spans_ranks: false },
+            force,
+            response,
+        })
     }
 
     /// Whether conjugate gradients soon converge to scattered numbers, and so M is positive definite: as long as they
@@ -286,6 +319,11 @@ impl<T: Real> ConsistentInverse<T> {
 
     /// Turns the force into a response, of which the places before the one returned are not negligible.
     fn solve(&mut self) -> Result<usize> {
+        if let Method::Factor { spans_ranks: true, .. } = self.method {
+            let result = self.force.len().checked_sub(1).map_or(Ok(0), |last| self.respond_around(last));
+            self.force.fill(T::zero());
+            return result;
+        }
         let Some(last) = self.force.iter().rposition(|&force| force != T::zero()) else { return Ok(0) };
         let result = self.respond_around(last);
         self.force[..=last].fill(T::zero());
@@ -296,7 +334,7 @@ impl<T: Real> ConsistentInverse<T> {
     /// The response to forces up to a place, and where it ends.
     fn respond_around(&mut self, last: usize) -> Result<usize> {
         let all = self.layers.connected(last);
-        if let Method::Factor { factor, vector } = &mut self.method {
+        if let Method::Factor { factor, vector, .. } = &mut self.method {
             vector.fill(T::zero());
             for (&dof, &force) in self.layers.order().iter().zip(&self.force[..=last]) {
                 vector[dof as usize] = force;

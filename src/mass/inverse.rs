@@ -3,6 +3,7 @@
 use super::Mass;
 use super::consistent::{ConsistentInverse, factor, without_response};
 use crate::error::{Error, Result};
+use crate::linear_solver::{Automatic, LinearSolver};
 use crate::real::Real;
 use faer::sparse::SparseColMatRef;
 
@@ -34,6 +35,16 @@ impl<T: Real> InverseMass<T> {
     }
 
     /// `x ← M⁻¹ x`, zero on dofs without response.
+    /// The same with a solver that is given, for consistent masses.
+    pub(crate) fn through(solver: &dyn LinearSolver<T>, mass: Mass<'_, T>, prescribed: &[usize]) -> Result<Self> {
+        match mass {
+            Mass::Lumped(_) => Self::new(mass, prescribed, &[]),
+            Mass::Consistent(mass) => {
+                Ok(Self::Consistent(Box::new(ConsistentInverse::through(solver, mass, prescribed)?)))
+            }
+        }
+    }
+
     pub(crate) fn apply(&mut self, x: &mut [T]) -> Result<()> {
         match self {
             Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
@@ -45,5 +56,5 @@ impl<T: Real> InverseMass<T> {
 
 /// Refuses a matrix that is not positive definite on the dofs that are not prescribed and have a mass.
 pub(super) fn check_definite<T: Real>(mass: SparseColMatRef<'_, usize, T>, prescribed: &[usize]) -> Result<()> {
-    factor(mass, &without_response(mass, prescribed)).map(|_| ())
+    factor(&Automatic, mass, &without_response(mass, prescribed)).map(|_| ())
 }

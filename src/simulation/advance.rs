@@ -48,16 +48,19 @@ impl<T: Real> Simulation<'_, T> {
     /// Takes a step and shows it to the observer.
     fn observed_step(&mut self, observer: &mut dyn Observer<T>) -> Result<Control> {
         self.step()?;
-        let energy = match observer.wants() {
-            Wants::State => None,
-            Wants::Energy => {
-                let energy = self.energy();
-                energy.check(self.time())?;
-                Some(energy)
-            }
-        };
+        // (Energies are sums over all ranks, which take part even if an observer elsewhere wants them.)
+        let [wanted] = self.together.sum(Ok([f64::from(u8::from(observer.wants() == Wants::Energy))]))?;
+        let energy = (wanted > 0.0).then(|| self.energy());
+        energy.map_or(Ok(()), |energy| energy.check(self.time()))?;
         let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
-        observer.observe(&view)
+        let observed = observer.observe(&view);
+        if self.together.is_alone() {
+            return observed;
+        }
+        let stops = observed.map(|control| [f64::from(u8::from(control == Control::Stop))]);
+        let stops = self.together.sum(stops);
+        self.together.caught();
+        Ok(if stops? == [0.0] { Control::Continue } else { Control::Stop })
     }
 
     /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it

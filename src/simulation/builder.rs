@@ -24,15 +24,16 @@ use super::tangent::At;
 use super::workspace::{ContactSize, Workspace};
 #[cfg(doc)]
 use crate::analysis;
-use crate::contact::ContactConstraint;
 #[cfg(doc)]
 use crate::contact::ContactLaw;
+use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
 use crate::corrector::{Corrector, PersistencyCorrection};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass;
+use crate::ranks::{AgreedSolver, AgreedSystem, Together, check_alike, check_interface, check_owned};
 use crate::real::Real;
 use crate::state::{Clock, History, Motion, State};
 use crate::system::{self, Linearity, System, check_vector};
@@ -323,6 +324,21 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// Any [`Error`] that names a wrong input: sizes, NaN, parameters, masses, supports, contact rows on missing or
     /// prescribed dofs, initial penetration, a singular effective matrix, parts that do not fit together.
     pub fn build(self) -> Result<Simulation<'a, T>> {
+        let together = Together::new(self.system.ranks());
+        let run = self.over_ranks(&together).and_then(|builder| builder.build_together(&together));
+        together.finish(run)
+    }
+
+    /// Puts the ranks, if there are any, between the run and the parts of the host that they are spread over.
+    fn over_ranks(self, together: &Together<T>) -> Result<Self> {
+        let Some(ranks) = self.system.ranks() else { return Ok(self) };
+        together.agree(check_system(&*self.system).and_then(|dofs| check_owned(&*ranks, dofs)))?;
+        let system = Box::new(AgreedSystem::new(self.system, together.clone())?);
+        let linear_solver = Box::new(AgreedSolver::new(self.linear_solver, together.clone()));
+        Ok(Self { system, linear_solver, ..self })
+    }
+
+    fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         step_size::<T>(h)?;
         check_times(t, self.overclosure)?;
@@ -334,13 +350,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let admitted = admitted(&*integrator, &tableau, &*contact_solver, (&self.correctors, by_default));
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
         let scheme = Scheme::new(integrator, tableau, self.start_up);
-        let initial = |what, values: Option<Vec<T>>| {
-            let values = values.unwrap_or_else(|| vec![T::zero(); dofs]);
-            check_vector(what, &values, dofs).map(|()| values)
-        };
-        let (mut u, mut v) = (initial("the initial displacement", u)?, initial("the initial velocity", v)?);
+        let [mut u, mut v] = initial_motion(together, [u, v], dofs)?;
 
-        let massless = mass::massless(system.mass(), system.prescribed());
+        let massless = massless_dofs(&*system, together)?;
         let follows = check_massless(&scheme, massless.first())?;
         let fits = |resumed: Resumed<T>| resumed.checked(&scheme, (self.control, h), [dofs, massless.len()]);
         let resumed = self.resumed.map(fits).transpose()?;
@@ -351,36 +363,37 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             ((t, &u[..], &v[..]), &[][..])
         };
         let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), broken, admitted)?;
+        let alike = ["the step size", "the start time", "the number of contact dofs"];
+        check_alike(together, alike, [h, begin.0, constraints.interface().len() as f64])?;
+        check_interface(together, dofs, constraints.interface())?;
         if self.stability == Stability::Checked {
             stability::check_scheme(&scheme)?;
         }
         if constraints.may_press() {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
-        let mut projection = start::projection(&*system, &constraints)?;
+        let mut projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
         let is_smooth = self.correctors.iter().any(Corrector::leaves_smooth_motion);
         let begun = if let Some((state, history)) = resumed {
-            constraints.search(&state.motion, scheme.ahead() * history.clock.h, &mut g)?;
-            constraints.check_rows(&g, system.prescribed(), state.motion.t, &state.motion.u)?;
-            if let Some(overclosures) = &history.overclosures {
-                constraints.adjust(overclosures.clone());
-            }
-            RateCheck::new(constraints.len()).check(&mut constraints, &state.motion, history.clock.h, &g)?;
+            take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
             Begun { state, history, adjustment: None }
         } else {
             let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
-            let start = Start { system, contact_solver, scheme: &scheme, h, t, massless, is_smooth };
+            let start = Start { system, contact_solver, scheme: &scheme, together, h, t, massless, is_smooth };
             let violation = Violation::Initial(self.overclosure);
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };
         let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
+        check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;
         contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
             correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
         }
         let limit = match self.stability {
-            Stability::Checked => stability::check_step(&mut *system, &scheme, &state.motion, history.clock.h)?,
+            Stability::Checked => {
+                stability::check_step((&mut *system, together), &scheme, &state.motion, history.clock.h)?
+            }
             Stability::Unchecked => StepLimit::Unchecked,
         };
 
@@ -403,7 +416,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
         let is_balanced = self.balance == EnergyBalance::On;
-        let ledger = is_balanced.then(|| Ledger::new(&mut *system, &state, (&constraints, &g))).transpose()?;
+        let ledger =
+            is_balanced.then(|| Ledger::new(&mut *system, together, &state, (&constraints, &g))).transpose()?;
         let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
         Ok(Simulation {
             system,
@@ -412,6 +426,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             contact_solver,
             correctors,
             linear_solver: self.linear_solver,
+            together: together.clone(),
             scheme,
             program,
             limit,
@@ -429,6 +444,43 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 }
 
 /// Refuses times that are not finite, and an overclosure that is removed over a time that is not positive.
+/// Initial displacements and velocities as they were given, or zero; those of their owners on ranks.
+fn initial_motion<T: Real>(together: &Together<T>, given: [Option<Vec<T>>; 2], dofs: usize) -> Result<[Vec<T>; 2]> {
+    let names = ["the initial displacement", "the initial velocity"];
+    let mut motion = given.map(|values| values.unwrap_or_else(|| vec![T::zero(); dofs]));
+    let sound = names.into_iter().zip(&motion).try_for_each(|(what, values)| check_vector(what, values, dofs));
+    together.agree(sound)?;
+    motion.iter_mut().try_for_each(|values| together.share(values))?;
+    Ok(motion)
+}
+
+/// Finds the rows of the state that a run goes on from, and checks that they fit.
+fn take_up<T: Real>(
+    constraints: &mut Constraints<'_, T>,
+    g: &mut ContactJacobian<T>,
+    (scheme, prescribed): (&Scheme<'_>, &[usize]),
+    (state, history): (&State<T>, &History<T>),
+) -> Result<()> {
+    let h = history.clock.h;
+    constraints.search(&state.motion, scheme.ahead() * h, g)?;
+    constraints.check_rows(g, prescribed, state.motion.t, &state.motion.u)?;
+    if let Some(overclosures) = &history.overclosures {
+        constraints.adjust(overclosures.clone());
+    }
+    RateCheck::new(constraints.len()).check(constraints, &state.motion, h, g)
+}
+
+/// The free dofs without mass. Over ranks, none of which has all of their stiffness, they are refused.
+fn massless_dofs<T: Real>(system: &dyn System<T>, together: &Together<T>) -> Result<Vec<usize>> {
+    let mut massless = mass::massless(system.mass(), system.prescribed());
+    massless.retain(|&dof| together.owns(dof));
+    if together.is_alone() || together.max(Ok([massless.len() as f64]))? == [0.0] {
+        return Ok(massless);
+    }
+    let reason = "it has dofs without mass, which runs over ranks do not take: give them some, as `Mass` lumps it";
+    Err(Error::Incompatible { part: "the mass".into(), reason })
+}
+
 fn check_times(t: f64, overclosure: InitialOverclosure) -> Result<()> {
     let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
         true => Ok(()),

@@ -47,7 +47,8 @@ impl<T: Real> Simulation<'_, T> {
             (Err(error), Some((state, history))) => {
                 let (h, tried) = (history.clock.h, self.history.clock.h);
                 (self.state, self.history) = (state, history);
-                self.compile_for(tried, h)?;
+                let compiled = self.compile_for(tried, h);
+                self.together.finish(compiled)?;
                 Err(error)
             }
         }

@@ -4,13 +4,17 @@ use super::constraints::Constraints;
 use super::results::{Energy, Works, finite};
 use crate::contact::ContactJacobian;
 use crate::error::Result;
+use crate::mass::Mass;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{ContactState, State};
 use crate::system::System;
+use std::ops::Range;
 
 /// Accumulates [`Works`]; costs one load, one product with C and, with supports, one evaluation of f a step.
 #[derive(Debug)]
-pub(crate) struct Ledger<T> {
+pub(crate) struct Ledger<T: Real> {
+    together: Together<T>,
     works: Works<T>,
     start: T,
     load: Vec<T>,
@@ -49,9 +53,15 @@ pub(crate) struct StepBooks<'a, T> {
 }
 
 impl<T: Real> Ledger<T> {
-    pub(crate) fn new(system: &mut dyn System<T>, state: &State<T>, rows: Rows<'_, '_, T>) -> Result<Self> {
+    pub(crate) fn new(
+        system: &mut dyn System<T>,
+        together: &Together<T>,
+        state: &State<T>,
+        rows: Rows<'_, '_, T>,
+    ) -> Result<Self> {
         let zero = || vec![T::zero(); system.dofs()];
         let mut ledger = Self {
+            together: together.clone(),
             works: Works::default(),
             start: T::zero(),
             load: zero(),
@@ -67,7 +77,7 @@ impl<T: Real> Ledger<T> {
             next_friction: Vec::new(),
             next: (Works::default(), T::zero()),
         };
-        let energy = energy(system, state, None);
+        let energy = energy(system, together, state, None);
         energy.check(state.time())?;
         ledger.start = energy.total();
         ledger.restart(system, state, rows)?;
@@ -106,7 +116,7 @@ impl<T: Real> Ledger<T> {
     fn damping_power(&mut self, system: &mut dyn System<T>, u: &[T], v: &[T]) -> Result<T> {
         let Some(damping) = system.damping_force() else { return Ok(T::zero()) };
         damping.evaluate(u, v, &mut self.residual)?;
-        Ok(-dot(&self.residual, v))
+        Ok(-self.together.dot(&self.residual, v)?)
     }
 
     /// Remembers the displacements that the step starts from.
@@ -122,16 +132,22 @@ impl<T: Real> Ledger<T> {
         let half = T::of(0.5);
         let [u, v, _] = books.motion;
         let mut works = self.works;
+        // (On ranks: what this one has of each sum.)
+        let mut by_supports = T::zero();
         for ((&reaction, next), &dof) in self.reactions.iter().zip(&mut self.next_reactions).zip(system.prescribed()) {
             *next = self.residual[dof];
             let mean = half * (reaction + *next);
-            works.supports += mean * (u[dof] - self.old_u[dof]);
+            if self.together.owns(dof) {
+                by_supports += mean * (u[dof] - self.old_u[dof]);
+            }
         }
         // The load at the end is kept in the spare vector until the step is accepted.
         system.external_load(books.t, &mut self.old_load)?;
-        let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
-        let loads = self.load.iter().zip(&self.old_load).map(|(&old, &new)| half * (old + new));
-        works.load += moves.zip(loads).map(|(du, f)| du * f).sum();
+        let work = |force: &dyn Fn(usize) -> T| {
+            let own = |part: Range<usize>| part.map(|dof| (u[dof] - self.old_u[dof]) * force(dof)).sum::<T>();
+            self.together.owned(u.len()).map(own).sum::<T>()
+        };
+        let by_loads = work(&|dof| half * (self.load[dof] + self.old_load[dof]));
         if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
             self.friction.resize(u.len(), T::zero());
         }
@@ -145,12 +161,22 @@ impl<T: Real> Ledger<T> {
         // The force in the middle of the step, by the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
         let work = |old: &[T], new: &[T]| {
-            let moves = u.iter().zip(&self.old_u).map(|(&new, &old)| new - old);
-            let forces = old.iter().zip(new).map(|(&old, &new)| old + newest * (new - old));
-            moves.zip(forces).map(|(du, f)| du * f).sum::<T>()
+            let own = |part: Range<usize>| {
+                part.map(|dof| (u[dof] - self.old_u[dof]) * (old[dof] + newest * (new[dof] - old[dof]))).sum::<T>()
+            };
+            match new.is_empty() {
+                true => T::zero(),
+                false => self.together.owned(u.len()).map(own).sum::<T>(),
+            }
         };
-        works.contact += work(&self.contact, &self.next_contact);
-        works.friction += work(&self.friction, &self.next_friction);
+        let (by_contact, by_friction) =
+            (work(&self.contact, &self.next_contact), work(&self.friction, &self.next_friction));
+        let parts = [by_supports, by_loads, by_contact, by_friction].map(T::value);
+        let [by_supports, by_loads, by_contact, by_friction] = self.together.sum(Ok(parts))?.map(T::of);
+        works.supports += by_supports;
+        works.load += by_loads;
+        works.contact += by_contact;
+        works.friction += by_friction;
         works.corrections += books.corrections;
         let power = self.damping_power(system, u, v)?;
         works.damping += half * (self.power + power) * T::of(books.h);
@@ -175,17 +201,26 @@ impl<T: Real> Ledger<T> {
 }
 
 /// Energy of a state, with the balance of a ledger.
-pub(crate) fn energy<T: Real>(system: &mut dyn System<T>, state: &State<T>, ledger: Option<&Ledger<T>>) -> Energy<T> {
+/// On ranks all call it; where they cannot be reached the energy is not finite.
+pub(crate) fn energy<T: Real>(
+    system: &mut dyn System<T>,
+    together: &Together<T>,
+    state: &State<T>,
+    ledger: Option<&Ledger<T>>,
+) -> Energy<T> {
     let v = state.velocity();
-    let kinetic = T::of(0.5)
-        * match system.mass() {
-            crate::mass::Mass::Lumped(mass) => mass.iter().zip(v).map(|(&m, &v)| m * v * v).sum::<T>(),
-            consistent @ crate::mass::Mass::Consistent(_) => {
-                let mut momentum = vec![T::zero(); v.len()];
-                consistent.add_product(T::one(), v, &mut momentum);
-                dot(&momentum, v)
-            }
-        };
+    let twice = match system.mass() {
+        Mass::Lumped(mass) => {
+            let own = |part: Range<usize>| mass[part.clone()].iter().zip(&v[part]).map(|(&m, &v)| m * v * v).sum::<T>();
+            together.owned(v.len()).map(own).sum::<T>()
+        }
+        consistent @ Mass::Consistent(_) => {
+            let mut momentum = vec![T::zero(); v.len()];
+            consistent.add_product(T::one(), v, &mut momentum);
+            together.part_of_dot(&momentum, v)
+        }
+    };
+    let kinetic = together.sum(Ok([twice.value()])).map_or(T::nan(), |[twice]| T::of(0.5) * T::of(twice));
     let energy = Energy { kinetic, potential: system.potential_energy(state.displacement()), works: None };
     Energy { works: ledger.map(|ledger| ledger.works(energy.total())), ..energy }
 }
@@ -224,8 +259,4 @@ fn balance_residual<T: Real>(
     }
     system.mass().add_product(T::one(), a, residual);
     Ok(())
-}
-
-fn dot<T: Real>(x: &[T], y: &[T]) -> T {
-    x.iter().zip(y).map(|(&x, &y)| x * y).sum()
 }

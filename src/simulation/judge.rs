@@ -2,6 +2,7 @@
 
 use crate::analysis::LocalError;
 use crate::error::{Error, Result, positive};
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{Motion, State};
 
@@ -136,20 +137,31 @@ impl<T: Real> Judge<T> {
     }
 
     /// Judges a step that ends with u and v after `changes` of contact.
-    pub(super) fn judge(&mut self, [u, v]: [&[T]; 2], prescribed: &[usize], h: f64, changes: usize) -> Verdict {
+    pub(super) fn judge(
+        &mut self,
+        together: &Together<T>,
+        [u, v]: [&[T]; 2],
+        prescribed: &[usize],
+        h: f64,
+        changes: usize,
+    ) -> Result<Verdict> {
         self.excess = 0.0;
         if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
             let factor = if changes > 0 { 1.0 } else { local.factor };
-            self.estimate = factor * self.distance([u, v], prescribed, h);
+            // (The largest of numbers leaves NaN out.)
+            let distance = self.distance([u, v], prescribed, h);
+            let distance = if distance.is_nan() { f64::INFINITY } else { distance };
+            let [distance] = together.max(Ok([distance]))?;
+            self.estimate = factor * distance;
             self.excess = self.estimate / tolerance;
         }
         // Written so that NaN is refused.
         let fine = self.excess <= 1.0 && self.control.changes.is_none_or(|limit| changes <= limit);
         self.coarse = !fine;
-        match fine || self.suspended {
+        Ok(match fine || self.suspended {
             true => Verdict::Accepted,
             false => Verdict::Coarse,
-        }
+        })
     }
 
     /// Largest distance of the free dofs from Taylor's expansion, in u and in h v.

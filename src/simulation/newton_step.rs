@@ -65,8 +65,10 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let settled = self.press(newton, new, past, vectors, contact)?;
             self.operator.finish(&mut vectors.increment, &contact.interface.increment, &contact.interface.forces)?;
             self.refuse_nan(&vectors.increment, "the increment")?;
-            let before = Norms { residual: self.loaded_norm(&newton.residual, &contact.interface.forces), ..norms };
-            let size = norm(&vectors.increment);
+            let residual = self.loaded_square(&newton.residual, &contact.interface.forces);
+            let increment = self.square(&vectors.increment);
+            let [residual, size] = self.together.sum(Ok([residual, increment]))?.map(f64::sqrt);
+            let before = Norms { residual, ..norms };
             let forces = &contact.interface.forces;
             let Some((share, found)) = self.advance(newton, new, past, vectors, forces, before)? else {
                 if settled {
@@ -80,7 +82,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             norms = found;
             // Rows were made to fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
-            if self.has_converged(newton, share * size, [first, before.residual], norms, new) && settled {
+            if self.has_converged(newton, share * size, [first, before.residual], norms, new)? && settled {
                 return Ok(());
             }
         }
@@ -105,20 +107,21 @@ impl<T: Real> StageSolve<'_, '_, T> {
         [first, before]: [f64; 2],
         norms: Norms,
         new: &Motion<T>,
-    ) -> bool {
+    ) -> Result<bool> {
         let ratio = |x: f64, y: f64| if y > 0.0 { x / y } else { 0.0 };
-        let (whole, contraction) = (norm(&newton.d), ratio(norms.residual, before));
+        let [in_u, in_v, _] = self.stage.balanced().weights();
+        let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
+        let [whole, values] = self.together.sum(Ok([self.square(&newton.d), self.square(values)]))?.map(f64::sqrt);
+        let contraction = ratio(norms.residual, before);
         newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
         // Where forces cancel the residual has nothing to be compared with. Then increments must be small, and the
         // residual must fall no more or have fallen far; or the increment must be below the resolution of the
         // displacements.
-        let [in_u, in_v, _] = self.stage.balanced().weights();
-        let (weight, values) = if in_u == T::zero() { (in_v, &new.v) } else { (in_u, &new.u) };
-        let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * norm(values));
+        let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * values);
         let small = size <= displacement * whole || moved <= 1e4 * resolution;
-        met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first)
+        Ok(met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first))
     }
 
     /// Begins with d = 0: completes the prediction by its accelerations.
@@ -169,27 +172,42 @@ impl<T: Real> StageSolve<'_, '_, T> {
         vectors: &mut StageVectors<T>,
         forces: &[T],
     ) -> Result<Norms> {
+        let squares = self.squares(newton, new, past, vectors, forces);
+        let [force, residual] = self.together.sum(squares)?.map(f64::sqrt);
+        // (Contact is the same on all ranks.)
+        Ok(Norms { residual, force, contact: norm(forces) })
+    }
+
+    /// Puts the residual without contact where the increment is going to be; returns what this rank has of the squares
+    /// of the force, and of the residual with contact forces.
+    fn squares(
+        &mut self,
+        newton: &mut NewtonWork<T>,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+        forces: &[T],
+    ) -> Result<[f64; 2]> {
         let StageVectors { increment, balance, supports } = vectors;
         let prescribed = &supports.dofs;
         let t = self.clock.at(self.stage.load);
         let motion = self.balanced(new, balance.as_ref());
         match (&mut newton.path, past.first()) {
             (Some(path), Some(from)) if self.stage.along_path => {
-                path.force(self.system, t, [&from.u, &new.u, &motion.u], &motion.v, increment)?;
+                path.force((&mut *self.system, self.together), t, [&from.u, &new.u, &motion.u], &motion.v, increment)?;
             }
             _ => self.system.force(t, &motion.u, &motion.v, increment)?,
         }
         for &dof in prescribed {
             increment[dof] = T::zero();
         }
-        let force = norm(increment);
+        let force = self.square(increment);
         self.system.mass().add_product(-T::one(), &motion.a, increment);
         for &dof in prescribed {
             increment[dof] = T::zero();
         }
         self.refuse_nan(increment, "the residual")?;
-        let residual = self.loaded_norm(increment, forces);
-        Ok(Norms { residual, force, contact: norm(forces) })
+        Ok([force, self.loaded_square(increment, forces)])
     }
 
     /// A residual with the contact forces added.
@@ -201,8 +219,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    fn loaded_norm(&self, residual: &[T], forces: &[T]) -> f64 {
-        self.loaded(residual, forces).map(|r| r * r).sum::<f64>().sqrt()
+    fn loaded_square(&self, residual: &[T], forces: &[T]) -> f64 {
+        let loaded = self.loaded(residual, forces);
+        match self.together.is_alone() {
+            true => loaded.map(|r| r * r).sum(),
+            false => loaded.enumerate().filter(|&(dof, _)| self.together.owns(dof)).map(|(_, r)| r * r).sum(),
+        }
+    }
+
+    /// The square of the length of what this rank owns of a vector.
+    fn square(&self, x: &[T]) -> f64 {
+        self.together.owned(x.len()).map(|part| square(&x[part])).sum()
     }
 
     /// The dof with the largest residual.
@@ -293,7 +320,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                     }
                 }
                 // The host may admit a state nearer to the last one.
-                Err(error) if may_shorten && error.is_recoverable() => {}
+                Err(error) if may_shorten && error.is_recoverable() => self.together.caught(),
                 Err(error) => return Err(error),
             }
             share *= 0.5;
@@ -320,5 +347,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
 
 /// The Euclidean norm.
 fn norm<T: Real>(x: &[T]) -> f64 {
-    x.iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt()
+    square(x).sqrt()
+}
+
+fn square<T: Real>(x: &[T]) -> f64 {
+    x.iter().map(|x| x.value().powi(2)).sum()
 }

@@ -43,6 +43,8 @@ pub(crate) struct Operator<T> {
     delassus: Delassus<T>,
     groups: Groups,
     contact: ContactPath,
+    /// Whether its rows are all here, not spread over ranks.
+    whole: bool,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
 }
@@ -109,6 +111,7 @@ impl<T: Real> Operator<T> {
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact,
+            whole: system.ranks().is_none(),
             full,
         };
         match operator.factorize(system, h, at) {
@@ -143,6 +146,7 @@ impl<T: Real> Operator<T> {
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact: ContactPath::Condensed,
+            whole: true,
             full: Vec::new(),
         })
     }
@@ -379,7 +383,8 @@ impl<T: Real> Operator<T> {
 
     /// Whether W of so many rows is dearer to form than to apply: the factor changes with every iteration.
     pub(crate) fn applies(&self, rows: usize) -> bool {
-        self.varies() && rows >= MANY && self.contact != ContactPath::Apart
+        // (Its scale is read from rows that no rank has all of.)
+        self.varies() && rows >= MANY && self.contact != ContactPath::Apart && self.whole
     }
 
     /// The size of the diagonal of W: that of a body that answers on each dof as if the others were held.

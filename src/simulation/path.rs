@@ -1,8 +1,10 @@
 //! The force of a path: the one whose internal work over a step is the change of the potential.
 
 use crate::error::Result;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::system::{Path, System};
+use std::ops::Range;
 
 /// How the force of a path was formed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +42,7 @@ impl<T: Real> PathWork<T> {
     /// nearest to Simpson's rule. Each of the three internal forces has no resultant, hence neither has the mean.
     pub(super) fn force(
         &mut self,
-        system: &mut dyn System<T>,
+        (system, together): (&mut dyn System<T>, &Together<T>),
         t: f64,
         [from, to, mean]: [&[T]; 3],
         v: &[T],
@@ -57,7 +59,11 @@ impl<T: Real> PathWork<T> {
             return Ok(());
         };
         *form = PathForm::Simpson;
-        let work = |force: &[T]| (0..to.len()).map(|i| force[i] * (to[i] - from[i])).sum::<T>();
+        // (What this rank has of a work.)
+        let work = |force: &[T]| {
+            let own = |part: Range<usize>| part.map(|i| force[i] * (to[i] - from[i])).sum::<T>();
+            together.owned(to.len()).map(own).sum::<T>()
+        };
         // The external part, loads and damping, is the same in all three.
         system.external_load(t, load)?;
         if let Some(damping) = system.damping_force() {
@@ -67,7 +73,8 @@ impl<T: Real> PathWork<T> {
         let other = work(load);
         system.force(t, from, v, scratch)?;
         system.force(t, to, v, load)?;
-        let works = [work(scratch), work(out), work(load)];
+        let works = [other, work(scratch), work(out), work(load)];
+        let [other, works @ ..] = together.sum(Ok(works.map(T::value)))?.map(T::of);
         let simpson = [1.0, 4.0, 1.0].map(|weight| T::of(weight / 6.0));
         let miss = other - (after - before) - works.iter().zip(simpson).map(|(&work, weight)| work * weight).sum::<T>();
         let center = works.iter().copied().sum::<T>() / T::of(3.0);

@@ -66,6 +66,11 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Changes the step size, whatever the nominal one is.
     pub(super) fn change_step_size(&mut self, h: f64) -> Result<()> {
+        let result = self.change_step_size_together(h);
+        self.together.finish(result)
+    }
+
+    fn change_step_size_together(&mut self, h: f64) -> Result<()> {
         let old = self.history.clock.h;
         if h.to_bits() == old.to_bits() {
             return Ok(());
@@ -76,7 +81,8 @@ impl<T: Real> Simulation<'_, T> {
         if let StepLimit::Cleared(cleared) = self.limit
             && h > cleared
         {
-            self.limit = stability::check_step(&mut *self.system, &self.scheme, &self.state.motion, h)?;
+            self.limit =
+                stability::check_step((&mut *self.system, &self.together), &self.scheme, &self.state.motion, h)?;
         }
         let past = self.resampled(h)?;
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
@@ -102,7 +108,7 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Past states 1, 2, … known − 1 at the spacing h.
     fn resampled(&mut self, h: f64) -> Result<Vec<Motion<T>>> {
-        let Self { system, constraints, g, state, history, scheme, .. } = self;
+        let Self { system, constraints, g, state, history, scheme, together, linear_solver, .. } = self;
         let known = history.known;
         let newest = &state.motion;
         let nodes = computed(state, history);
@@ -123,7 +129,7 @@ impl<T: Real> Simulation<'_, T> {
         let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
         let closed: Vec<usize> = rigid.collect();
         if history.smooth < known && !closed.is_empty() {
-            let mut projection = start::projection(&**system, constraints)?;
+            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
             projection.close_rows(g, &closed, |row| no_response(newest.t, constraints.ids[row]))?;
             for motion in &mut past {
                 project(motion, constraints, g, &mut projection, &closed)?;
@@ -155,7 +161,10 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// Those of building a simulation from this state. The simulation is then as it was.
     pub fn restart(&mut self) -> Result<()> {
-        self.guarded(Self::begin_anew)
+        self.guarded(|run| {
+            let result = run.begin_anew();
+            run.together.finish(result)
+        })
     }
 
     fn begin_anew(&mut self) -> Result<()> {
@@ -165,10 +174,18 @@ impl<T: Real> Simulation<'_, T> {
         let is_smooth = correctors.iter().any(Corrector::leaves_smooth_motion);
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        let mut projection = start::projection(&**system, constraints)?;
+        let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
         let (system, contact_solver) = (&mut **system, &mut **contact_solver);
-        let start =
-            Start { system: &mut *system, contact_solver: &mut *contact_solver, scheme, h, t, massless, is_smooth };
+        let start = Start {
+            system: &mut *system,
+            contact_solver: &mut *contact_solver,
+            scheme,
+            together: &self.together,
+            h,
+            t,
+            massless,
+            is_smooth,
+        };
         let Begun { state: mut begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
         work.contact.rows.reserved = constraints.room().min(FORESEEN);

@@ -16,6 +16,7 @@ use crate::contact_solver::ContactSolver;
 use crate::corrector::Corrector;
 use crate::error::{Error, Result};
 use crate::linear_solver::LinearSolver;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{History, State};
 use crate::system::System;
@@ -48,6 +49,7 @@ pub struct Simulation<'a, T: Real> {
     pub(super) contact_solver: Box<dyn ContactSolver<T> + 'a>,
     pub(super) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
     pub(super) linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    pub(super) together: Together<T>,
     pub(super) scheme: Scheme<'a>,
     pub(super) program: Program<T>,
     pub(super) limit: StepLimit,
@@ -162,7 +164,7 @@ impl<T: Real> Simulation<'_, T> {
         let sum = self.scheme.momentum(&self.state.motion, &history.slots[1..history.known], history.clock.h);
         let mut product = vec![T::zero(); dofs];
         self.system.mass().add_product(T::one(), &sum, &mut product);
-        Ok(product.iter().zip(direction).map(|(&p, &d)| p * d).sum())
+        self.together.dot(&product, direction)
     }
 
     /// Refuses to go on after a panic of the host.
@@ -182,6 +184,8 @@ impl<T: Real> Simulation<'_, T> {
                 if self.work.backup.underway {
                     self.put_back();
                 }
+                // The others do not wait for a rank that has panicked.
+                self.together.finish::<()>(Err(Error::Poisoned)).ok();
                 resume_unwind(panic)
             }
         }
@@ -197,7 +201,7 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Kinetic and elastic energy of the state, and the balance if the builder asked for it.
     pub fn energy(&mut self) -> Energy<T> {
-        energy::energy(&mut *self.system, &self.state, self.ledger.as_ref())
+        energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_ref())
     }
 
     /// Forces of the supports on the system, one a prescribed dof: R = M a − f(t, u, v) − Gᵀ λ.
@@ -207,6 +211,7 @@ impl<T: Real> Simulation<'_, T> {
     /// The host's own.
     pub fn reactions(&mut self) -> Result<Vec<T>> {
         self.check_sound()?;
-        energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g))
+        let reactions = energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g));
+        self.together.finish(reactions)
     }
 }

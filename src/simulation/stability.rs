@@ -4,6 +4,7 @@ use super::scheme::Scheme;
 use crate::analysis::{self, ZeroStability};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::sparse::{self, Product, Symmetry};
 use crate::state::Motion;
@@ -60,7 +61,7 @@ pub(super) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
 /// is unstable. One that they admit may exceed the limit by the error of the iteration (a fraction of a percent on
 /// meshes). For nonlinear systems the tangent at `motion` counts.
 pub(super) fn check_step<T: Real>(
-    system: &mut dyn System<T>,
+    (system, together): (&mut dyn System<T>, &Together<T>),
     scheme: &Scheme<'_>,
     motion: &Motion<T>,
     h: f64,
@@ -75,6 +76,18 @@ pub(super) fn check_step<T: Real>(
     };
     let allowance = 1.0 + SLIVER.max(64.0 * T::epsilon().value());
     let lags = lags(tableau, system);
+    if !together.is_alone() {
+        let limit = critical / frequency_over_ranks(system, together, motion, lags)?;
+        return match h <= limit * allowance {
+            true => Ok(StepLimit::Cleared(h.max(limit))),
+            false => Err(Error::BeyondStability {
+                integrator: scheme.integrator.name(),
+                h,
+                largest: limit,
+                frequency: critical / limit,
+            }),
+        };
+    }
     let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed(), &[])?, system.dofs());
     let highest = if let Some(omega) = system.highest_frequency() {
         Highest { at_least: omega * omega, at_most: omega * omega }
@@ -118,6 +131,35 @@ pub(super) fn check_step<T: Real>(
 }
 
 /// Whether the system is damped, and the scheme takes damping forces from before the stage.
+/// The highest frequency of bodies over ranks: what the host knows, or the bound by Gershgorin's circles, of which each
+/// rank has those of its own dofs. Lanczos' iteration would take products with rows of all ranks.
+fn frequency_over_ranks<T: Real>(
+    system: &mut dyn System<T>,
+    together: &Together<T>,
+    motion: &Motion<T>,
+    lags: bool,
+) -> Result<f64> {
+    let refusal = |reason| Err(Error::Incompatible { part: "an explicit scheme over ranks".into(), reason });
+    if lags {
+        return refusal(
+            "it takes damping forces from before the step, whose limit is not sought over ranks: see to the step size \
+             and take it by `unchecked_stability`",
+        );
+    }
+    if let Some(frequency) = system.highest_frequency() {
+        return Ok(frequency);
+    }
+    let circles = Stiffness::of(system, motion).and_then(|stiffness| {
+        let inverse = InverseMass::new(system.mass(), system.prescribed(), &[]);
+        let circles = stiffness.map(|stiffness| Ok(stiffness.circles(system, &inverse?))).transpose()?.flatten();
+        Ok([circles.map_or(f64::INFINITY, |circles| circles.largest.value())])
+    });
+    match together.max(circles)? {
+        [square] if square.is_finite() => Ok(square.sqrt()),
+        _ => refusal("nothing bounds its frequencies: let the system tell its `highest_frequency`"),
+    }
+}
+
 fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
     tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0) && system.damping_force().is_some()
 }

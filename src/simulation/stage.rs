@@ -12,6 +12,7 @@ use crate::contact::ContactJacobian;
 use crate::contact_solver::{ContactFailure, ContactSolver};
 use crate::corrector::contact_error;
 use crate::error::{Error, Result};
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{Clock, Motion};
 use crate::system::System;
@@ -21,6 +22,7 @@ pub(super) struct StageSolve<'s, 'a, T: Real> {
     pub(super) stage: &'s CompiledStage<T>,
     pub(super) clock: Clock,
     pub(super) system: &'s mut dyn System<T>,
+    pub(super) together: &'s Together<T>,
     pub(super) operator: &'s mut Operator<T>,
     pub(super) constraints: &'s mut Constraints<'a, T>,
     pub(super) g: &'s mut ContactJacobian<T>,
@@ -40,7 +42,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         vectors: &mut StageVectors<T>,
         work: &mut ContactWork<T>,
     ) -> Result<bool> {
-        let Self { stage, clock, system, operator, constraints, g, solver, statistics } = self;
+        let Self { stage, clock, system, operator, constraints, g, solver, statistics, .. } = self;
         let mut contact =
             ContactStep { stage, clock: *clock, constraints, g, solver: &mut **solver, statistics, iterate, part };
         contact.solve(&mut **system, operator, new, past, vectors, work)

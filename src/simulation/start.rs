@@ -13,7 +13,9 @@ use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, rounding};
 use crate::error::{Error, Result};
+use crate::linear_solver::LinearSolver;
 use crate::mass::InverseMass;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
 use crate::system::System;
@@ -24,6 +26,7 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) system: &'s mut dyn System<T>,
     pub(super) contact_solver: &'s mut dyn ContactSolver<T>,
     pub(super) scheme: &'s Scheme<'s>,
+    pub(super) together: &'s Together<T>,
     pub(super) h: f64,
     pub(super) t: f64,
     /// Free dofs without mass.
@@ -79,8 +82,13 @@ pub(super) struct Begun<T: Real> {
 pub(super) fn projection<T: Real>(
     system: &dyn System<T>,
     constraints: &Constraints<'_, T>,
+    (together, solver): (&Together<T>, &dyn LinearSolver<T>),
 ) -> Result<JumpProjection<T>> {
-    let inverse = InverseMass::new(system.mass(), system.prescribed(), constraints.interface())?;
+    let (mass, interface) = (system.mass(), constraints.interface());
+    let inverse = match together.is_alone() {
+        true => InverseMass::new(mass, system.prescribed(), interface)?,
+        false => InverseMass::through(solver, mass, system.prescribed())?,
+    };
     JumpProjection::with(inverse, system.dofs(), constraints.room())
 }
 
@@ -108,7 +116,7 @@ impl<T: Real> Start<'_, T> {
         let depth = scheme.depth;
         let mut slots = vec![Motion::zero(motion.u.len()); scheme.slots()];
         straight_past(&motion, h, &mut slots[1..depth]);
-        let known = if is_free_flight(self.system, projection, &motion, &slots[1..depth], h)? {
+        let known = if is_free_flight((self.system, self.together), projection, &motion, &slots[1..depth], h)? {
             depth
         } else if scheme.start_up == StartUp::Taylor {
             taylor_past(&motion, h, &mut slots[1..depth]);
@@ -332,27 +340,34 @@ fn touching_contacts<T: Real>(
 /// Whether the straight line through the start is the past motion of the system: neither the acceleration at the start
 /// nor that at the past states changes a velocity beyond rounding within a step.
 fn is_free_flight<T: Real>(
-    system: &mut dyn System<T>,
+    (system, together): (&mut dyn System<T>, &Together<T>),
     projection: &mut JumpProjection<T>,
     motion: &Motion<T>,
     past: &[Motion<T>],
     h: f64,
 ) -> Result<bool> {
-    let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
-    let bound = T::of(64.0) * T::epsilon() * largest(&motion.v);
-    let small = |a: &[T]| T::all_finite(a) && T::of(h) * largest(a) <= bound;
-    if !small(&motion.a) {
+    let largest = |x: &[T]| -> Result<T> {
+        let own = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+        let own = if T::all_finite(x) { own } else { T::infinity() };
+        together.max(Ok([own.value()])).map(|[largest]| T::of(largest))
+    };
+    let bound = T::of(64.0) * T::epsilon() * largest(&motion.v)?;
+    let small = |a: &[T]| -> Result<bool> { Ok(T::of(h) * largest(a)? <= bound) };
+    if !small(&motion.a)? {
         return Ok(false);
     }
     let mut a = vec![T::zero(); motion.u.len()];
     for motion in past {
         match system.force(motion.t, &motion.u, &motion.v, &mut a) {
             // The host does not admit this past.
-            Err(error) if error.is_recoverable() => return Ok(false),
+            Err(error) if error.is_recoverable() => {
+                together.caught();
+                return Ok(false);
+            }
             other => other?,
         }
         projection.apply_inverse(&mut a)?;
-        if !small(&a) {
+        if !small(&a)? {
             return Ok(false);
         }
     }

@@ -20,6 +20,14 @@ use crate::tableau::impulse_weight;
 impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
     pub(super) fn attempt(&mut self) -> Result<Verdict> {
+        match self.attempt_together() {
+            // (All ranks have agreed on it before the host's history moved.)
+            Ok(verdict) => Ok(verdict),
+            failed => self.together.finish(failed),
+        }
+    }
+
+    fn attempt_together(&mut self) -> Result<Verdict> {
         let Self { constraints, g, state, history, work, ledger, scheme, contact_solver, .. } = self;
         history.clock.check()?;
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g)?;
@@ -76,7 +84,8 @@ impl<T: Real> Simulation<'_, T> {
     /// Makes the motion in slot 0 of the history the state. After an error, or the verdict that the step is too coarse,
     /// the caller undoes the step.
     fn accept(&mut self) -> Result<Verdict> {
-        let Self { system, constraints, g, state, history, work, statistics, ledger, scheme, judge, .. } = self;
+        let Self { system, constraints, g, state, history, work, statistics, ledger, scheme, judge, together, .. } =
+            self;
         let stages = work.backup.rotations;
         let flags = work.contact.trial.closed.iter().zip(&work.contact.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
@@ -108,7 +117,8 @@ impl<T: Real> Simulation<'_, T> {
         check_contacts(new.t, &work.contact.trial)?;
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         if let Some(judge) = judge {
-            let verdict = judge.judge([motion[0], motion[1]], &work.vectors.supports.dofs, history.clock.h, changes);
+            let verdict =
+                judge.judge(together, [motion[0], motion[1]], &work.vectors.supports.dofs, history.clock.h, changes)?;
             if verdict == Verdict::Coarse {
                 return Ok(verdict);
             }
@@ -160,7 +170,7 @@ impl<T: Real> Simulation<'_, T> {
 
     /// All stages of a step. On entry slot 0 of the history holds the current motion.
     fn stages(&mut self) -> Result<()> {
-        let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, .. } = self;
+        let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, together, .. } = self;
         let (program, start_covector) = match &mut self.startup {
             // After the step one state more is known than now.
             Some(startup) => (startup, Some(&self.scheme.derived.covectors[history.known])),
@@ -205,7 +215,8 @@ impl<T: Real> Simulation<'_, T> {
             }
             work.contact.rows.read_start(constraints, g, past, clock.h)?;
             let (parts, solver) = (&mut **system, &mut **contact_solver);
-            let mut solve = StageSolve { stage, clock, system: parts, operator, constraints, g, solver, statistics };
+            let mut solve =
+                StageSolve { stage, clock, system: parts, together, operator, constraints, g, solver, statistics };
             let (vectors, contact) = (&mut work.vectors, &mut work.contact);
             match (&mut work.newton, &mut work.block) {
                 (Some(newton), None) => solve.by_iteration(newton, new, past, vectors, contact)?,

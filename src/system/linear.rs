@@ -3,9 +3,11 @@
 use super::{DampingForce, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
 use crate::mass::Mass;
+use crate::ranks::{Ranks, Together};
 use crate::real::Real;
 use crate::sparse::{self, Combination, Product, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
+use std::sync::Arc;
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) -> Result<()> + Send + 'a>;
 type Motion<'a, T> = Box<dyn FnMut(f64) -> Result<[T; 3]> + Send + 'a>;
@@ -50,6 +52,7 @@ pub struct LinearSystem<'a, T: Real> {
     prescribed: Vec<usize>,
     motions: Vec<Option<Motion<'a, T>>>,
     scratch: Vec<T>,
+    ranks: Option<Arc<dyn Ranks<T>>>,
 }
 
 enum StoredMass<T> {
@@ -139,6 +142,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             prescribed: Vec::new(),
             motions: Vec::new(),
             scratch: Vec::new(),
+            ranks: None,
         })
     }
 
@@ -216,6 +220,14 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     #[must_use]
     pub fn try_load(mut self, load: impl FnMut(f64, &mut [T]) -> Result<()> + Send + 'a) -> Self {
         self.load = Some(Box::new(load));
+        self
+    }
+
+    /// Says that this is the part of a system that one of several ranks has: the matrices of the elements that touch
+    /// its own dofs, over all dofs that it knows. See [`Ranks`] for what each rank has.
+    #[must_use]
+    pub fn over_ranks(mut self, ranks: Arc<dyn Ranks<T>>) -> Self {
+        self.ranks = Some(ranks);
         self
     }
 
@@ -364,16 +376,22 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             return None;
         }
         let k = self.stiffness.as_ref();
+        let together = Together::new(self.ranks());
         let energy = |j: usize| {
             let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
             u[j] * entries.map(|(&i, &value)| value * u[i]).sum::<T>()
         };
-        Some(T::of(0.5) * (0..u.len()).map(energy).sum::<T>())
+        // (On ranks: the part of the rows that this one owns.)
+        Some(T::of(0.5) * together.owned(u.len()).map(|part| part.map(energy).sum::<T>()).sum::<T>())
     }
 
     fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
         out.fill(T::zero());
         self.load.as_mut().map_or(Ok(()), |load| load(t, out))
+    }
+
+    fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
+        self.ranks.clone()
     }
 
     fn prescribed(&self) -> &[usize] {

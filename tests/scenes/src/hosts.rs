@@ -2,6 +2,7 @@
 //! computed, or fail.
 
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::ranks::Ranks;
 use contact_dynamics::{
     DampingForce, Factorization, LinearSolver, Linearity, Mass, Path, PathForce, Real, Result, System, TangentWeights,
 };
@@ -48,6 +49,9 @@ impl<T: Real, S: System<T>> System<T> for Bare<S> {
     fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
         assert!(self.empty.is_none(), "there is no tangent");
         self.system.tangent(t, u, v, weights, out)
+    }
+    fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
+        self.system.ranks()
     }
 }
 
@@ -140,6 +144,9 @@ impl<T: Real, S: System<T>, F: FnMut(&'static str, f64, &mut [T]) -> Result<()> 
     }
     fn highest_frequency(&mut self) -> Option<f64> {
         self.system.highest_frequency()
+    }
+    fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
+        self.system.ranks()
     }
     fn prescribed(&self) -> &[usize] {
         self.system.prescribed()

@@ -29,6 +29,7 @@ pub mod plot;
 pub mod pounding;
 pub mod propagated;
 pub mod random;
+pub mod ranks;
 pub mod reduced;
 pub mod schemes;
 pub mod second_order;
