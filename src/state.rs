@@ -7,6 +7,8 @@ mod clock;
 mod contacts;
 mod history;
 #[cfg(feature = "serde")]
+mod parts;
+#[cfg(feature = "serde")]
 mod read;
 #[cfg(feature = "serde")]
 mod record;

@@ -82,6 +82,12 @@ impl<T: Real> Trail<T> {
         self.states.first_mut().map(|(motion, _)| motion)
     }
 
+    /// All motions, those that are spare too.
+    #[cfg(feature = "serde")]
+    pub(super) fn all(&mut self) -> impl Iterator<Item = &mut Motion<T>> {
+        self.states.iter_mut().map(|(motion, _)| motion)
+    }
+
     /// The motions known.
     pub(crate) fn known(&self) -> impl Iterator<Item = (&Motion<T>, f64)> {
         self.states[..self.known].iter().map(|(motion, h)| (motion, *h))

@@ -4,6 +4,8 @@
 //! asserts that. So handles may be moved and shared between threads: nothing but a panic comes of their use elsewhere.
 //! MUMPS keeps pointers to the entries of its matrix; they are held here, behind the handle, as long as it lives.
 #![allow(unsafe_code)]
+// (A `World` is the proof that MPI has been initialized.)
+#![allow(clippy::unused_self)]
 
 use std::ffi::{c_int, c_long, c_void};
 use std::sync::OnceLock;
@@ -63,6 +65,7 @@ unsafe extern "C" {
     fn shim_mumps_negative_pivots(handle: *mut c_void) -> c_int;
     fn shim_mumps_detail(handle: *mut c_void) -> c_int;
     fn shim_mumps_schur(handle: *mut c_void, out: *mut f64);
+    fn shim_mumps_limit(handle: *mut c_void, megabytes: c_int);
     fn shim_mumps_solve(
         handle: *mut c_void,
         rhs: *mut f64,
@@ -322,7 +325,17 @@ impl Mumps {
             return Err(Failed(code, 0));
         }
         let entries = rows.len();
-        let mut mumps = Self { handle, input, is_root: world.rank == 0, dofs, entries, last, rows, columns, values: vec![0.0; entries] };
+        let mut mumps = Self {
+            handle,
+            input,
+            is_root: world.rank == 0,
+            dofs,
+            entries,
+            last,
+            rows,
+            columns,
+            values: vec![0.0; entries],
+        };
         mumps.checked(code)?;
         // SAFETY: the lists are as long as told, have indices from 1 to the number of dofs, and live with the handle.
         let code = unsafe {
@@ -360,6 +373,11 @@ impl Mumps {
         Ok(unsafe { shim_mumps_negative_pivots(self.handle) })
     }
 
+    /// The number of entries that a factorization takes from this rank.
+    pub fn entries(&self) -> usize {
+        self.entries
+    }
+
     /// Entries of the factors; as estimated before there are any.
     pub fn stored(&self, factorized: bool) -> usize {
         assert_thread();
@@ -367,6 +385,13 @@ impl Mumps {
         let stored = unsafe { shim_mumps_stored(self.handle, c_int::from(factorized)) };
         let size = stored.unsigned_abs() as usize;
         if stored < 0 { size * 1_000_000 } else { size }
+    }
+
+    /// Gives this rank no more memory than so many megabytes.
+    pub fn limit_memory(&mut self, megabytes: i32) {
+        assert_thread();
+        // SAFETY: the handle lives.
+        unsafe { shim_mumps_limit(self.handle, megabytes) };
     }
 
     /// The lower triangle of the Schur complement by rows, on rank 0, after a factorization.

@@ -153,6 +153,8 @@ int shim_mumps_stored(void *handle, int factorized) {
     return mumps->INFOG(factorized ? 29 : 20);
 }
 
+void shim_mumps_limit(void *handle, int megabytes) { ((DMUMPS_STRUC_C *)handle)->ICNTL(23) = megabytes; }
+
 int shim_mumps_negative_pivots(void *handle) { return ((DMUMPS_STRUC_C *)handle)->INFOG(12); }
 
 int shim_mumps_detail(void *handle) { return ((DMUMPS_STRUC_C *)handle)->INFOG(2); }
