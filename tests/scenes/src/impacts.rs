@@ -245,3 +245,41 @@ impl Course {
         self.impulse / (self.last - first)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force of 2 from 1 to 3, in steps of h.
+    fn pulse(h: f64, later: f64) -> Course {
+        let steps = (5.0 / h).round() as usize;
+        let force = |t: f64| if t > 1.0 + later && t < 3.0 + later + 0.5 * h { 2.0 } else { 0.0 };
+        let forces: Vec<(f64, f64)> = (1..=steps).map(|k| h * k as f64).map(|t| (t, force(t - 1e-9))).collect();
+        let impulse = h * forces.iter().map(|of| of.1).sum::<f64>();
+        Course { forces, impulse, h, steps, last: 3.0 + later, ..Course::default() }
+    }
+
+    #[test]
+    fn a_pulse_that_comes_later_errs_by_twice_the_delay() {
+        let exact = pulse(1e-3, 0.0);
+        assert!((exact.impulse - 4.0).abs() < 0.01 && exact.error(&exact) < 1e-12);
+        // Over a duration of 2, with steps of either size.
+        for h in [1e-3, 1e-2] {
+            let late = pulse(h, 0.2);
+            assert!((late.error(&exact) - 0.2).abs() < 0.02, "{}", late.error(&exact));
+            assert!((late.mean() - 2.0).abs() < 0.03, "{}", late.mean());
+        }
+    }
+
+    #[test]
+    fn windows_have_the_impulse_of_what_they_see() {
+        let exact = pulse(1e-2, 0.0);
+        // Edges that no step meets.
+        let windows = exact.windows(0.737, &exact);
+        assert!((0.737 * windows.iter().sum::<f64>() - exact.impulse).abs() < 1e-9, "{windows:?}");
+        assert!(windows[0] < 1e-12 && (windows[2] - 2.0).abs() < 1e-9, "{windows:?}");
+        assert!(exact.window_error(0.737, &exact) < 1e-12);
+        // Windows do not see what happens inside them: all of it is in the first one.
+        assert!(pulse(1e-2, 0.5).window_error(4.0, &exact) < 1e-9);
+    }
+}
