@@ -27,7 +27,7 @@ pub(crate) fn bathe() -> Box<dyn TimeIntegrator> {
 
 const SCHEMES: [(&str, Make); 2] = [("trapezoidal", trapezoidal), ("ρ∞-Bathe(1)", bathe)];
 
-fn phases(quick: bool) -> Vec<f64> {
+pub(crate) fn phases(quick: bool) -> Vec<f64> {
     let count = if quick { 2 } else { 10 };
     (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count)).collect()
 }

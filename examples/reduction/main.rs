@@ -3,13 +3,20 @@
 //! `cargo run --release --example reduction -- --output target/reduction` prints the tables of `docs/reduction.md` and
 //! writes them and a figure; with `--quick` steps, phases and bodies are fewer.
 //!
-//! `bars.rs` has bars against a wall and each other, `blocks.rs` blocks in the plane and in space, `cost.rs` times,
-//! `figure.rs` the force over time.
+//! `bars.rs` has bars against a wall and each other, `fronts.rs` the taper in closed form, `blocks.rs` blocks in the
+//! plane and in space, `ball.rs` Hertz' impact, `pair.rs` two blocks, `ring.rs` a ring, `softenings.rs` other softenings
+//! of these three, `strikes.rs` what their tables have in common, `cost.rs` times, `figure.rs` the force over time.
 
+mod ball;
 mod bars;
 mod blocks;
 mod cost;
 mod figure;
+mod fronts;
+mod pair;
+mod ring;
+mod softenings;
+mod strikes;
 
 use contact_dynamics_scenes::output::Output;
 use std::error::Error;
@@ -20,10 +27,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tables = [
         bars::wall(quick)?,
         bars::exponents(quick)?,
+        fronts::fronts(quick)?,
         bars::resolution(quick)?,
         bars::pairs(quick)?,
         blocks::plane(quick)?,
         blocks::space(quick)?,
+        ball::ball(quick)?,
+        pair::pair(quick)?,
+        ring::thrown(quick)?,
+        softenings::softenings(quick)?,
         cost::steps(quick)?,
         cost::modes(quick)?,
     ];

@@ -18,13 +18,14 @@ use faer::sparse::SparseColMatRef;
 pub enum Boundary {
     /// Massless contact dofs on the residual flexibility, the modes tapered toward the highest: the contact force is
     /// smooth. Statically a little softer than the body: see [`Accuracy`]. For parents with a plain mass matrix: where
-    /// contact dofs of the parent have no mass already it is too soft.
+    /// contact dofs of the parent have no mass already, or contacts are small and grow slowly, it is too soft.
     #[default]
     Tapered,
     /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
     /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
-    /// exact. Known failure: the abrupt end of the modes rings in the contact force, by a third of it and more; not
-    /// where contact dofs of the parent have no mass and the modes are many times as many as these.
+    /// exact. Known failure: the abrupt end of the modes rings in the contact force, after a front by 0.8 of it; not
+    /// where contacts grow slowly, as Hertz's do, nor where contact dofs of the parent have no mass and the modes are
+    /// many times as many as these.
     Untapered,
     /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6, 1968).
     /// Statically exact; contact dofs have mass. Known failure: that mass is struck, and the force rings and jumps as
@@ -165,15 +166,16 @@ impl<'a, T: Real> Reduction<'a, T> {
         Self { boundary, ..self }
     }
 
-    /// The exponent p of the taper σ² = 1 − (ω/ω_c)^p; default 3. The larger, the more modes count fully, and the
-    /// more the force overshoots (`docs/reduction.md`).
+    /// The exponent p of the taper σ² = 1 − (ω/ω_c)^p; default 3. The larger, the more modes count fully; 3 has
+    /// the least error behind a front (`docs/reduction.md`).
     #[must_use]
     pub fn exponent(self, exponent: f64) -> Self {
         Self { exponent, ..self }
     }
 
-    /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2. With 0
-    /// statics are exact, and the force overshoots several times as far (`docs/reduction.md`).
+    /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2, which
+    /// has the least error behind a front. With 0 statics are exact, as small contacts that grow slowly need it, and
+    /// behind a front the force overshoots by half of it (`docs/reduction.md`).
     #[must_use]
     pub fn softening(self, times: f64) -> Self {
         Self { softening: times, ..self }
