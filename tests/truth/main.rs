@@ -1,0 +1,3 @@
+//! Whole runs beside a second, slow implementation of the time step.
+
+mod explore;
