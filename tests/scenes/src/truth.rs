@@ -3,6 +3,7 @@
 //! data alone.
 
 mod against;
+mod chance;
 mod correct;
 mod dense;
 mod history;
@@ -12,8 +13,9 @@ mod scene;
 mod stage;
 mod start;
 
-pub use against::{Deviation, Outcome, compare};
-pub use scene::{Kind, Offset, Row, Scene};
+pub use against::{Compared, Deviation, Outcome, compare};
+pub use chance::{Kind, Setting};
+pub use scene::{Offset, Row, Scene};
 
 use crate::combinations::Correction;
 use contact_dynamics::tableau::{Stage, Tableau};

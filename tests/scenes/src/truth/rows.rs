@@ -39,11 +39,6 @@ impl Affine {
         self.weight.iter().zip(&self.known).zip(z).map(|((w, known), z)| w * z + known).collect()
     }
 
-    /// The change of it with z.
-    pub fn change(&self, z: &[f64]) -> Vec<f64> {
-        self.weight.iter().zip(z).map(|(w, z)| w * z).collect()
-    }
-
     /// c₁ of one and c₂ of another.
     pub fn sum(&self, c1: f64, other: &Self, c2: f64) -> Self {
         let add = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| c1 * x + c2 * y).collect();

@@ -1,7 +1,6 @@
-//! Scenes of a few dofs: what a run is made of, and scenes by chance.
+//! Scenes of a few dofs, and the parts of the crate that they make.
 
 use super::dense::{Matrix, dot, size, solve};
-use crate::random::Congruential;
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::tableau::StartUp;
@@ -34,23 +33,6 @@ pub struct Row {
     pub friction: Option<(f64, Vec<f64>)>,
 }
 
-/// What happens in a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Bodies fly against obstacles, with springs to the ground.
-    Bounce,
-    /// They are pushed to them, lie, and are let go.
-    Press,
-    /// They lie on them at the start.
-    Rest,
-    /// Nothing acts on them until they meet.
-    Flight,
-}
-
-impl Kind {
-    pub const ALL: [Self; 4] = [Self::Bounce, Self::Press, Self::Rest, Self::Flight];
-}
-
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub mass: Matrix,
@@ -72,6 +54,15 @@ pub struct Scene {
 impl Scene {
     pub fn dofs(&self) -> usize {
         self.u.len()
+    }
+
+    /// The same scene with data that differ by a few roundings.
+    pub fn rounded(&self) -> Self {
+        let mut scene = self.clone();
+        for data in [&mut scene.v, &mut scene.constant, &mut scene.amplitude] {
+            data.iter_mut().zip(1..).for_each(|(x, i)| *x *= 1.0 + f64::from(i % 3 - 1) * 2.0 * f64::EPSILON);
+        }
+        scene
     }
 
     pub fn load(&self, t: f64) -> Vec<f64> {
@@ -181,123 +172,6 @@ impl Scene {
             }
         })
     }
-
-    /// A scene by chance: a chain of masses and springs, and rows that each have a dof of their own. `critical` is the
-    /// largest stable Ω of the scheme, if there is one.
-    pub fn by_chance(kind: Kind, seed: u64, critical: Option<f64>) -> Self {
-        let mut random = Congruential(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
-        (0..4).for_each(|_| _ = random.unit());
-        let n = 3 + (seed % 4) as usize;
-        let mut mass = vec![vec![0.0; n]; n];
-        let mut stiffness = mass.clone();
-        let consistent = seed % 3 == 1;
-        for i in 0..n {
-            mass[i][i] = random.within(0.5, 2.0);
-            if kind != Kind::Flight && (i == 0 || random.unit() < 0.5) {
-                stiffness[i][i] += random.within(5.0, 60.0);
-            }
-        }
-        for i in 1..n {
-            let (k, m) = (random.within(20.0, 200.0), random.within(0.05, 0.2));
-            for (row, column, sign) in [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)] {
-                stiffness[row][column] += sign * k;
-                if consistent && row != column {
-                    mass[row][column] += m;
-                }
-            }
-        }
-        let damping = (seed % 2 == 1 && kind != Kind::Flight).then(|| {
-            let (alpha, beta) = (random.within(0.0, 0.3), random.within(0.0005, 0.003));
-            let entry = |i: usize, j: usize| alpha * mass[i][j] + beta * stiffness[i][j];
-            (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
-        });
-        let bound = highest(&mass, &stiffness);
-        let h = match critical {
-            Some(critical) => random.within(0.3, 0.6) * critical / bound,
-            None => random.within(0.3, 1.5) / bound,
-        };
-        let mut scene = Self {
-            mass,
-            damping,
-            stiffness,
-            constant: vec![0.0; n],
-            amplitude: vec![0.0; n],
-            frequency: random.within(0.02, 0.2) / h,
-            rows: Vec::new(),
-            u: vec![0.0; n],
-            v: vec![0.0; n],
-            h,
-            start_up: StartUp::Trapezoidal,
-            drive: None,
-        };
-        scene.put_rows(kind, &mut random);
-        scene.put_motion(kind, &mut random);
-        if kind == Kind::Press && seed % 4 >= 2 {
-            scene.start_up = StartUp::Taylor;
-        }
-        scene
-    }
-
-    /// Obstacles in front of some of the dofs, and bodies in front of each other.
-    fn put_rows(&mut self, kind: Kind, random: &mut Congruential) {
-        let n = self.dofs();
-        let count = 1 + (random.unit() * 4.0) as usize;
-        for r in 0..count.min(n - 1) {
-            let mut g = vec![0.0; n];
-            g[r] = if random.unit() < 0.5 { 1.0 } else { -1.0 };
-            if random.unit() < 0.4 {
-                g[r + 1] = random.signed();
-            }
-            let gap = if kind == Kind::Rest { 0.0 } else { random.within(0.2, 2.0) * self.h };
-            let mut offset = Offset { gap, ..Offset::default() };
-            if kind == Kind::Bounce && random.unit() < 0.4 {
-                offset.amplitude = random.within(0.1, 0.5) * self.h;
-                offset.frequency = random.within(0.02, 0.2) / self.h;
-            }
-            self.rows.push(Row { g, offset, law: ContactLaw::Rigid, friction: None });
-        }
-    }
-
-    /// Motion at the start, and loads that bring the contacts together.
-    fn put_motion(&mut self, kind: Kind, random: &mut Congruential) {
-        let n = self.dofs();
-        match kind {
-            Kind::Bounce => {
-                self.v = random.vector(n, 1.0);
-                self.amplitude = random.vector(n, 0.3 / self.h);
-            }
-            Kind::Flight => {
-                let v = random.signed();
-                self.v = vec![v; n];
-                for row in &mut self.rows {
-                    let approaches = row.g.iter().sum::<f64>() * v < 0.0;
-                    if !approaches {
-                        row.g.iter_mut().for_each(|g| *g = -*g);
-                    }
-                }
-            }
-            Kind::Press | Kind::Rest => {
-                // Towards the rows at first, and away from them later.
-                for row in &self.rows {
-                    let push = random.within(0.2, 1.0) / self.h;
-                    for (i, g) in row.g.iter().enumerate() {
-                        self.constant[i] -= 0.3 * push * g;
-                        self.amplitude[i] -= push * g;
-                    }
-                }
-                if kind == Kind::Press {
-                    self.v = random.vector(n, 0.3);
-                }
-            }
-        }
-    }
-}
-
-/// An upper bound of the highest frequency: norms of K and M⁻¹.
-fn highest(mass: &Matrix, stiffness: &Matrix) -> f64 {
-    let rows = |a: &Matrix| a.iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
-    let least = mass.iter().enumerate().map(|(i, row)| 2.0 * row[i] - row.iter().map(|x| x.abs()).sum::<f64>());
-    (rows(stiffness) / least.fold(f64::INFINITY, f64::min)).sqrt()
 }
 
 fn sparse(a: &Matrix) -> SparseColMat<usize, f64> {
