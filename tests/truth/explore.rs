@@ -54,7 +54,7 @@ fn explore(law: ContactLaw, mixed: bool, rubs: bool, seeds: u64) {
                 }
                 line += &format!(" | {kind:?} r{refused} {:.1e} s{} {} @{} {:?} {:?}", worst.0, worst.1, worst.2, worst.3, counts, steps);
             }
-            println!("{law:?} {rubs} {} {}: {line}", listed.name(), correction.name());
+            println!("{} {rubs} {} {}: {line}", format!("{law:?}").replace(": ", "="), listed.name(), correction.name());
         }
     }
 }

@@ -182,7 +182,9 @@ impl Step<'_> {
                     let slip = jumps[row] + dot(&problem.w[row], &added);
                     let bound = coefficient * totals[place].max(0.0);
                     self.contacts.slides[i] = is_at_bound(totals[row], bound) && slip.abs() > problem.noise[row];
-                    self.directions[i] = if totals[row] < 0.0 { -1.0 } else { 1.0 };
+                    // What has no friction, since all that it has been given pulls, slides all the same.
+                    let along = if totals[row].abs() > 0.0 { totals[row] } else { -slip };
+                    self.directions[i] = along.signum();
                 }
             }
         }

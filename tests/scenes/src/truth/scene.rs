@@ -33,6 +33,9 @@ pub struct Row {
     pub friction: Option<(f64, Vec<f64>)>,
 }
 
+/// By how many roundings data differ in the runs that tell how sensitive a scene is.
+const ROUNDINGS: f64 = 32.0;
+
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub mass: Matrix,
@@ -60,7 +63,10 @@ impl Scene {
     pub fn rounded(&self) -> Self {
         let mut scene = self.clone();
         for data in [&mut scene.v, &mut scene.constant, &mut scene.amplitude] {
-            data.iter_mut().zip(1..).for_each(|(x, i)| *x *= 1.0 + f64::from(i % 3 - 1) * 2.0 * f64::EPSILON);
+            data.iter_mut().zip(1..).for_each(|(x, i)| *x *= 1.0 + f64::from(i % 3 - 1) * ROUNDINGS * f64::EPSILON);
+        }
+        for (row, i) in scene.rows.iter_mut().zip(1..) {
+            row.offset.gap *= 1.0 + f64::from(i % 3 - 1) * ROUNDINGS * f64::EPSILON;
         }
         scene
     }

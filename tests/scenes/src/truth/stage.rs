@@ -254,7 +254,10 @@ impl Stage<'_> {
                         again |= (depth[i] + y).abs() > 1e-14 * y.abs() && pass < 60;
                         depth[i] = -y;
                     }
-                    ContactLaw::AugmentedLagrangian { augmentations, .. } if pass < augmentations => {
+                    // (Where the gap does not move with the unknown there is nothing to augment.)
+                    ContactLaw::AugmentedLagrangian { augmentations, .. }
+                        if pass < augmentations && forms[i].by_z.iter().any(|by| by.abs() > 0.0) =>
+                    {
                         forms[i].shift = -forms[i].compliance * raw[i];
                         again = true;
                     }

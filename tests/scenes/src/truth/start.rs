@@ -43,7 +43,12 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
     }
     push(scene, &rigid, 1.0, &mut now.a);
     if leaves_smooth_motion(correction) {
-        push(scene, &rigid, -1.0, &mut now.a);
+        let jumps = |(i, force): (usize, &f64)| {
+            let springs = scene.rows.get(i).is_some_and(|row| row.law.is_compliant());
+            if springs { 0.0 } else { *force }
+        };
+        let jumps: Vec<f64> = rigid.iter().enumerate().map(jumps).collect();
+        push(scene, &jumps, -1.0, &mut now.a);
     }
     let depth = history::depth(tableau);
     let past = |straight: bool| -> Vec<Motion> { (0..depth).map(|k| back(&now, k as f64 * h, straight)).collect() };
@@ -116,17 +121,24 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
         let way = h * scene.rate(i, 0.0, &now.v).abs();
         touches(i) && way <= 64.0 * f64::EPSILON * (size(&rows[i].g, &now.u) + h * size(&rows[i].g, &now.v))
     };
+    let acceleration = |i: usize| dot(&rows[i].g, &now.a) + rows[i].offset.at(0.0)[2];
+    let inertia = |i: usize| match rows[i].law {
+        ContactLaw::Bipenalty { stiffness, mass } => mass / stiffness,
+        _ => 0.0,
+    };
     // y over what a unit of acceleration makes of it.
     let asks = |i: usize| -> Option<f64> {
         let row = &rows[i];
         match (level, level.lead() > 0.0) {
+            // λ = −k g − m g̈, or none.
+            _ if inertia(i) > 0.0 => Some(acceleration(i) + gaps[i] / inertia(i)),
             _ if row.law.is_compliant() => None,
             (ContactLevel::Velocity { .. }, true) => {
                 let e = if let ContactLaw::Restitution { coefficient } = row.law { coefficient } else { 0.0 };
                 touches(i).then(|| (scene.rate(i, lead, &faster) + e * scene.rate(i, 0.0, &now.v)) / lead)
             }
             (_, true) => Some(scene.gap(i, lead, &ahead) / (0.5 * lead * lead)),
-            (_, false) => rests(i).then(|| dot(&row.g, &now.a) + row.offset.at(0.0)[2]),
+            (_, false) => rests(i).then(|| acceleration(i)),
         }
     };
     let slip = |tangent: &[f64]| match (level, level.lead() > 0.0) {
@@ -152,13 +164,19 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
     let contacts = contacts.collect();
     let q: Vec<f64> = all.iter().map(|&i| if i < rows.len() { asks(i).unwrap_or(0.0) } else { slip(axes[i]) }).collect();
     let responses: Vec<Vec<f64>> = all.iter().map(|&i| scene.accelerate(axes[i])).collect();
+    let own = |i: usize| match rows.get(i).map(|row| row.law) {
+        Some(ContactLaw::Bipenalty { mass, .. }) => mass.recip(),
+        _ => 0.0,
+    };
+    let entry = |i: usize, j: usize, x: &[f64]| dot(axes[i], x) + if i == j { own(i) } else { 0.0 };
     let problem = Problem {
         contacts,
-        w: all.iter().map(|&i| responses.iter().map(|x| dot(axes[i], x)).collect()).collect(),
+        w: all.iter().map(|&i| all.iter().zip(&responses).map(|(&j, x)| entry(i, j, x)).collect()).collect(),
         noise: q.iter().map(|q| 64.0 * f64::EPSILON * q.abs()).collect(),
         q,
     };
     let mut forces = vec![0.0; axes.len()];
     problem.solve().iter().zip(&all).for_each(|(force, &i)| forces[i] = *force);
-    (forces, if level.lead() > 0.0 { Vec::new() } else { taken })
+    let rest = taken.into_iter().filter(|&i| level.lead() <= 0.0 && !rows[i].law.is_compliant());
+    (forces, rest.collect())
 }
