@@ -82,7 +82,9 @@ impl Setting {
         if matches!(kind, Kind::Bounce | Kind::Press) && seed % 4 == 3 {
             // The last dof is moved.
             let frequency = random.within(0.02, 0.1) / h;
-            scene.drive = Some((n - 1, Offset { gap: 0.0, amplitude: random.within(0.2, 1.0) * h, frequency }));
+            let drive = Offset { gap: 0.0, amplitude: random.within(0.2, 1.0) * h, frequency };
+            [scene.u[n - 1], scene.v[n - 1], _] = drive.at(0.0);
+            scene.drive = Some((n - 1, drive));
         }
         if kind == Kind::Rest && seed % 2 == 1 && !self.rubs && self.law == ContactLaw::Rigid {
             if let Some(row) = scene.rows.last_mut().filter(|row| row.law == ContactLaw::Rigid) {

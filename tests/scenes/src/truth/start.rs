@@ -126,12 +126,18 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
         ContactLaw::Bipenalty { stiffness, mass } => mass / stiffness,
         _ => 0.0,
     };
+    let is_predictive = |i: usize| matches!(rows[i].law, ContactLaw::StabilizedBipenalty { .. });
     // y over what a unit of acceleration makes of it.
     let asks = |i: usize| -> Option<f64> {
         let row = &rows[i];
         match (level, level.lead() > 0.0) {
             // λ = −k g − m g̈, or none.
             _ if inertia(i) > 0.0 => Some(acceleration(i) + gaps[i] / inertia(i)),
+            (_, true) if is_predictive(i) => {
+                // The mean gap of the coming step; the last one is taken to have had the same gap all along.
+                let mean = 0.5 * (scene.gap(i, lead, &ahead) + gaps[i]) - (-gaps[i]).max(0.0);
+                Some(mean / (0.25 * lead * lead))
+            }
             _ if row.law.is_compliant() => None,
             (ContactLevel::Velocity { .. }, true) => {
                 let e = if let ContactLaw::Restitution { coefficient } = row.law { coefficient } else { 0.0 };
@@ -166,6 +172,7 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
     let responses: Vec<Vec<f64>> = all.iter().map(|&i| scene.accelerate(axes[i])).collect();
     let own = |i: usize| match rows.get(i).map(|row| row.law) {
         Some(ContactLaw::Bipenalty { mass, .. }) => mass.recip(),
+        Some(ContactLaw::StabilizedBipenalty { stiffness }) => 2.0 / stiffness / (0.25 * lead * lead),
         _ => 0.0,
     };
     let entry = |i: usize, j: usize, x: &[f64]| dot(axes[i], x) + if i == j { own(i) } else { 0.0 };

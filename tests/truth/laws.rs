@@ -1,0 +1,66 @@
+//! Laws of contact besides the rigid one, beside rigid rows and without, with and without friction: every scheme.
+
+use crate::sweep::Sweep;
+use contact_dynamics::ContactLaw;
+use contact_dynamics_scenes::combinations::Correction;
+
+/// With stiffnesses in units of a spring of the scene, and the mass in those of k h².
+const LAWS: [ContactLaw; 8] = [
+    ContactLaw::Restitution { coefficient: 0.6 },
+    ContactLaw::RateCondition,
+    ContactLaw::PersistencySwitch,
+    ContactLaw::Penalty { stiffness: 1.5 },
+    ContactLaw::PowerLaw { stiffness: 1.0, exponent: 1.5 },
+    ContactLaw::Bipenalty { stiffness: 1.5, mass: 0.25 },
+    ContactLaw::StabilizedBipenalty { stiffness: 1.5 },
+    ContactLaw::AugmentedLagrangian { stiffness: 1.5, augmentations: 2 },
+];
+
+const CORRECTIONS: [Correction; 3] = [Correction::None, Correction::History, Correction::Splitting];
+
+/// One group of columns a law, in the order of `LAWS`, of one column a correction: none, λ_v/λ_a with the past
+/// projected, splitting. Flags as in `rigid.rs`; '?': scenes without a rigid row are compared, the others refused.
+const TABLE: &str = "\
+TABLE
+";
+
+/// The same of the laws that admit friction.
+const RUBBING: &str = "\
+RUBBING
+";
+
+fn table(laws: &[ContactLaw], rubs: bool) -> String {
+    let mut lines: Vec<[String; 2]> = Vec::new();
+    let mut worst = 0.0_f64;
+    for &law in laws {
+        let swept = Sweep { corrections: &CORRECTIONS, law, mixed: true, rubs, seeds: 4 }.run();
+        worst = worst.max(swept.worst);
+        for (i, line) in swept.table.lines().enumerate() {
+            let (flags, name) = line.split_once(' ').expect("flags and a name");
+            match lines.get_mut(i) {
+                Some([all, _]) => *all += &format!(" {flags}"),
+                None => lines.push([flags.into(), name.into()]),
+            }
+        }
+        for pair in &swept.pairs {
+            assert!(pair.sum(|run| run.closings) >= 4, "{law:?}: {}", pair.name);
+        }
+    }
+    println!("largest difference {worst:.0e}");
+    lines.iter().map(|[flags, name]| format!("{flags} {name}\n")).collect()
+}
+
+#[test]
+fn runs_with_other_laws_are_those_of_the_truth() {
+    let found = table(&LAWS, false);
+    println!("{found}");
+    assert_eq!(found, TABLE);
+}
+
+#[test]
+fn runs_with_other_laws_and_friction_are_those_of_the_truth() {
+    let rubbing: Vec<ContactLaw> = [0, 3, 4, 7].map(|law| LAWS[law]).to_vec();
+    let found = table(&rubbing, true);
+    println!("{found}");
+    assert_eq!(found, RUBBING);
+}
