@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// Largest difference, over the size of what is compared.
 const TOLERANCE: f64 = 1e-9;
 /// Steps of a run, and those that have to be compared in the longer ones.
-const STEPS: usize = 80;
+const STEPS: usize = 64;
 const LONG: usize = 60;
 
 /// What a sweep goes through.

@@ -74,22 +74,28 @@ pub fn compare(
     let mut truth = Truth::new(scene, &*scheme(), correction);
     let mut twin = Truth::new(&other, &*scheme(), correction);
     let mut pairs = vec![(of_crate(scene, run.state()), of_truth(&truth))];
-    let mut twins = vec![(of_truth(&twin), of_truth(&truth))];
+    let mut scales = Scales::default();
     let mut compared = Compared { phases: [1.0, 0.0], ..Compared::default() };
     for step in 0..steps {
         let (before, gaps) = (truth.contacts().closed.clone(), truth.contacts().gaps.clone());
         truth.step();
         twin.step();
-        twins.push((of_truth(&twin), of_truth(&truth)));
-        if worst(&twins, scene.h).size > SENSITIVE {
+        let values = of_truth(&truth);
+        scales.see(&values, scene.h);
+        if scales.deviation(&of_truth(&twin), &values).size > SENSITIVE {
             break;
         }
         run.step()?;
-        pairs.push((of_crate(scene, run.state()), of_truth(&truth)));
+        pairs.push((of_crate(scene, run.state()), values));
         compared.count(scene, &truth, &before, &gaps);
         compared.steps = step + 1;
     }
-    compared.worst = worst(&pairs, scene.h);
+    for (step, (run, truth)) in pairs.iter().enumerate() {
+        let deviation = scales.deviation(run, truth);
+        if deviation.size > compared.worst.size {
+            compared.worst = Deviation { step, ..deviation };
+        }
+    }
     Ok(Outcome::Compared(compared))
 }
 
@@ -132,27 +138,31 @@ fn of_truth(truth: &Truth<'_>) -> Values {
 
 /// The scale of a quantity is the largest value of it, or what the largest force or velocity makes of it in a step.
 /// (Masses are about one.)
-fn worst(pairs: &[(Values, Values)], h: f64) -> Deviation {
-    let mut worst = Deviation::default();
-    let largest = |field: usize| {
-        let values = pairs.iter().flat_map(|(_, truth)| &truth[field]);
-        values.fold(f64::MIN_POSITIVE, |largest, x| largest.max(x.abs()))
-    };
-    let speed = largest(1).max(h * largest(3));
-    for (field, what) in NAMES.into_iter().enumerate() {
-        let scale = largest(field).max(match field {
-            0 => h * speed,
-            1 => speed,
-            _ => speed / h,
-        });
-        for (step, (run, truth)) in pairs.iter().enumerate() {
-            for (x, y) in run[field].iter().zip(&truth[field]) {
+#[derive(Default)]
+struct Scales([f64; 5]);
+
+impl Scales {
+    fn see(&mut self, values: &Values, h: f64) {
+        let largest = |x: &[f64]| x.iter().fold(f64::MIN_POSITIVE, |largest, x| largest.max(x.abs()));
+        let speed = largest(&values[1]).max(h * largest(&values[3]));
+        let least = [h * speed, speed, speed / h, speed / h, speed / h];
+        for ((scale, values), least) in self.0.iter_mut().zip(values).zip(least) {
+            *scale = scale.max(largest(values)).max(least);
+        }
+    }
+
+    /// The largest difference of two states; what is no number differs without bound.
+    fn deviation(&self, values: &Values, truth: &Values) -> Deviation {
+        let mut worst = Deviation::default();
+        for (((values, truth), scale), what) in values.iter().zip(truth).zip(self.0).zip(NAMES) {
+            for (x, y) in values.iter().zip(truth) {
                 let size = (x - y).abs() / scale;
-                if !size.is_finite() || size > worst.size {
-                    worst = Deviation { size: if size.is_nan() { f64::INFINITY } else { size }, what, step };
+                let size = if size.is_nan() { f64::INFINITY } else { size };
+                if size > worst.size {
+                    worst = Deviation { size, what, ..worst };
                 }
             }
         }
+        worst
     }
-    worst
 }

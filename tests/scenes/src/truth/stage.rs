@@ -7,6 +7,7 @@ use super::rows::{Affine, Target, motion, target};
 use super::{Contacts, Motion, Place, Scene};
 use crate::combinations::Correction;
 use contact_dynamics::ContactLaw;
+use contact_dynamics::tableau::StageForce;
 
 pub struct Solved {
     pub motion: Motion,
@@ -65,6 +66,12 @@ pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Conta
     let mut balance = motion(stage.balance.each(), past, scene, t_balance);
     if stage.is_collocated() {
         balance = new.clone();
+    }
+    if let (StageForce::AlongPath, Some((dof, [to, ..]))) = (stage.force, scene.driven(t_new)) {
+        // Along its path a support is in the middle, with the velocity of the way.
+        let from = past[0].u[dof];
+        balance[0].known[dof] = 0.5 * (from + to);
+        balance[1].known[dof] = (to - from) / (stage.end * h);
     }
     if correction == Correction::Stabilized || correction == Correction::StabilizedClosed {
         let shift = shift(scene, &past[0], correction, &contacts.closed, t_new);

@@ -86,9 +86,8 @@ fn back(now: &Motion, time: f64, straight: bool) -> Motion {
 fn is_free_flight(scene: &Scene, past: &[Motion]) -> bool {
     let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
     let bound = 64.0 * f64::EPSILON * largest(&past[0].v);
-    let flies = |state: &Motion| {
-        scene.h * largest(&scene.accelerate(&scene.force(state.t, &state.u, &state.v))) <= bound
-    };
+    let flies =
+        |state: &Motion| scene.h * largest(&scene.accelerate(&scene.force(state.t, &state.u, &state.v))) <= bound;
     scene.h * largest(&past[0].a) <= bound && past.iter().skip(1).all(flies)
 }
 
@@ -168,7 +167,8 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
         Contact { held: rows[i].law == ContactLaw::Equality, friction }
     });
     let contacts = contacts.collect();
-    let q: Vec<f64> = all.iter().map(|&i| if i < rows.len() { asks(i).unwrap_or(0.0) } else { slip(axes[i]) }).collect();
+    let q: Vec<f64> =
+        all.iter().map(|&i| if i < rows.len() { asks(i).unwrap_or(0.0) } else { slip(axes[i]) }).collect();
     let responses: Vec<Vec<f64>> = all.iter().map(|&i| scene.accelerate(axes[i])).collect();
     let own = |i: usize| match rows.get(i).map(|row| row.law) {
         Some(ContactLaw::Bipenalty { mass, .. }) => mass.recip(),
