@@ -1,6 +1,6 @@
 //! Scenes by chance.
 
-use super::dense::Matrix;
+use super::dense::{Matrix, dot};
 use super::scene::{Offset, Row, Scene};
 use crate::random::Congruential;
 use contact_dynamics::ContactLaw;
@@ -76,6 +76,11 @@ impl Setting {
         };
         self.put_rows(&mut scene, &mut random);
         self.put_motion(&mut scene, &mut random);
+        if kind == Kind::Flight && seed % 2 == 0 {
+            // The first contact closes where a step ends.
+            let rate = dot(&scene.rows[0].g, &scene.v);
+            scene.rows[0].offset.gap = 3.0 * h * rate.abs();
+        }
         if kind == Kind::Press && seed % 4 >= 2 {
             scene.start_up = StartUp::Taylor;
         }
