@@ -100,7 +100,10 @@ fn table(laws: &[ContactLaw], rubs: bool) -> String {
         for (i, line) in swept.table.lines().enumerate() {
             let (flags, name) = line.split_once(' ').expect("flags and a name");
             match lines.get_mut(i) {
-                Some([all, _]) => *all += &format!(" {flags}"),
+                Some([all, _]) => {
+                    all.push(' ');
+                    all.push_str(flags);
+                }
                 None => lines.push([flags.into(), name.into()]),
             }
         }
@@ -109,7 +112,8 @@ fn table(laws: &[ContactLaw], rubs: bool) -> String {
         }
     }
     println!("largest difference {worst:.0e}");
-    lines.iter().map(|[flags, name]| format!("{flags} {name}\n")).collect()
+    let lines: Vec<String> = lines.iter().map(|line| line.join(" ") + "\n").collect();
+    lines.concat()
 }
 
 #[test]

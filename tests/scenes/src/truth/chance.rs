@@ -76,7 +76,7 @@ impl Setting {
         };
         self.put_rows(&mut scene, &mut random);
         self.put_motion(&mut scene, &mut random);
-        if kind == Kind::Flight && seed % 2 == 0 {
+        if kind == Kind::Flight && seed.is_multiple_of(2) {
             // The first contact closes where a step ends.
             let rate = dot(&scene.rows[0].g, &scene.v);
             scene.rows[0].offset.gap = 3.0 * h * rate.abs();
@@ -91,10 +91,9 @@ impl Setting {
             [scene.u[n - 1], scene.v[n - 1], _] = drive.at(0.0);
             scene.drive = Some((n - 1, drive));
         }
-        if kind == Kind::Rest && seed % 2 == 1 && !self.rubs && self.law == ContactLaw::Rigid {
-            if let Some(row) = scene.rows.last_mut().filter(|row| row.law == ContactLaw::Rigid) {
-                row.law = ContactLaw::Equality;
-            }
+        let ties = kind == Kind::Rest && seed % 2 == 1 && !self.rubs && self.law == ContactLaw::Rigid;
+        if let Some(row) = scene.rows.last_mut().filter(|_| ties) {
+            row.law = ContactLaw::Equality;
         }
         scene
     }
