@@ -77,9 +77,10 @@ impl Setting {
         self.put_rows(&mut scene, &mut random);
         self.put_motion(&mut scene, &mut random);
         if kind == Kind::Flight && seed.is_multiple_of(2) {
-            // The first contact closes where a step ends.
-            let rate = dot(&scene.rows[0].g, &scene.v);
-            scene.rows[0].offset.gap = 3.0 * h * rate.abs();
+            // All contacts close where a step ends: they touch without pressure, and some let go of others.
+            for row in &mut scene.rows {
+                row.offset.gap = 3.0 * h * dot(&row.g, &scene.v).abs();
+            }
         }
         if kind == Kind::Press && seed % 4 >= 2 {
             scene.start_up = StartUp::Taylor;
