@@ -15,8 +15,8 @@ pub struct Prediction<'a, T: Real> {
     /// Time from the state before to that of the stage.
     pub(crate) h: f64,
     pub(crate) t: f64,
-    /// Weights of the unknown in the displacements of the state and of the balance.
-    pub(crate) weights: [T; 2],
+    /// Weight of the unknown in the displacements of the balance over that in those of the state.
+    pub(crate) balance_share: T,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) projection: &'a mut JumpProjection<T>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
@@ -93,10 +93,9 @@ impl<T: Real> Prediction<'_, T> {
             }
         }
         if result.is_ok() {
-            let [state, balance] = self.weights;
-            result = self.projection.push(self.g, (&rows, &mu), state, &mut self.new.u);
+            result = self.projection.push(self.g, (&rows, &mu), T::one(), &mut self.new.u);
             if let (Ok(()), Some(motion)) = (&result, &mut self.balance) {
-                result = self.projection.push(self.g, (&rows, &mu), balance, &mut motion.u);
+                result = self.projection.push(self.g, (&rows, &mu), self.balance_share, &mut motion.u);
             }
         }
         self.buffers.closed = rows;

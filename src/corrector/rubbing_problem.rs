@@ -120,15 +120,21 @@ impl<T: Real> Rubbing<T> {
         self.base.push(base);
     }
 
-    /// Keeps the directions of the friction found.
+    /// Keeps the directions of the friction found. A contact that slides without any, since all that it has been given
+    /// pulls, may press again in what follows: its friction is then against the slip.
     pub(super) fn keep_directions(&mut self) {
-        let Self { blocks, totals, directions, .. } = self;
+        let Self { blocks, totals, left, noise, directions, .. } = self;
         directions.clear();
         for block in blocks.iter().filter(|block| block.tangents > 0) {
-            let mut direction = [T::zero(); 2];
-            direction[..block.tangents].copy_from_slice(&totals[block.places()][1..]);
-            let size = direction[0].hypot(direction[1]);
-            let unit = if size > T::zero() { direction.map(|f| f / size) } else { direction };
+            let unit_of = |values: &[T], noise: T| {
+                let mut direction = [T::zero(); 2];
+                direction[..block.tangents].copy_from_slice(&values[block.places()][1..]);
+                let size = direction[0].hypot(direction[1]);
+                (size > noise).then(|| direction.map(|x| x / size))
+            };
+            let noise = T::largest(&noise[block.places()][1..]);
+            let against_slip = || unit_of(left, noise).map(|along| along.map(|x| -x));
+            let unit = unit_of(totals, T::zero()).or_else(against_slip).unwrap_or([T::zero(); 2]);
             directions.push((block.row, unit));
         }
     }

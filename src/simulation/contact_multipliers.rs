@@ -77,13 +77,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn press(&mut self, operator: &mut Operator<T>, t: f64, contact: &mut ContactWork<T>) -> Result<()> {
         let augmentations = self.constraints.laws().augmentations;
         let limit = LINEARIZATIONS + augmentations;
+        // What the last pass left of the laws.
+        let mut before = T::infinity();
         for pass in 0..limit {
             self.press_linearized(operator, t, contact)?;
             let ContactWork { rows, trial, interface, .. } = &mut *contact;
             let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, curved, .. } = rows;
             let forces = curved.forces(self.g);
             // The laws at the solution.
-            let (mut worst, mut again) = ((0, T::zero()), false);
+            let (mut worst, mut deepest, mut augments) = ((0, T::zero()), T::zero(), false);
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                 if self.g.is_tangential(row) || weight[row] == T::zero() {
                     continue;
@@ -94,15 +96,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
                     let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
                     let miss = (lambda - law.force(gap)).abs() * slope;
-                    if miss > tolerance[row] + rounded * depth {
-                        again = true;
-                        if miss > worst.1 {
-                            worst = (row, miss);
-                        }
+                    deepest = deepest.max(depth);
+                    if miss > tolerance[row] + rounded * depth && miss > worst.1 {
+                        worst = (row, miss);
                     }
                     (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
                 } else if pass < law.augmentations() {
-                    again = true;
+                    augments = true;
                     (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
                 }
             }
@@ -111,7 +111,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     trial.lambda_raw[row] = lambda;
                 }
             }
-            if !again {
+            // Newton's method ends where a pass that follows a small miss makes it no smaller: what is left is that of a
+            // solver that iterates, as for friction.
+            let ends = worst.1 <= T::epsilon().sqrt() * deepest && worst.1 > T::of(0.25) * before;
+            before = worst.1;
+            let met = worst.1 == T::zero() || ends;
+            if met && !augments {
                 for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
                     if !lambda.is_finite() {
                         let (contact, value) = (self.constraints.id_of(row), lambda.value());

@@ -233,10 +233,11 @@ impl<T: Real> StartProblem<T> {
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         self.solved.clear();
-        while !self.rows.is_empty() {
-            match constraints.tangents().is_empty() {
-                true => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
-                false => self.solve_rubbing(t, constraints, (g, &mut *projection), solver)?,
+        loop {
+            match (self.rows.is_empty(), constraints.tangents().is_empty()) {
+                (true, _) => {}
+                (_, true) => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
+                (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection), solver)?,
             }
             let Self { rows, waiting, offset, tolerance, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];

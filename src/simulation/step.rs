@@ -193,7 +193,7 @@ impl<T: Real> Simulation<'_, T> {
                     let mut prediction = Prediction {
                         h: clock.h * stage.end,
                         t: new.t,
-                        weights: [stage.recovery.weights()[0], stage.balanced().weights()[0]],
+                        balance_share: balance_share(stage),
                         g,
                         projection,
                         solver: &mut **contact_solver,
@@ -280,6 +280,12 @@ fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version
         *known = version;
         projection.reset();
     }
+}
+
+/// By how much the displacements of the balance move where those of the state do, with the unknown.
+fn balance_share<T: Real>(stage: &CompiledStage<T>) -> T {
+    let [state, balance] = [stage.recovery.weights()[0], stage.balanced().weights()[0]];
+    if state == T::zero() { T::zero() } else { balance / state }
 }
 
 /// The numbers of a stage that a correction needs; the stage is number `place` of `stages`.

@@ -26,6 +26,20 @@ pub enum Correction {
 }
 
 impl Correction {
+    pub const ALL: [Self; 11] = [
+        Self::None,
+        Self::Persistency,
+        Self::History,
+        Self::Release,
+        Self::TaylorPapadopoulos,
+        Self::Splitting,
+        Self::Implicit,
+        Self::Stabilized,
+        Self::StabilizedClosed,
+        Self::LaursenLove,
+        Self::ZeroAcceleration,
+    ];
+
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "–",
@@ -43,7 +57,7 @@ impl Correction {
     }
 
     /// The correctors; `transit` is the time of a wave through a contact element.
-    fn correctors(self, transit: f64) -> Result<Vec<Box<dyn Corrector<f64>>>> {
+    pub fn correctors(self, transit: f64) -> Result<Vec<Box<dyn Corrector<f64>>>> {
         let history = || Box::new(PersistencyCorrection::with_history_projection());
         Ok(match self {
             Self::None => Vec::new(),

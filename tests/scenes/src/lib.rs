@@ -45,6 +45,7 @@ pub mod stacks;
 pub mod tables;
 pub mod timing;
 pub mod truss;
+pub mod truth;
 pub mod two_slabs;
 pub mod wall_bar;
 pub mod well;

@@ -1,0 +1,446 @@
+//! The corrections of a stage (theory, sections 7, 8, 16 and 18).
+
+use super::dense::{Matrix, add, dot, product, size, solve};
+use super::problem::{Contact, Friction, Problem};
+use super::stage::is_at_bound;
+use super::{Contacts, Motion, Place, Scene};
+use crate::combinations::Correction;
+use contact_dynamics::ContactLaw;
+
+/// What was before the stage, and its effective matrix.
+pub struct Before<'b> {
+    pub was_closed: &'b [bool],
+    pub stuck: &'b [bool],
+    pub reported: &'b [f64],
+    pub matrix: &'b Matrix,
+}
+
+/// Time of a wave through a contact element, for the correction that wants it, in steps.
+pub const TRANSIT: f64 = 1.5;
+
+/// Whether a correction takes the forces of contact out of the accelerations.
+pub fn leaves_smooth_motion(correction: Correction) -> bool {
+    matches!(
+        correction,
+        Correction::Splitting | Correction::Implicit | Correction::Stabilized | Correction::StabilizedClosed
+    )
+}
+
+/// Which jump is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Jump {
+    Velocity,
+    Acceleration,
+}
+
+/// A stage in the hands of a correction. The newest state of the past is that of the stage.
+struct Step<'s> {
+    scene: &'s Scene,
+    place: &'s Place<'s>,
+    before: Before<'s>,
+    past: &'s mut Vec<Motion>,
+    contacts: &'s mut Contacts,
+    /// M⁻¹ of each row and tangent.
+    responses: Vec<Vec<f64>>,
+    /// Response of (u, h v, h² a) to a multiplier on a unit mass, over h².
+    response: [f64; 3],
+    closed: Vec<usize>,
+    engaged: Vec<usize>,
+    /// Of contacts with friction the direction in which it acts.
+    directions: Vec<f64>,
+}
+
+pub fn correct(
+    scene: &Scene,
+    correction: Correction,
+    place: &Place<'_>,
+    before: Before<'_>,
+    (past, contacts): (&mut Vec<Motion>, &mut Contacts),
+) {
+    let rigid = |i: &usize| !scene.rows[*i].law.is_compliant();
+    let closed = (0..scene.rows.len()).filter(rigid).filter(|&i| contacts.closed[i]).collect();
+    let rows = place.stage.recovery.each();
+    let mut step = Step {
+        scene,
+        place,
+        before,
+        past,
+        contacts,
+        responses: scene.axes().iter().map(|axis| scene.accelerate(axis)).collect(),
+        response: rows.map(|row| row.z / place.stage.balance.a.z),
+        closed,
+        engaged: Vec::new(),
+        directions: vec![0.0; scene.rows.len()],
+    };
+    match correction {
+        Correction::None => {}
+        Correction::Persistency => step.persist(),
+        Correction::History => {
+            step.persist();
+            step.project_past();
+        }
+        Correction::Release => {
+            step.persist();
+            step.project_past();
+            step.release();
+        }
+        Correction::TaylorPapadopoulos => {
+            step.persist();
+            step.run_off();
+        }
+        Correction::Splitting => step.split(),
+        Correction::Implicit | Correction::Stabilized | Correction::StabilizedClosed => step.act_implicitly(),
+        Correction::LaursenLove => step.restore_energy(),
+        Correction::ZeroAcceleration => step.stop_accelerations(),
+    }
+}
+
+impl Step<'_> {
+    fn h(&self) -> f64 {
+        self.scene.h
+    }
+
+    fn is_pressed(&self, i: usize) -> bool {
+        self.contacts.raw[i] > 0.0 || self.scene.rows[i].law == ContactLaw::Equality
+    }
+
+    /// Rows and the tangents that belong to them, as numbers of axes.
+    fn axes_of(&self, rows: &[usize]) -> Vec<usize> {
+        rows.iter().copied().chain(rows.iter().filter_map(|&i| self.scene.tangent(i))).collect()
+    }
+
+    /// S between two axes.
+    fn s(&self, i: usize, j: usize) -> f64 {
+        dot(self.scene.axes()[i], &self.responses[j])
+    }
+
+    /// λ_v/λ_a.
+    fn persist(&mut self) {
+        let rows = self.closed.clone();
+        let x = self.jumps(&rows, Jump::Velocity, true);
+        self.apply(&x);
+        let rows = self.engaged.clone();
+        let y = self.jumps(&rows, Jump::Acceleration, true);
+        let share = self.share();
+        for &(axis, y) in &y {
+            add(&mut self.past[0].a, y, &self.responses[axis]);
+            self.contacts.forces[axis] += share * y;
+        }
+    }
+
+    /// w_ā/w_a.
+    fn share(&self) -> f64 {
+        self.place.stage.balance.a.z / self.place.stage.recovery.a.z
+    }
+
+    /// Removes the jumps of some rows: finds what is to be added to what the stage has given, axis by axis. Of
+    /// velocities it also finds which contacts are engaged, and which slide. A pressed row is `held`, or may part.
+    fn jumps(&mut self, rows: &[usize], jump: Jump, held: bool) -> Vec<(usize, f64)> {
+        let (scene, axes) = (self.scene, self.axes_of(rows));
+        let share = match jump {
+            Jump::Velocity => self.h() * self.response[1],
+            Jump::Acceleration => self.response[2],
+        };
+        let new = &self.past[0];
+        let mut q = Vec::new();
+        let mut noise = Vec::new();
+        let mut given = Vec::new();
+        for &axis in &axes {
+            let (values, field) = if jump == Jump::Velocity { (&new.v, 1) } else { (&new.a, 2) };
+            let own = scene.rows.get(axis).map_or(0.0, |row| row.offset.at(new.t)[field]);
+            q.push(dot(scene.axes()[axis], values) + own);
+            noise.push(64.0 * f64::EPSILON * (size(scene.axes()[axis], values) + own.abs()));
+            given.push(share * self.contacts.raw[axis]);
+        }
+        let w: Matrix = axes.iter().map(|&i| axes.iter().map(|&j| self.s(i, j)).collect()).collect();
+        let jumps = q.clone();
+        for (q, w) in q.iter_mut().zip(&w) {
+            *q -= dot(w, &given);
+        }
+        let mut behind = rows.len();
+        let mut contacts = Vec::new();
+        for &i in rows {
+            let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
+                behind += 1;
+                let direction = (jump == Jump::Acceleration && self.contacts.slides[i]).then(|| self.directions[i]);
+                Friction { row: behind - 1, coefficient: *coefficient, direction }
+            });
+            let held = scene.rows[i].law == ContactLaw::Equality || held && self.is_pressed(i);
+            contacts.push(Contact { held, friction });
+        }
+        let problem = Problem { contacts, w, q, noise };
+        let totals = problem.solve();
+        let added: Vec<f64> = totals.iter().zip(&given).map(|(total, given)| total - given).collect();
+        if jump == Jump::Velocity {
+            self.engaged.clear();
+            for (place, &i) in rows.iter().enumerate() {
+                // (Without friction what a touching row is given is all that it has.)
+                if problem.contacts[place].held || totals[place] > 0.0 {
+                    self.engaged.push(i);
+                }
+                if let Some(Friction { row, coefficient, .. }) = problem.contacts[place].friction {
+                    let slip = jumps[row] + dot(&problem.w[row], &added);
+                    let bound = coefficient * totals[place].max(0.0);
+                    self.contacts.slides[i] = is_at_bound(totals[row], bound) && slip.abs() > problem.noise[row];
+                    // What has no friction, since all that it has been given pulls, slides all the same.
+                    let along = if totals[row].abs() > 0.0 { totals[row] } else { -slip };
+                    self.directions[i] = along.signum();
+                }
+            }
+        }
+        axes.into_iter().zip(added).collect()
+    }
+
+    /// v ← v + M⁻¹ Gᵀ x, and the change of the damping forces.
+    fn apply(&mut self, impulses: &[(usize, f64)]) {
+        let (scene, h) = (self.scene, self.h());
+        let mut change = vec![0.0; scene.dofs()];
+        for &(axis, x) in impulses {
+            add(&mut change, x, &self.responses[axis]);
+        }
+        let new = &mut self.past[0];
+        let before = new.v.clone();
+        add(&mut new.v, 1.0, &change);
+        if self.place.is_last {
+            for &(axis, x) in impulses.iter().filter(|(axis, _)| *axis < scene.rows.len()) {
+                // Seen from the obstacle.
+                let mean = 0.5 * (scene.rate(axis, new.t, &before) + scene.rate(axis, new.t, &new.v));
+                self.contacts.taken[axis] -= x * mean;
+            }
+        }
+        let Some(damping) = scene.damping.as_ref().filter(|_| change.iter().any(|x| x.abs() > 0.0)) else { return };
+        let mut force = product(damping, &change);
+        if self.place.reads.iter().any(|[.., a]| *a) {
+            let mut matrix = self.before.matrix.clone();
+            scene.hold(&mut matrix, &mut force);
+            let response = solve(matrix, force).expect("an effective matrix that is regular");
+            add(&mut new.a, -self.place.stage.balance.a.z / (h * h), &response);
+        } else {
+            add(&mut new.a, -1.0, &scene.accelerate(&force));
+        }
+    }
+
+    /// Projects what later rows read of the past, if a contact has just closed, or begins to stick.
+    fn project_past(&mut self) {
+        let begins = |&i: &usize| {
+            let sticks = self.scene.rows[i].friction.is_some() && !self.contacts.slides[i];
+            !self.before.was_closed[i] || sticks && !self.before.stuck[i]
+        };
+        if !self.engaged.iter().any(begins) {
+            return;
+        }
+        for k in 1..self.past.len().min(self.place.reads.len()) {
+            for field in 0..3 {
+                if self.place.reads[k][field] {
+                    self.project(k, field);
+                }
+            }
+        }
+    }
+
+    /// Projects one field of one state.
+    fn project(&mut self, k: usize, field: usize) {
+        let (scene, rows) = (self.scene, self.engaged.clone());
+        let axes = self.axes_of(&rows);
+        let (now, old) = (&self.past[0], &self.past[k]);
+        let values = [&old.u, &old.v, &old.a][field];
+        let mut jumps: Vec<f64> = axes
+            .iter()
+            .map(|&axis| match scene.rows.get(axis) {
+                Some(row) => {
+                    // Laws that read the gap at the start of a stage hold it where it is.
+                    let holds = matches!(row.law, ContactLaw::RateCondition | ContactLaw::PersistencySwitch);
+                    let held = if field == 0 && holds { self.contacts.gaps[axis] } else { 0.0 };
+                    dot(&row.g, values) + row.offset.at(old.t)[field] - held
+                }
+                None if field == 0 => dot(scene.axes()[axis], &old.u) - dot(scene.axes()[axis], &now.u),
+                None => dot(scene.axes()[axis], values),
+            })
+            .collect();
+        let before = jumps.clone();
+        // An impulse that presses moves past displacements back: the problem of these has the other sign.
+        let sign = if field == 0 { -1.0 } else { 1.0 };
+        jumps.iter_mut().for_each(|jump| *jump *= sign);
+        let mut behind = rows.len();
+        let contact = |&i: &usize| {
+            let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
+                behind += 1;
+                let direction = self.contacts.slides[i].then(|| self.directions[i]);
+                Friction { row: behind - 1, coefficient: *coefficient, direction }
+            });
+            // (What sticks is held both ways, however it presses.)
+            let stuck = friction.is_some_and(|friction| friction.direction.is_none());
+            (Contact { held: true, friction: friction.filter(|_| !stuck) }, stuck.then(|| behind - 1))
+        };
+        let (mut contacts, stuck): (Vec<_>, Vec<_>) = rows.iter().map(contact).unzip();
+        let noise: Vec<f64> = axes
+            .iter()
+            .zip(&jumps)
+            .map(|(&axis, jump)| 64.0 * f64::EPSILON * (size(scene.axes()[axis], values) + jump.abs()))
+            .collect();
+        let w: Matrix = axes.iter().map(|&i| axes.iter().map(|&j| self.s(i, j)).collect()).collect();
+        // Tangents of what sticks become contacts of their own, behind the rows in the order of the problem.
+        let order = reorder(&mut contacts, &stuck, axes.len());
+        let pick = |values: &[f64]| -> Vec<f64> { order.iter().map(|&place| values[place]).collect() };
+        let problem = Problem {
+            contacts,
+            w: order.iter().map(|&place| pick(&w[place])).collect(),
+            q: pick(&jumps),
+            noise: pick(&noise),
+        };
+        let found = problem.solve();
+        let mut multipliers = vec![0.0; axes.len()];
+        order.iter().zip(found).for_each(|(&place, m)| multipliers[place] = sign * m);
+        if field == 1 && !self.place.is_last && k == self.place.made {
+            // What the state that the step starts from loses here no later stage sees any more.
+            for (place, &i) in rows.iter().enumerate() {
+                let after = before[place] + dot(&w[place], &multipliers);
+                self.contacts.taken[i] -= multipliers[place] * 0.5 * (before[place] + after);
+            }
+        }
+        let old = &mut self.past[k];
+        let values = [&mut old.u, &mut old.v, &mut old.a];
+        for (value, place) in values.into_iter().zip(0..).filter(|(_, place)| *place == field) {
+            let _ = place;
+            for (&axis, m) in axes.iter().zip(&multipliers) {
+                add(value, *m, &self.responses[axis]);
+            }
+        }
+    }
+
+    /// Gives back at release what the corrections took.
+    fn release(&mut self) {
+        for i in self.released() {
+            let taken = self.contacts.taken[i];
+            let (s, rate) = (self.s(i, i), self.scene.rate(i, self.past[0].t, &self.past[0].v));
+            let noise = 64.0
+                * f64::EPSILON
+                * (size(&self.scene.rows[i].g, &self.past[0].v)
+                    + self.scene.rows[i].offset.at(self.past[0].t)[1].abs());
+            if taken <= 0.0 || 2.0 * s * taken <= noise * noise {
+                continue;
+            }
+            let impulse = ((rate * rate + 2.0 * s * taken).sqrt() - rate) / s;
+            self.apply(&[(i, impulse)]);
+            self.move_past(i, impulse);
+        }
+    }
+
+    /// Lets the stress of contacts that have opened run off as a wave.
+    fn run_off(&mut self) {
+        for i in self.released() {
+            let impulse = 0.5 * TRANSIT * self.h() * self.before.reported[i].max(0.0);
+            self.apply(&[(i, impulse)]);
+            self.move_past(i, impulse);
+        }
+    }
+
+    /// Rows that are open at the end of a step, and were closed in it or at its start.
+    fn released(&self) -> Vec<usize> {
+        let opens = |&i: &usize| {
+            let closed = self.before.was_closed[i] || self.place.closed_at_start[i];
+            self.place.is_last && closed && !self.contacts.closed[i] && !self.scene.rows[i].law.is_compliant()
+        };
+        (0..self.scene.rows.len()).filter(opens).collect()
+    }
+
+    /// Lets the past have had a velocity all along.
+    fn move_past(&mut self, i: usize, impulse: f64) {
+        let (h, made) = (self.h(), self.place.made);
+        for k in made..self.past.len().min(self.place.reads.len()) {
+            let steps = (k + 1 - made) as f64;
+            let [u, v, _] = self.place.reads[k];
+            if u {
+                add(&mut self.past[k].u, -steps * h * impulse, &self.responses[i]);
+            }
+            if v {
+                add(&mut self.past[k].v, impulse, &self.responses[i]);
+            }
+        }
+    }
+
+    /// The nonsmooth splitting.
+    fn split(&mut self) {
+        let rows = self.closed.clone();
+        let given = self.h() * self.response[1];
+        let x = self.jumps(&rows, Jump::Velocity, false);
+        self.apply(&x);
+        for &(axis, x) in &x {
+            let raw = self.contacts.raw[axis];
+            add(&mut self.past[0].a, -self.response[2] * raw, &self.responses[axis]);
+            self.contacts.forces[axis] = (given * raw + x) / self.h();
+        }
+    }
+
+    /// Contact forces that act as one impulse.
+    fn act_implicitly(&mut self) {
+        let (h, [by_u, by_v, by_a]) = (self.h(), self.response);
+        let mut impulses = Vec::new();
+        for i in self.closed.clone() {
+            let raw = self.contacts.raw[i];
+            add(&mut self.past[0].a, -by_a * raw, &self.responses[i]);
+            self.contacts.forces[i] = 2.0 * by_u * raw;
+            impulses.push((i, h * (2.0 * by_u - by_v) * raw));
+        }
+        if impulses.iter().any(|(_, x)| x.abs() > 0.0) {
+            self.apply(&impulses);
+        }
+    }
+
+    /// The velocity jump of Laursen and Love.
+    fn restore_energy(&mut self) {
+        let (scene, rows) = (self.scene, self.closed.clone());
+        let (new, start) = (&self.past[0], &self.past[1]);
+        let lambda: Vec<f64> = rows.iter().map(|&i| self.contacts.raw[i]).collect();
+        let gap = |i: usize, state: &Motion| scene.gap(i, state.t, &state.u);
+        let work: f64 = rows.iter().zip(&lambda).map(|(&i, l)| l * (gap(i, new) - gap(i, start))).sum();
+        let rate: f64 = rows.iter().zip(&lambda).map(|(&i, l)| l * scene.rate(i, new.t, &new.v)).sum();
+        let row = |i: usize| rows.iter().zip(&lambda).map(|(&j, l)| self.s(i, j) * l).sum::<f64>();
+        let square: f64 = rows.iter().zip(&lambda).map(|(&i, l)| l * row(i)).sum();
+        if square <= 0.0 {
+            return;
+        }
+        // ½ τ² λᵀSλ + τ λᵀ ġ + work = 0.
+        let tau = ((rate * rate - 2.0 * square * work).max(0.0).sqrt() - rate) / square;
+        let impulses: Vec<_> = rows.iter().zip(&lambda).map(|(&i, l)| (i, tau * l)).collect();
+        self.apply(&impulses);
+    }
+
+    /// No acceleration on the dofs of pressed contacts.
+    fn stop_accelerations(&mut self) {
+        let rows = self.closed.clone();
+        let _ = self.jumps(&rows, Jump::Velocity, true);
+        let rows = self.engaged.clone();
+        let y = self.jumps(&rows, Jump::Acceleration, true);
+        let share = self.share();
+        for &(i, y) in &y {
+            self.contacts.forces[i] += share * y;
+            for (a, g) in self.past[0].a.iter_mut().zip(&self.scene.rows[i].g) {
+                if g.abs() > 0.0 {
+                    *a = 0.0;
+                }
+            }
+        }
+    }
+}
+
+/// Puts the tangents of what sticks behind the normal rows as contacts of their own, and what slides behind these;
+/// returns the order.
+fn reorder(contacts: &mut Vec<Contact>, stuck: &[Option<usize>], axes: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..contacts.len()).collect();
+    for &place in stuck.iter().flatten() {
+        order.push(place);
+        contacts.push(Contact { held: true, friction: None });
+    }
+    for place in 0..axes {
+        if !order.contains(&place) {
+            order.push(place);
+        }
+    }
+    for contact in contacts {
+        if let Some(friction) = &mut contact.friction {
+            friction.row = order.iter().position(|&place| place == friction.row).unwrap_or(friction.row);
+        }
+    }
+    order
+}

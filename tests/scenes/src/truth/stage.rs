@@ -1,0 +1,337 @@
+//! One stage: the balance, the conditions of the contact laws, and which contacts are closed in the end (theory,
+//! sections 2, 5 and 18).
+
+use super::dense::{Matrix, add, dot, product, size, solve as solve_dense, zeros};
+use super::problem::{Contact, Friction, Problem};
+use super::rows::{Affine, Target, motion, target};
+use super::{Contacts, Motion, Place, Scene};
+use crate::combinations::Correction;
+use contact_dynamics::ContactLaw;
+use contact_dynamics::tableau::StageForce;
+
+pub struct Solved {
+    pub motion: Motion,
+    pub raw: Vec<f64>,
+    pub gaps: Vec<f64>,
+    pub closed: Vec<bool>,
+    pub slides: Vec<bool>,
+    /// The effective matrix.
+    pub matrix: Matrix,
+}
+
+/// What a row constrains: y = `by_z` z + `known`, with 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
+#[derive(Clone)]
+struct Form {
+    by_z: Vec<f64>,
+    known: f64,
+    noise: f64,
+    compliance: f64,
+    shift: f64,
+    enabled: bool,
+}
+
+impl Form {
+    /// `row` x + `own`.
+    fn new(row: &[f64], x: &Affine, own: f64) -> Self {
+        let by_z: Vec<f64> = row.iter().zip(&x.weight).map(|(g, w)| g * w).collect();
+        let known = dot(row, &x.known) + own;
+        let noise = 64.0 * f64::EPSILON * (size(row, &x.known) + own.abs());
+        Self { by_z, known, noise, compliance: 0.0, shift: 0.0, enabled: true }
+    }
+
+    fn at(&self, z: &[f64]) -> f64 {
+        dot(&self.by_z, z) + self.known
+    }
+}
+
+/// A stage before its contact is known.
+struct Stage<'s> {
+    scene: &'s Scene,
+    place: &'s Place<'s>,
+    past: &'s [Motion],
+    new: [Affine; 3],
+    balance: [Affine; 3],
+    target: Target,
+    /// Where the balance and the new state live.
+    t_balance: f64,
+    t_new: f64,
+    /// The solution without contact.
+    free: Vec<f64>,
+}
+
+pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Contacts, correction: Correction) -> Solved {
+    let (stage, h) = (place.stage, scene.h);
+    let (t_balance, t_new) = (place.t + stage.load * h, place.t + stage.end * h);
+    let mut new = motion(stage.recovery.each(), past, scene, t_new);
+    let mut balance = motion(stage.balance.each(), past, scene, t_balance);
+    if stage.is_collocated() {
+        balance = new.clone();
+    }
+    if let (StageForce::AlongPath, Some((dof, [to, ..]))) = (stage.force, scene.driven(t_new)) {
+        // Along its path a support is in the middle, with the velocity of the way.
+        let from = past[0].u[dof];
+        balance[0].known[dof] = 0.5 * (from + to);
+        balance[1].known[dof] = (to - from) / (stage.end * h);
+    }
+    if correction == Correction::Stabilized || correction == Correction::StabilizedClosed {
+        let shift = shift(scene, &past[0], correction, &contacts.closed, t_new);
+        add(&mut new[0].known, 1.0, &shift);
+        add(&mut balance[0].known, stage.balance.u.z / stage.recovery.u.z, &shift);
+    }
+    let (matrix, free) = balanced(scene, &balance, t_balance);
+    let target = target(stage, past, scene, place.t);
+    let mut work = Stage { scene, place, past, new, balance, target, t_balance, t_new, free };
+    if let (Correction::Stabilized | Correction::StabilizedClosed, None) = (correction, &work.target.forecast) {
+        work.target.values = work.new[0].clone();
+    }
+    let by_way = matches!(
+        correction,
+        Correction::Splitting | Correction::Implicit | Correction::Stabilized | Correction::StabilizedClosed
+    );
+    let forms = work.forms(by_way);
+    let responses: Vec<Vec<f64>> = scene
+        .axes()
+        .iter()
+        .map(|axis| {
+            let (mut a, mut f) = (matrix.clone(), axis.to_vec());
+            scene.hold(&mut a, &mut f);
+            solve_dense(a, f).expect("an effective matrix that is regular")
+        })
+        .collect();
+    let raw = work.multipliers(forms.clone(), &responses);
+    let mut z = work.free.clone();
+    raw.iter().zip(&responses).for_each(|(r, response)| add(&mut z, *r, response));
+    work.finish(&forms, &z, raw, matrix)
+}
+
+/// The effective matrix, and z without contact.
+fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], t: f64) -> (Matrix, Vec<f64>) {
+    let n = scene.dofs();
+    let mut f = scene.force(t, &u.known, &v.known);
+    add(&mut f, -1.0, &product(&scene.mass, &a.known));
+    let mut matrix = zeros(n, n);
+    for (i, row) in matrix.iter_mut().enumerate() {
+        for (j, entry) in row.iter_mut().enumerate() {
+            let damping = scene.damping.as_ref().map_or(0.0, |c| c[i][j]);
+            *entry = scene.stiffness[i][j] * u.weight[j] + damping * v.weight[j] + scene.mass[i][j] * a.weight[j];
+        }
+    }
+    scene.hold(&mut matrix, &mut f);
+    let free = solve_dense(matrix.clone(), f).expect("an effective matrix that is regular");
+    (matrix, free)
+}
+
+/// The shift D of u + h v to what contacts admit, in the norm of the mass (theory, section 16).
+fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool], t: f64) -> Vec<f64> {
+    let mut u = start.u.clone();
+    add(&mut u, scene.h, &start.v);
+    if let Some((dof, [there, ..])) = scene.driven(t) {
+        u[dof] = there;
+    }
+    let rows: Vec<usize> = (0..scene.rows.len())
+        .filter(|&i| scene.rows[i].law == ContactLaw::Rigid && (correction == Correction::Stabilized || closed[i]))
+        .collect();
+    let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
+    let problem = Problem {
+        contacts: rows.iter().map(|_| Contact { held: false, friction: None }).collect(),
+        w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
+        q: rows.iter().map(|&i| scene.gap(i, t, &u)).collect(),
+        noise: rows.iter().map(|&i| scene.rounding(i, t, &u)).collect(),
+    };
+    let mut shift = vec![0.0; scene.dofs()];
+    problem.solve().iter().zip(&responses).for_each(|(mu, response)| add(&mut shift, *mu, response));
+    shift
+}
+
+impl Stage<'_> {
+    /// What the rows constrain; those of tangents are behind the others.
+    fn forms(&self, by_way: bool) -> Vec<Form> {
+        let rows = 0..self.scene.rows.len();
+        let normal = rows.clone().map(|i| self.normal(i));
+        normal.chain(rows.filter_map(|i| self.tangential(i, by_way))).collect()
+    }
+
+    fn normal(&self, i: usize) -> Form {
+        let (scene, h, start) = (self.scene, self.scene.h, &self.past[0]);
+        let row = &scene.rows[i];
+        let rigid = || {
+            let [gap, rate, _] = row.offset.at(self.target.t);
+            let own = if self.target.forecast.is_some() { h * rate } else { gap };
+            Form::new(&row.g, &self.target.values, own)
+        };
+        let spring = || Form::new(&row.g, &self.balance[0], row.offset.at(self.t_balance)[0]);
+        let start_gap = scene.gap(i, start.t, &start.u);
+        match row.law {
+            ContactLaw::Rigid | ContactLaw::Equality => Form { enabled: self.enables(i), ..rigid() },
+            ContactLaw::Restitution { coefficient } => {
+                let mut form = Form { enabled: self.enables(i), ..rigid() };
+                let lead = self.place.stage.contact.lead();
+                let rate = scene.rate(i, start.t, &start.v) + lead * h * dot(&row.g, &start.a);
+                form.known += coefficient * h * rate;
+                form
+            }
+            ContactLaw::RateCondition | ContactLaw::PersistencySwitch => {
+                let mut form = rigid();
+                let free = form.at(&self.free);
+                let tolerance = scene.rounding(i, start.t, &start.u)
+                    + 1e-10 * (h * scene.rate(i, start.t, &start.v).abs() + (free - start_gap).abs());
+                match (row.law, start_gap <= tolerance) {
+                    (ContactLaw::RateCondition, true) => form.known -= start_gap,
+                    (ContactLaw::RateCondition, false) => form.enabled = false,
+                    (_, true) => {
+                        let mut way = self.new[1].clone();
+                        way.weight.iter_mut().for_each(|w| *w *= h);
+                        way.known.iter_mut().for_each(|v| *v *= h);
+                        form = Form::new(&row.g, &way, h * row.offset.at(self.t_new)[1]);
+                    }
+                    (_, false) => {}
+                }
+                form
+            }
+            ContactLaw::Bipenalty { stiffness, mass } => {
+                let ratio = mass / stiffness;
+                let x = self.balance[0].sum(1.0, &self.balance[2], ratio);
+                let [gap, _, acceleration] = row.offset.at(self.t_balance);
+                Form { compliance: stiffness.recip(), ..Form::new(&row.g, &x, gap + ratio * acceleration) }
+            }
+            ContactLaw::StabilizedBipenalty { stiffness } => {
+                // Gaps of the state are known before its forces.
+                let now = spring().known;
+                let before = (-0.5 * (start_gap + now)).max(0.0);
+                let mut form = rigid();
+                form.by_z.iter_mut().for_each(|by| *by *= 0.5);
+                form.known = 0.5 * (form.known + now) - before;
+                Form { compliance: 2.0 / stiffness, ..form }
+            }
+            ContactLaw::Penalty { stiffness } | ContactLaw::AugmentedLagrangian { stiffness, .. } => {
+                Form { compliance: stiffness.recip(), ..spring() }
+            }
+            _ => spring(),
+        }
+    }
+
+    /// Whether a contact may press: where velocities are constrained if its gap is forecast to be closed.
+    fn enables(&self, i: usize) -> bool {
+        let Some((u, t)) = &self.target.forecast else { return true };
+        let row = &self.scene.rows[i];
+        let x = self.target.values.at(&self.free);
+        let way = (dot(&row.g, &x) + self.scene.h * row.offset.at(self.target.t)[1]).abs();
+        let tolerance = self.scene.rounding(i, *t, u) + 1e-10 * way;
+        row.law == ContactLaw::Equality || self.scene.gap(i, *t, u) <= tolerance
+    }
+
+    fn tangential(&self, i: usize, by_way: bool) -> Option<Form> {
+        let (_, tangent) = self.scene.rows[i].friction.as_ref()?;
+        let stage = self.place.stage;
+        let x = if self.target.forecast.is_some() {
+            self.target.values.clone()
+        } else if stage.contact.lead() > 0.0 {
+            self.target.values.sum(1.0, &self.new[0], -1.0)
+        } else if stage.recovery.v.z > 0.0 && !by_way {
+            let scale = stage.recovery.u.z / (stage.recovery.v.z / self.scene.h);
+            self.new[1].sum(scale, &self.new[1], 0.0)
+        } else {
+            let start = Affine { weight: vec![0.0; self.free.len()], known: self.past[0].u.clone() };
+            self.new[0].sum(1.0, &start, -1.0)
+        };
+        Some(Form::new(tangent, &x, 0.0))
+    }
+
+    /// Multipliers of all rows and tangents.
+    fn multipliers(&self, mut forms: Vec<Form>, responses: &[Vec<f64>]) -> Vec<f64> {
+        let laws: Vec<ContactLaw> = self.scene.rows.iter().map(|row| row.law).collect();
+        let mut depth: Vec<f64> = forms.iter().map(|form| -form.at(&self.free)).collect();
+        let mut pass = 0;
+        loop {
+            for ((form, law), depth) in forms.iter_mut().zip(&laws).zip(&depth) {
+                if let ContactLaw::PowerLaw { stiffness, exponent } = *law {
+                    // F = k δ^p about the depth δ.
+                    let depth = depth.max(form.noise);
+                    form.compliance = (stiffness * exponent * depth.powf(exponent - 1.0)).recip();
+                    form.shift = depth * (1.0 - exponent.recip());
+                }
+            }
+            let raw = self.once(&forms, responses);
+            let mut again = false;
+            for (i, law) in laws.iter().enumerate() {
+                match *law {
+                    ContactLaw::PowerLaw { .. } => {
+                        let y = forms[i].at(&self.free)
+                            + raw.iter().zip(responses).map(|(r, x)| r * dot(&forms[i].by_z, x)).sum::<f64>();
+                        again |= (depth[i] + y).abs() > 1e-14 * y.abs() && pass < 60;
+                        depth[i] = -y;
+                    }
+                    // (Where the gap does not move with the unknown there is nothing to augment.)
+                    ContactLaw::AugmentedLagrangian { augmentations, .. }
+                        if pass < augmentations && forms[i].by_z.iter().any(|by| by.abs() > 0.0) =>
+                    {
+                        forms[i].shift = -forms[i].compliance * raw[i];
+                        again = true;
+                    }
+                    _ => {}
+                }
+            }
+            if !again {
+                return raw;
+            }
+            pass += 1;
+        }
+    }
+
+    fn once(&self, forms: &[Form], responses: &[Vec<f64>]) -> Vec<f64> {
+        let rows = &self.scene.rows;
+        let normals: Vec<usize> = (0..rows.len()).filter(|&i| forms[i].enabled).collect();
+        let tangents: Vec<usize> = normals.iter().filter_map(|&i| self.scene.tangent(i)).collect();
+        let taken: Vec<usize> = normals.iter().chain(&tangents).copied().collect();
+        let mut behind = normals.len();
+        let contact = |&i: &usize| {
+            let friction = rows[i].friction.as_ref().map(|(coefficient, _)| {
+                behind += 1;
+                Friction { row: behind - 1, coefficient: *coefficient, direction: None }
+            });
+            Contact { held: rows[i].law == ContactLaw::Equality, friction }
+        };
+        let contacts = normals.iter().map(contact).collect();
+        let entry = |i: usize, j: usize| {
+            let own = if i == j { forms[i].compliance } else { 0.0 };
+            own + dot(&forms[i].by_z, &responses[j])
+        };
+        let problem = Problem {
+            contacts,
+            w: taken.iter().map(|&i| taken.iter().map(|&j| entry(i, j)).collect()).collect(),
+            q: taken.iter().map(|&i| forms[i].at(&self.free) + forms[i].shift).collect(),
+            noise: taken.iter().map(|&i| forms[i].noise + 1e-15 * forms[i].at(&self.free).abs()).collect(),
+        };
+        let mut raw = vec![0.0; forms.len()];
+        problem.solve().iter().zip(&taken).for_each(|(r, &i)| raw[i] = *r);
+        raw
+    }
+
+    /// The state at z, and which contacts are closed.
+    fn finish(&self, forms: &[Form], z: &[f64], raw: Vec<f64>, matrix: Matrix) -> Solved {
+        let (scene, h, t) = (self.scene, self.scene.h, self.t_new);
+        let [u, v, a] = [0, 1, 2].map(|field| self.new[field].at(z));
+        let (mut closed, mut slides) = (Vec::new(), Vec::new());
+        for (i, row) in scene.rows.iter().enumerate() {
+            let form = &forms[i];
+            let tolerance = form.noise + 1e-10 * h * scene.rate(i, t, &v).abs();
+            let touches = form.enabled && form.at(z) <= tolerance && !row.law.is_compliant();
+            closed.push(raw[i] > 0.0 || touches || row.law == ContactLaw::Equality);
+            slides.push(match (&row.friction, scene.tangent(i)) {
+                (Some((coefficient, tangent)), Some(k)) => {
+                    let slip = dot(tangent, &v).abs();
+                    let noise = 64.0 * f64::EPSILON * (size(tangent, &v) + h * size(tangent, &a));
+                    raw[i] > 0.0 && is_at_bound(raw[k], coefficient * raw[i]) && slip > noise
+                }
+                _ => false,
+            });
+        }
+        let gaps = (0..scene.rows.len()).map(|i| scene.gap(i, t, &u)).collect();
+        Solved { motion: Motion { t, u, v, a }, raw, gaps, closed, slides, matrix }
+    }
+}
+
+/// Whether friction is at the rim of its cone.
+pub fn is_at_bound(friction: f64, bound: f64) -> bool {
+    friction.abs() >= (1.0 - 1e-12) * bound
+}

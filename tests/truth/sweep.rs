@@ -1,0 +1,107 @@
+//! Scenes by chance, run with every scheme and some corrections, and what came of them.
+
+use contact_dynamics::ContactLaw;
+use contact_dynamics_scenes::combinations::Correction;
+use contact_dynamics_scenes::schemes;
+use contact_dynamics_scenes::truth::{Compared, Kind, Outcome, Setting, compare};
+use std::fmt::Write;
+
+/// Largest difference, over the size of what is compared.
+const TOLERANCE: f64 = 1e-9;
+/// Steps of a run, and those that have to be compared in the longer ones.
+const STEPS: usize = 64;
+const LONG: usize = 60;
+
+/// What a sweep goes through.
+pub(crate) struct Sweep<'c> {
+    pub(crate) corrections: &'c [Correction],
+    pub(crate) law: ContactLaw,
+    /// Whether every other row is rigid.
+    pub(crate) mixed: bool,
+    pub(crate) rubs: bool,
+    pub(crate) seeds: u64,
+}
+
+/// The runs of a scheme with a correction.
+#[derive(Default)]
+pub(crate) struct Pair {
+    pub(crate) name: String,
+    pub(crate) refused: usize,
+    /// Refused although nothing is damped.
+    pub(crate) refused_undamped: usize,
+    pub(crate) runs: Vec<Compared>,
+}
+
+impl Pair {
+    /// '+' if all runs were compared, 'u' if those of undamped bodies were, '.' if none was.
+    fn flag(&self) -> char {
+        match (self.runs.is_empty(), self.refused, self.refused_undamped) {
+            (true, _, _) => '.',
+            (false, 0, _) => '+',
+            (false, _, 0) => 'u',
+            (false, _, _) => '?',
+        }
+    }
+
+    pub(crate) fn sum(&self, what: fn(&Compared) -> usize) -> usize {
+        self.runs.iter().map(what).sum()
+    }
+
+    pub(crate) fn long(&self) -> usize {
+        self.runs.iter().filter(|run| run.steps >= LONG).count()
+    }
+}
+
+/// What came of a sweep: a line for each scheme with a flag for each correction, and all pairs that were compared.
+pub(crate) struct Swept {
+    pub(crate) table: String,
+    pub(crate) pairs: Vec<Pair>,
+    pub(crate) worst: f64,
+}
+
+impl Sweep<'_> {
+    pub(crate) fn run(&self) -> Swept {
+        let mut swept = Swept { table: String::new(), pairs: Vec::new(), worst: 0.0 };
+        for listed in schemes::all() {
+            let mut flags = String::new();
+            for &correction in self.corrections {
+                let pair = self.pair(&listed, correction, &mut swept.worst);
+                flags.push(pair.flag());
+                if !pair.runs.is_empty() {
+                    swept.pairs.push(pair);
+                }
+            }
+            writeln!(swept.table, "{flags} {}", listed.name()).expect("a string takes all");
+        }
+        swept
+    }
+
+    fn pair(&self, listed: &schemes::Listed, correction: Correction, worst: &mut f64) -> Pair {
+        let mut pair = Pair { name: format!("{}, {}", listed.name(), correction.name()), ..Pair::default() };
+        for kind in Kind::ALL {
+            // Where bodies rest on each other Laursen's and Love's jump is the root of rounding.
+            if correction == Correction::LaursenLove && kind == Kind::Rest {
+                continue;
+            }
+            for seed in 0..self.seeds {
+                let Self { law, mixed, rubs, .. } = *self;
+                let scene = Setting { kind, critical: listed.critical, law, mixed, rubs }.scene(seed);
+                let place = format!("{}, {law:?}, {kind:?} {seed}", pair.name);
+                match compare(&scene, listed.make, correction, STEPS) {
+                    Err(error) => panic!("{place}: {error}"),
+                    Ok(Outcome::Refused(_)) => {
+                        pair.refused += 1;
+                        pair.refused_undamped += usize::from(scene.damping.is_none());
+                    }
+                    Ok(Outcome::Compared(run)) => {
+                        let deviation = &run.worst;
+                        assert!(deviation.size <= TOLERANCE, "{place}: {deviation:?} of {} steps", run.steps);
+                        *worst = worst.max(deviation.size);
+                        pair.runs.push(run);
+                    }
+                }
+            }
+        }
+        pair
+    }
+}
