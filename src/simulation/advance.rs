@@ -4,6 +4,7 @@ use super::results::Outcome;
 use super::run::Simulation;
 use crate::error::{Error, Result};
 use crate::observer::{Control, Observer, StepView, Wants};
+use crate::ranks::check_alike;
 use crate::real::Real;
 use crate::state::resolution;
 
@@ -37,6 +38,7 @@ impl<T: Real> Simulation<'_, T> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
         }
+        check_alike(&self.together, ["the end time"], [t])?;
         while !self.history.clock.has_reached(t) {
             if self.observed_step(observer)? == Control::Stop {
                 return Ok(Outcome::Stopped);

@@ -13,6 +13,7 @@ use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::FORESEEN;
 use crate::corrector::{Corrector, Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
+use crate::ranks::check_alike;
 use crate::real::Real;
 use crate::state::{History, Motion, Pace, State, Trail};
 
@@ -58,6 +59,7 @@ impl<T: Real> Simulation<'_, T> {
     /// as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         self.guarded(|run| {
+            check_alike(&run.together, ["the step size"], [h])?;
             run.change_step_size(h)?;
             run.history.pace = Pace::new(h);
             Ok(())

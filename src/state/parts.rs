@@ -74,7 +74,7 @@ impl<T: Real> Checkpoint<T> {
             return refuse("a dof of the whole belongs to none of them");
         };
         let mut sources: Vec<Self> = parts.iter().map(|(part, _)| part.clone()).collect();
-        let mut vectors: Vec<_> = sources.iter_mut().map(|part| part.vectors()).collect();
+        let mut vectors: Vec<_> = sources.iter_mut().map(Self::vectors).collect();
         let mut whole = first.clone();
         for values in whole.vectors() {
             let from: Vec<_> = vectors.iter_mut().filter_map(Iterator::next).collect();

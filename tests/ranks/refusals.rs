@@ -56,6 +56,25 @@ fn ranks_that_differ() {
     refused!(found, Error::RanksDiffer { .. }, "the number of contact rows");
 }
 
+#[test]
+fn steps_and_ends_that_differ() {
+    let blocks = Blocks::new();
+    on_ranks(2, |rank, meeting| {
+        let set_up = |part: &SolidPart<2>| Simulation::builder(linear_part(part, false), Composite, 1e-3);
+        let (_, builder) = blocks.on_rank((rank, meeting), set_up).unwrap();
+        let mut run = builder.build().unwrap();
+        let other = 1.0 + rank as f64;
+        let step = run.set_step_size(1e-3 * other).expect_err("it is refused");
+        assert!(matches!(step, Error::RanksDiffer { what: "the step size", .. }), "{step:?}");
+        let end = run.run_until(1e-2 * other, &mut ()).expect_err("it is refused");
+        assert!(matches!(end, Error::RanksDiffer { what: "the end time", .. }), "{end:?}");
+        // Nothing has moved, and the run goes on.
+        assert_eq!(run.statistics().steps, 0);
+        run.run_until(1e-2, &mut ()).unwrap();
+        assert_eq!(run.statistics().steps, 10);
+    });
+}
+
 /// Ranks that claim other dofs than they own.
 #[derive(Debug)]
 struct Claiming(Arc<Part>, Vec<Range<usize>>);

@@ -1,5 +1,5 @@
 //! Contact of bodies over MPI ranks: `mpirun -n 3 target/release/ranks [--quick] [--cells N] [--steps N]`; further
-//! `fault force|solve|memory|kill` and `save|resume FOLDER`.
+//! `model`, `fault force|solve|memory|kill` and `save|resume FOLDER`.
 //!
 //! Two blocks of hexahedra, one above the other, are thrown at a floor, with friction; every rank assembles its own
 //! elements. Each scene is run over the ranks that there are, with MUMPS in each of its ways, and in one piece on rank 0
@@ -8,6 +8,7 @@
 mod bodies;
 mod faults;
 mod ffi;
+mod model;
 mod restart;
 mod share;
 mod solver;
@@ -31,6 +32,7 @@ struct Arguments {
 
 enum Task {
     Table,
+    Model,
     Fault(Fault),
     Save(PathBuf),
     Resume(PathBuf),
@@ -44,9 +46,10 @@ impl Arguments {
             place.and_then(|place| arguments.get(place + 1)?.parse().ok()).unwrap_or(default)
         };
         let quick = arguments.iter().any(|argument| argument == "--quick");
-        let (cells, steps) = if quick { (4, 20) } else { (10, 40) };
+        let (cells, steps) = if quick { (4, 20) } else { (6, 30) };
         let words: Vec<&str> = arguments.iter().skip(1).take(2).map(String::as_str).collect();
         let task = match words[..] {
+            ["model", ..] => Task::Model,
             ["fault", name] => Task::Fault(Fault::named(name).expect("force, solve, memory or kill")),
             ["save", folder] => Task::Save(folder.into()),
             ["resume", folder] => Task::Resume(folder.into()),
@@ -164,6 +167,7 @@ fn run(world: World) -> Result<bool> {
     let way = Way { input: Input::Distributed, condenses: true };
     match task {
         Task::Table => print_table((cells, steps), &blocks, (&cut, &share)),
+        Task::Model => model::print(&blocks, (&cut, &share)),
         Task::Fault(fault) => faults::run(fault, &blocks, (&cut, &share)),
         Task::Save(folder) => restart::save(&folder, &blocks, (&cut, &share), way, steps).map(|()| true),
         Task::Resume(folder) => {
