@@ -106,3 +106,32 @@ pub trait Ranks<T: Real>: std::fmt::Debug + Send + Sync {
     /// As [`sum`](Self::sum).
     fn share(&self, values: &mut [T]) -> Result<()>;
 }
+
+#[cfg(test)]
+mod tests {
+    /// The names of the methods in a part of a source.
+    fn methods(source: &str, from: &str) -> Vec<String> {
+        let body = source.split(from).nth(1).and_then(|rest| rest.split("\n}").next()).unwrap();
+        let methods = body.lines().filter_map(|line| line.strip_prefix("    fn "));
+        methods.map(|rest| rest.split(['(', '<']).next().unwrap().to_owned()).collect()
+    }
+
+    /// A method that is new must not be answered by its default for a host that has one.
+    #[test]
+    fn wrapped_parts_answer_every_method() {
+        let (system, solver) = (include_str!("ranks/system.rs"), include_str!("ranks/solver.rs"));
+        let solvers = include_str!("linear_solver.rs");
+        for (declared, trait_name, wrapped, implemented) in [
+            (include_str!("system.rs"), "pub trait System<", system, "System<T> for AgreedSystem"),
+            (solvers, "pub trait LinearSolver<", solver, "LinearSolver<T> for AgreedSolver"),
+            (solvers, "pub trait Factorization<", solver, "Factorization<T> for AgreedFactorization"),
+            (solvers, "pub trait Condensation<", solver, "Condensation<T> for AgreedFactorization"),
+        ] {
+            let (mut all, mut own) = (methods(declared, trait_name), methods(wrapped, implemented));
+            all.sort_unstable();
+            own.sort_unstable();
+            assert!(all.len() > 1);
+            assert_eq!(all, own, "{trait_name}");
+        }
+    }
+}

@@ -4,12 +4,14 @@
 use contact_dynamics::corrector::{Correction, Edits, Prediction};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::observer::Wants;
+use contact_dynamics::ranks::Ranks;
 use contact_dynamics::tableau::Tableau;
 use contact_dynamics::{
     Control, Corrector, DampingForce, Diagonal, Factorization, LinearRows, LinearSolver, LinearSystem, Linearity, Mass,
     Newmark, Observer, Path, PathForce, Result, Simulation, StepView, System, TangentWeights, TimeIntegrator,
 };
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 /// Which methods of a part were called.
@@ -103,6 +105,10 @@ impl System<f64> for Model {
         self.log.note("highest_frequency");
         Some(7.0)
     }
+    fn ranks(&self) -> Option<Arc<dyn Ranks<f64>>> {
+        self.log.note("ranks");
+        Some(Arc::new(Fifth))
+    }
     fn prescribed(&self) -> &[usize] {
         self.log.note("prescribed");
         &[1]
@@ -115,6 +121,28 @@ impl System<f64> for Model {
     fn commit(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<()> {
         self.log.note("commit");
         Err(contact_dynamics::Error::Host { callback: "commit", source: format!("{t}").into() })
+    }
+}
+
+/// A rank that is asked for its number alone.
+#[derive(Debug)]
+struct Fifth;
+
+impl Ranks<f64> for Fifth {
+    fn rank(&self) -> usize {
+        5
+    }
+    fn owned(&self) -> &[Range<usize>] {
+        &[]
+    }
+    fn sum(&self, _: &mut [f64]) -> Result<()> {
+        Ok(())
+    }
+    fn max(&self, _: &mut [f64]) -> Result<()> {
+        Ok(())
+    }
+    fn share(&self, _: &mut [f64]) -> Result<()> {
+        Ok(())
     }
 }
 
@@ -161,7 +189,8 @@ fn answers(mut system: impl System<f64>) -> String {
     let mut supports = [[0.0; 3]];
     system.prescribed_motion(0.7, &mut supports).unwrap();
     let sizes = (system.dofs(), system.linearity(), system.pattern().row_idx().len(), system.prescribed().to_vec());
-    let numbers = (system.potential_energy(&u), system.highest_frequency());
+    let rank = system.ranks().map(|ranks| ranks.rank());
+    let numbers = (system.potential_energy(&u), system.highest_frequency(), rank);
     let (mass, commit) = (format!("{:?}", system.mass()), system.commit(0.9, &u, &v));
     format!("{all:?} {supports:?} {sizes:?} {numbers:?} {mass} {commit:?}")
 }
@@ -287,18 +316,22 @@ impl LinearSolver<f64> for Solver {
         self.0.note("analyze");
         Diagonal.analyze(pattern, last)
     }
+    fn spans_ranks(&self) -> bool {
+        self.0.note("spans_ranks");
+        true
+    }
 }
 
 #[test]
 fn pointers_to_linear_solvers() {
     #[expect(clippy::needless_pass_by_value, reason = "pointers are tried by value")]
-    fn answers(solver: impl LinearSolver<f64>) -> f64 {
+    fn answers(solver: impl LinearSolver<f64>) -> (f64, bool) {
         let a = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)]).unwrap();
         let mut factor = solver.analyze(a.symbolic(), &[0]).unwrap();
         factor.factorize(a.as_ref()).unwrap();
         let mut x = [1.0];
         factor.solve(&mut x).unwrap();
-        x[0]
+        (x[0], solver.spans_ranks())
     }
     let (log, all) = (Log::default(), methods("linear_solver.rs", "LinearSolver"));
     let bare = answers(Solver(log.clone()));
