@@ -7,15 +7,13 @@ use contact_dynamics_scenes::impacts::{Impact, Model, Step};
 use contact_dynamics_scenes::tables::decimal;
 use std::fmt::Write;
 
-/// Modes of each body.
-const MODES: usize = 50;
-
 /// Errors against the whole model on the same mesh.
 pub(crate) fn softenings(quick: bool) -> Table {
     let ball = if quick { Ball::new(0.15, 2, [5, 5, 7])? } else { Ball::new(0.15, 6, [11, 11, 17])? };
     let cells: usize = if quick { 4 } else { 16 };
+    let modes = if quick { 10 } else { 50 };
     let mut table = format!(
-        "Taper p = 3 with other softenings, {MODES} modes of each body: error of the force over time (largest force), \
+        "Taper p = 3 with other softenings, {modes} modes of each body: error of the force over time (largest force), \
          both of the whole model on the same mesh\n\n| softening | ball | two blocks |\n| --- | --- | --- |\n"
     );
     let scenes: [(Impact, f64); 2] = [
@@ -28,7 +26,7 @@ pub(crate) fn softenings(quick: bool) -> Table {
     for &softening in softenings {
         write!(table, "| {softening} |")?;
         for ((impact, h), whole) in scenes.iter().zip(&wholes) {
-            let course = impact.course(Kind::softened(softening).of(MODES), Step::Of(*h))?;
+            let course = impact.course(Kind::softened(softening).of(modes), Step::Of(*h))?;
             let largest = course.largest() / whole.largest();
             write!(table, " {} ({}) |", decimal(course.error(whole), 3), decimal(largest, 2))?;
         }
