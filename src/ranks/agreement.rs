@@ -71,6 +71,12 @@ impl<T: Real> Together<T> {
         self.owned(x.len()).map(products).sum()
     }
 
+    /// What this rank has of the work of a force on the way from one displacement to another.
+    pub(crate) fn part_of_work(&self, [from, to]: [&[T]; 2], force: impl Fn(usize) -> T) -> T {
+        let own = |part: Range<usize>| part.map(|dof| (to[dof] - from[dof]) * force(dof)).sum::<T>();
+        self.owned(to.len()).map(own).sum()
+    }
+
     /// Fails on all ranks if it has failed on one.
     pub(crate) fn agree<R>(&self, result: Result<R>) -> Result<R> {
         let Some(agreement) = &self.ranks else { return result };

@@ -143,11 +143,8 @@ impl<T: Real> Ledger<T> {
         }
         // The load at the end is kept in the spare vector until the step is accepted.
         system.external_load(books.t, &mut self.old_load)?;
-        let work = |force: &dyn Fn(usize) -> T| {
-            let own = |part: Range<usize>| part.map(|dof| (u[dof] - self.old_u[dof]) * force(dof)).sum::<T>();
-            self.together.owned(u.len()).map(own).sum::<T>()
-        };
-        let by_loads = work(&|dof| half * (self.load[dof] + self.old_load[dof]));
+        let way = [&self.old_u[..], u];
+        let by_loads = self.together.part_of_work(way, |dof| half * (self.load[dof] + self.old_load[dof]));
         if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
             self.friction.resize(u.len(), T::zero());
         }
@@ -160,14 +157,9 @@ impl<T: Real> Ledger<T> {
         }
         // The force in the middle of the step, by the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
-        let work = |old: &[T], new: &[T]| {
-            let own = |part: Range<usize>| {
-                part.map(|dof| (u[dof] - self.old_u[dof]) * (old[dof] + newest * (new[dof] - old[dof]))).sum::<T>()
-            };
-            match new.is_empty() {
-                true => T::zero(),
-                false => self.together.owned(u.len()).map(own).sum::<T>(),
-            }
+        let work = |old: &[T], new: &[T]| match new.is_empty() {
+            true => T::zero(),
+            false => self.together.part_of_work(way, |dof| old[dof] + newest * (new[dof] - old[dof])),
         };
         let (by_contact, by_friction) =
             (work(&self.contact, &self.next_contact), work(&self.friction, &self.next_friction));

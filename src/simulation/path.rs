@@ -4,7 +4,6 @@ use crate::error::Result;
 use crate::ranks::Together;
 use crate::real::Real;
 use crate::system::{Path, System};
-use std::ops::Range;
 
 /// How the force of a path was formed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,11 +58,7 @@ impl<T: Real> PathWork<T> {
             return Ok(());
         };
         *form = PathForm::Simpson;
-        // (What this rank has of a work.)
-        let work = |force: &[T]| {
-            let own = |part: Range<usize>| part.map(|i| force[i] * (to[i] - from[i])).sum::<T>();
-            together.owned(to.len()).map(own).sum::<T>()
-        };
+        let work = |force: &[T]| together.part_of_work([from, to], |dof| force[dof]);
         // The external part, loads and damping, is the same in all three.
         system.external_load(t, load)?;
         if let Some(damping) = system.damping_force() {
