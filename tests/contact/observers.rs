@@ -44,7 +44,7 @@ fn relative(
     (law, correction): Case,
     (motion, wall): (Motion, Wall),
 ) -> Option<Vec<Vec<f64>>> {
-    let k = matrix(3, springs(2, STIFFNESS).into_iter().chain([(2, 2, 0.0)]));
+    let k = matrix(3, springs(2, STIFFNESS).chain([(2, 2, 0.0)]));
     let load = move |t: f64, f: &mut [f64]| {
         // Twice to the wall, once off it.
         let push = if (9.0 * t).sin() > -0.5 { -6.0 } else { 9.0 };
