@@ -8,7 +8,7 @@ use super::operator::Operator;
 use super::program::CompiledStage;
 use super::results::Statistics;
 use super::stage_vectors::StageVectors;
-use super::supports::finite_supports;
+use super::supports::{Supports, finite_supports};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Gaps, rounding};
@@ -201,9 +201,16 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         constraints.finite_rates(t, &motion.u, &motion.v, &mut rows.rates)?;
         let forces = rows.curved.forces(g);
+        // Prescribed dofs are not on the interface.
+        let Supports { dofs: prescribed, state, balance, .. } = &vectors.supports;
+        let supports = if stage.balance.is_some() { balance } else { state };
+        let driven = |dof: usize| prescribed.binary_search(&dof).map_or(T::zero(), |place| supports[place][2]);
         for row in 0..constraints.len() {
             let inertia = T::of(constraints.law(row).inertia());
-            let acceleration = forces.interface_product(row, response) + rows.rates[row].acceleration;
+            let mut acceleration = forces.interface_product(row, response) + rows.rates[row].acceleration;
+            if inertia > T::zero() && !prescribed.is_empty() {
+                acceleration += forces.row(row).map(|(dof, weight)| weight * driven(dof)).sum::<T>();
+            }
             rows.balance_gap[row] += inertia * acceleration;
         }
         Ok(())

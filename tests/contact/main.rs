@@ -15,6 +15,7 @@ mod itself;
 mod laws;
 mod mortar;
 mod node_to_facet;
+mod observers;
 mod obstacles;
 mod offsets;
 mod passing_through;

@@ -150,10 +150,23 @@ fn without_history_projection_contact_is_lost_after_an_early_impact() {
     };
     let (gap, changes) = lost(0.2, PersistencyCorrection::new());
     assert!(changes >= 2 && gap > 0.0, "{gap} {changes}");
-    let opening = (0.4 - 0.6 * 0.2) * 1e-3 * 0.1;
-    assert!((gap / opening - 1.0).abs() < 0.25, "{gap:e} for {opening:e}");
     let (gap, changes) = lost(0.2, FULL);
     assert!(changes == 1 && gap.abs() < 1e-14, "{gap} {changes}");
+    // Of free masses, which no wave moves meanwhile, the opening is that to rounding.
+    for theta in [0.05, 0.2, 0.5] {
+        let (h, speed) = (1e-3, 0.1);
+        let mut run = Simulation::builder(free(&[1.0, 3.0]), Composite, h)
+            .velocity(vec![0.6 * speed, -0.4 * speed])
+            .constraint(LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], (10.0 + theta) * h * speed))
+            .corrector(PersistencyCorrection::new())
+            .build()
+            .unwrap();
+        while !run.state().contacts().closed()[0] {
+            run.step().unwrap();
+        }
+        run.step().unwrap();
+        assert_relative_eq!(run.gaps()[0], (0.4 - 0.6 * theta) * h * speed, max_relative = 1e-9);
+    }
 }
 
 #[test]
@@ -384,4 +397,30 @@ fn a_touching_row_is_not_held_back_by_an_impact_elsewhere() {
         let impulses = run.state().contacts().impulses();
         assert!(impulses[0].abs() < 1e-14 && (impulses[1] - 0.6).abs() < 1e-12, "{impulses:?}");
     }
+}
+
+#[test]
+fn a_touching_row_is_not_held_back_in_acceleration_either() {
+    // A body of two faces is pulled along by a load, and another one with it, which touches its back without pressure. A
+    // third one catches up with it on a grid point: the two that meet have one velocity, but the load pulls its body off
+    // at once, and the one behind it goes on alone. All numbers are exact in binary.
+    let (h, load) = (1.0 / 8.0, 1.0);
+    let mut run = Simulation::builder(free(&[1.0; 3]).load(move |_, f| f[1..].fill(load)), Newmark::trapezoidal(), h)
+        .velocity(vec![1.0, 0.0, 0.0])
+        .constraint(
+            LinearRows::new()
+                .unilateral(&[(0, -1.0), (2, 1.0)], 2.0 * h - 2.0 * h * h)
+                .unilateral(&[(1, -1.0), (2, 1.0)], 0.0),
+        )
+        .corrector(FULL)
+        .build()
+        .unwrap();
+    run.run_until(2.0 * h, &mut ()).unwrap();
+    let contacts = run.state().contacts();
+    assert_eq!(contacts.closed(), [true, true]);
+    assert_eq!(contacts.raw_forces(), [0.0, 0.0]);
+    // The mean of 1 and ¼.
+    assert_eq!(run.state().velocity(), [0.625, 0.25, 0.625]);
+    assert_eq!(run.state().acceleration(), [0.0, load, load]);
+    assert_eq!(contacts.forces(), [0.0, 0.0]);
 }

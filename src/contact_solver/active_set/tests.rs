@@ -69,6 +69,22 @@ fn rounding_of_a_loaded_row_does_not_exchange_rows_at_rest() {
 }
 
 #[test]
+fn what_a_loaded_row_carries_into_its_neighbor_is_no_violation() {
+    // The first multiplier is 1 up to the tolerance of its row over its W, and the second row is moved by that: it may
+    // miss zero by less without being pressed.
+    let second = |miss: f64| {
+        let (offset, sets) = ([-2.0, -1.0 - miss], [AdmissibleSet::NonNegative; 2]);
+        let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &offset, &sets, &[1e-8, 1e-13]).unwrap();
+        let mut lambda = [1.0_f64, 0.0];
+        ActiveSet::default().solve(&problem, &mut lambda).unwrap();
+        lambda[1]
+    };
+    assert!(second(4e-9) == 0.0, "{:e}", second(4e-9));
+    // What is more than that presses, by ⅔ of the miss.
+    assert!((second(1e-7) / (2.0 / 3.0 * 1e-7) - 1.0).abs() < 1e-7, "{:e}", second(1e-7));
+}
+
+#[test]
 fn redundant_rows_share_the_force() {
     let both = [AdmissibleSet::NonNegative; 2];
     let lambda = solve(&[1.0; 4], &[-1.0, -1.0], &both, &[0.0; 2]).unwrap();
