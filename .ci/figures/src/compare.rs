@@ -78,10 +78,13 @@ fn rows(at: usize, table: &Table, tag: &Printed, printed: &Table, raw: &[&str]) 
         Some(At::Rows(begin)) => row.iter().any(|cell| cell.starts_with(begin.as_str())),
         _ => true,
     };
-    let percent = tag.within.as_ref().map_or(0.0, |within| within.percent);
+    let percent = |k: usize, row: &[String]| match &tag.within {
+        Some(within) if loose[k] && is_loose_row(row) => within.percent,
+        _ => 0.0,
+    };
     let cell_equal = |k: usize, documented: &[String], printed: &[String]| {
         let (a, b) = (cell(documented, k), cell(printed, k));
-        times[k] || a == b || loose[k] && is_loose_row(documented) && are_near(a, b, percent)
+        times[k] || a == b || are_near(a, b, percent(k, documented), tag.rounding)
     };
     let equal = |documented: &[String], printed: &[String]| {
         documented.len() == printed.len() && (0..heads.len()).all(|k| cell_equal(k, documented, printed))
@@ -161,22 +164,26 @@ fn with_times(raw: &str, printed: &[String], documented: &[String], keep: impl F
     format!("|{}|", cells.collect::<Vec<_>>().join("|"))
 }
 
-/// Whether two cells have the same words, and numbers that differ by no more than some percent of the larger one.
-fn are_near(a: &str, b: &str, percent: f64) -> bool {
+/// Whether two cells have the same words, and numbers that differ by no more than some percent of the larger one, or are
+/// both rounding.
+fn are_near(a: &str, b: &str, percent: f64, rounding: f64) -> bool {
     let ((words_a, a), (words_b, b)) = (numbers(a), numbers(b));
-    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= percent / 100.0 * a.abs().max(b.abs());
+    let near = |((text_a, a), (text_b, b)): (&(&str, f64), &(&str, f64))| {
+        let larger = a.abs().max(b.abs());
+        text_a == text_b || larger < rounding || percent > 0.0 && (a - b).abs() <= percent / 100.0 * larger
+    };
     words_a == words_b && a.len() == b.len() && a.iter().zip(&b).all(near)
 }
 
-/// What is no number in a cell, and its numbers.
-fn numbers(cell: &str) -> (String, Vec<f64>) {
+/// What is no number in a cell, and its numbers, as they are written too.
+fn numbers(cell: &str) -> (String, Vec<(&str, f64)>) {
     let (mut words, mut numbers) = (String::new(), Vec::new());
     let mut rest = cell;
     while let Some(first) = rest.chars().next() {
-        let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '−');
+        let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '+' | '-' | '−');
         let end = rest.find(|c: char| !is_part(c)).unwrap_or(rest.len());
         if let Ok(number) = rest[..end].replace('−', "-").parse() {
-            numbers.push(number);
+            numbers.push((&rest[..end], number));
             words.push('#');
             rest = &rest[end..];
         } else {
@@ -239,7 +246,9 @@ mod tests {
 
     #[test]
     fn near_cells_are_told_from_others() {
-        assert!(are_near("−0.10 (2e-3)", "−0.11 (2e-3)", 10.0));
-        assert!(!are_near("0.10", "−0.10", 10.0) && !are_near("1 of 2", "1 in 2", 10.0) && !are_near("–", "1", 10.0));
+        let near = |a, b| are_near(a, b, 10.0, 1e-12);
+        assert!(near("−0.10 (2e-3)", "−0.11 (2e-3)") && near("1, 3e-15", "1, 0e0"));
+        assert!(!near("0.10", "−0.10") && !near("1 of 2", "1 in 2") && !near("–", "1") && !near("3e-12", "0e0"));
+        assert!(are_near("+2e-13", "-1e-15", 0.0, 1e-12) && !are_near("0.10", "0.1", 0.0, 1e-12));
     }
 }

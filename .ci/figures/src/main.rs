@@ -182,7 +182,7 @@ fn compare_all<'a>(command: &str, jobs: &[Job<'a>], options: &Options, tally: &m
             }
         };
         let tag = match options.exact {
-            true => Printed { within: None, ..job.tag.clone() },
+            true => Printed { within: None, rounding: 0.0, ..job.tag.clone() },
             false => job.tag.clone(),
         };
         match compare::compare(job.figure, &tag, &text, job.number) {

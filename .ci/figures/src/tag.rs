@@ -16,6 +16,8 @@
 //!   those with a cell that begins so.
 //! - `not compared: REASON`.
 //!
+//! Numbers below 1e-12 are rounding, and all alike.
+//!
 //! COLUMNS are heads in quotes, with commas between them; `"a" to "b"` are those from a to the next b. Of a fenced block
 //! `times of DATE, COMMIT: lines with "…"` are those that begin so.
 
@@ -36,6 +38,8 @@ pub struct Printed {
     /// What is not compared.
     pub times: Option<At>,
     pub within: Option<Within>,
+    /// Numbers below this size are alike.
+    pub rounding: f64,
     /// Why nothing is compared.
     pub not_compared: Option<String>,
 }
@@ -89,7 +93,7 @@ fn printed(text: &str) -> Result<Printed, String> {
         Some((command, parts)) => (command, parts),
         None => (text, ""),
     };
-    let mut tag = Printed { command: command.into(), ..Printed::default() };
+    let mut tag = Printed { command: command.into(), rounding: 1e-12, ..Printed::default() };
     for part in parts.split("; ").filter(|part| !part.is_empty()) {
         if part.starts_with("output/") || part.starts_with("docs/measured/") {
             tag.file = Some(part.into());
@@ -158,6 +162,7 @@ mod tests {
             some_rows: true,
             times: Some(At::Columns(times.clone())),
             within: Some(Within { percent: 5.0, at: At::Rows("raw".into()) }),
+            rounding: 1e-12,
             not_compared: None,
         };
         assert_eq!(of_line(line), Some(Ok(Tag::Printed(tag))));
