@@ -89,6 +89,12 @@ fn rows(at: usize, table: &Table, tag: &Printed, printed: &Table, raw: &[&str]) 
     let equal = |documented: &[String], printed: &[String]| {
         documented.len() == printed.len() && (0..heads.len()).all(|k| cell_equal(k, documented, printed))
     };
+    // A printed row, with the times of the documented row of its names, which should be the one with this number.
+    let right = |k: usize, j: usize| {
+        let row = &printed.rows[j];
+        let same = table.rows.iter().skip(k).take(1).chain(&table.rows).find(|other| names(other) == names(row));
+        same.map_or(raw[j].to_string(), |documented| with_times(raw[j], row, documented, |k| times[k]))
+    };
     let mut found = Found { at, length: table.rows.len(), ..Found::default() };
     let mut free: Vec<usize> = (0..printed.rows.len()).collect();
     for (k, documented) in table.rows.iter().enumerate() {
@@ -102,8 +108,7 @@ fn rows(at: usize, table: &Table, tag: &Printed, printed: &Table, raw: &[&str]) 
                 found.right.push(with_times(raw[j], &printed.rows[j], documented, |_| true));
             }
             Some(j) => {
-                let same_row = names(documented) == names(&printed.rows[j]);
-                found.right.push(with_times(raw[j], &printed.rows[j], documented, |k| same_row && times[k]));
+                found.right.push(right(k, j));
                 let columns = (0..heads.len()).filter(|&k| !cell_equal(k, documented, &printed.rows[j]));
                 let columns: Vec<_> = columns.map(|k| heads[k].as_str()).collect();
                 let message = format!(
@@ -121,8 +126,8 @@ fn rows(at: usize, table: &Table, tag: &Printed, printed: &Table, raw: &[&str]) 
         }
     }
     if !tag.some_rows {
-        for raw in raw.iter().skip(table.rows.len()) {
-            found.right.push(raw.to_string());
+        for (j, raw) in raw.iter().enumerate().skip(table.rows.len()) {
+            found.right.push(right(j, j));
             found.differences.push((at + table.rows.len(), format!(" a row is missing:\n  printed    {raw}")));
         }
     }
@@ -222,6 +227,11 @@ mod tests {
         assert_eq!(differences(times, &format!("{all}| w | 1 | 1 |\n")).0, [6]);
         let (lines, right) = differences("(some rows; times of 2026-01-01, ab: \"time\")", two);
         assert_eq!((lines, &right[1][..]), (vec![4], "| z | 3 | 9 |"));
+        // A row that is new leaves the others their times.
+        assert_eq!(
+            differences(times, "| x | 1 | 7 |\n| z | 3 | 9 |\n").1,
+            ["| x | 1 |    7 |", "| y | 2 |  4.0 |", "| z | 3 | 9 |"]
+        );
         // Printed widths, documented times.
         assert_eq!(differences(times, "| x | 5 | 7 |\n| y | 2 | 8 |\n| z | 3 | 9 |\n").1[0], "| x | 1 |    7 |");
         let within = "(some rows; within 60 %, why: rows with \"z\"; times of 2026-01-01, ab: \"time\")";

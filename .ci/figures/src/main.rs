@@ -123,6 +123,13 @@ fn run() -> Result<bool, String> {
             }
         }
     }
+    let known = |test: &dyn Fn(&str) -> bool| jobs.iter().any(|(command, _)| test(command));
+    if let Some(unknown) = options.names.iter().find(|name| !known(&|command| command.contains(name.as_str()))) {
+        return Err(format!("no command of a tag has {unknown} in it"));
+    }
+    if let Some(unknown) = options.only.iter().find(|only| !known(&|command| command == *only)) {
+        return Err(format!("no tag has the command {unknown}"));
+    }
     let mut right = BTreeMap::<&str, Vec<Found>>::new();
     for (command, jobs) in &jobs {
         if !options.select(command) {
