@@ -1,13 +1,13 @@
 //! Compares the tables of the documents with what their commands print, in the root of the repository:
 //!
 //! ```text
-//! figures [--write] [--exact] [--kept] [--profile PROFILE] [--only COMMAND]… [NAME]…
+//! figures [--write] [--times] [--exact] [--kept] [--profile PROFILE] [--only COMMAND]… [NAME]…
 //! ```
 //!
 //! Commands are run that have a NAME in them, or are one of those behind `--only`; without either all. `--kept` compares
 //! with what the last run has printed, and runs nothing; `--profile` builds by another profile than `--release`. `--exact`
 //! allows no figure to differ, whatever its tag says. `--write` puts printed rows into the documents; columns of times
-//! stay. Tags are in `tag.rs`. Ends with a failure if a figure differs, or a table of figures has no tag.
+//! stay, but with `--times` as well, which renews day and commit in their tags. Tags are in `tag.rs`. Ends with a failure if a figure differs, or a table of figures has no tag.
 
 mod compare;
 mod page;
@@ -24,11 +24,12 @@ use tag::{At, Columns, Printed, Tag};
 
 const FOLDER: &str = "target/figures";
 
+const FLAGS: [&str; 4] = ["--write", "--times", "--exact", "--kept"];
+
 #[derive(Default)]
 struct Options {
-    write: bool,
-    exact: bool,
-    kept: bool,
+    /// Those of `FLAGS` that are given.
+    flags: Vec<String>,
     profile: Option<String>,
     only: Vec<String>,
     names: Vec<String>,
@@ -39,16 +40,18 @@ impl Options {
         let (mut options, mut arguments) = (Self::default(), std::env::args().skip(1));
         while let Some(argument) = arguments.next() {
             match argument.as_str() {
-                "--write" => options.write = true,
-                "--exact" => options.exact = true,
+                flag if FLAGS.contains(&flag) => options.flags.push(argument),
                 "--profile" => options.profile = Some(arguments.next().ok_or("--profile needs a name")?),
-                "--kept" => options.kept = true,
                 "--only" => options.only.push(arguments.next().ok_or("--only needs a command")?),
                 unknown if unknown.starts_with('-') => return Err(format!("unknown option {unknown}")),
                 _ => options.names.push(argument),
             }
         }
         Ok(options)
+    }
+
+    fn has(&self, flag: &str) -> bool {
+        self.flags.iter().any(|given| given == flag)
     }
 
     fn select(&self, command: &str) -> bool {
@@ -140,7 +143,7 @@ fn run() -> Result<bool, String> {
             right.entry(document).or_default().push(found);
         }
     }
-    if options.write {
+    if options.has("--write") {
         for (document, found) in right {
             write(document, found)?;
         }
@@ -160,7 +163,7 @@ fn compare_all<'a>(command: &str, jobs: &[Job<'a>], options: &Options, tally: &m
         let place = format!("{}:{}", job.document, job.figure.line + 1);
         let reason = match (&job.tag.not_compared, &job.tag.times) {
             (Some(reason), _) => Some(reason.as_str()),
-            (None, Some(At::Columns(Columns::All))) => Some("times"),
+            (None, Some(At::Columns(Columns::All))) if !options.has("--times") => Some("times"),
             _ => None,
         };
         if let Some(reason) = reason {
@@ -188,10 +191,13 @@ fn compare_all<'a>(command: &str, jobs: &[Job<'a>], options: &Options, tally: &m
                 continue;
             }
         };
-        let tag = match options.exact {
-            true => Printed { within: None, rounding: 0.0, ..job.tag.clone() },
-            false => job.tag.clone(),
-        };
+        let mut tag = job.tag.clone();
+        if options.has("--exact") {
+            (tag.within, tag.rounding) = (None, 0.0);
+        }
+        if options.has("--times") && tag.times.take().is_some() {
+            different.extend(renewed(job).map(|found| (job.document, found)));
+        }
         match compare::compare(job.figure, &tag, &text, job.number) {
             Ok(found) if found.differences.is_empty() => tally.equal += 1,
             Ok(found) => {
@@ -208,6 +214,16 @@ fn compare_all<'a>(command: &str, jobs: &[Job<'a>], options: &Options, tally: &m
         }
     }
     different
+}
+
+/// The tag of a figure, with the day and the commit of a run of today.
+fn renewed(job: &Job) -> Option<Found> {
+    let (at, _) = *job.figure.tag.as_ref()?;
+    let text = read(Path::new(job.document)).ok()?;
+    let print = |command: &str| Command::new("bash").args(["-c", command]).output().ok().map(|output| output.stdout);
+    let run = print("echo $(date -u +%F), $(git rev-parse --short=7 HEAD)")?;
+    let line = text.lines().nth(at)?.replace(&job.tag.run, String::from_utf8_lossy(&run).trim());
+    Some(Found { right: vec![line], at, length: 1, ..Found::default() })
 }
 
 /// How many of these have the command, file and heads of a figure.
@@ -235,7 +251,7 @@ fn output(command: &str, options: &Options) -> Result<String, String> {
         Some(name) => text.replace(&*folder.to_string_lossy(), &format!("output/{name}")),
         None => text,
     };
-    if options.kept {
+    if options.has("--kept") {
         return read(&file).map(as_usual);
     }
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;

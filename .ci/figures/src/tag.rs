@@ -11,7 +11,8 @@
 //! - `output/…`: a file that the command writes has the table, not the screen. `docs/measured/…`: a file of the
 //!   repository has it, which `benches/measure` writes, so that nothing is run.
 //! - `some rows`: the document leaves out rows of what is printed, or has them in another order.
-//! - `times of DATE, COMMIT: COLUMNS`: these are not compared, with the run that they are from; without COLUMNS nothing is.
+//! - `times of DATE, COMMIT: COLUMNS`: these are not compared, with day and commit of the run, or the commit that
+//!   brought its rows; without COLUMNS nothing is.
 //! - `within N %, REASON: COLUMNS`: figures of these may differ by so much; `rows with "…"` instead of columns are
 //!   those with a cell that begins so.
 //! - `not compared: REASON`.
@@ -35,8 +36,9 @@ pub struct Printed {
     /// Where the table is, if not on the screen.
     pub file: Option<String>,
     pub some_rows: bool,
-    /// What is not compared.
+    /// What is not compared, and the run that it is from: day and commit.
     pub times: Option<At>,
+    pub run: String,
     pub within: Option<Within>,
     /// Numbers below this size are alike.
     pub rounding: f64,
@@ -105,6 +107,7 @@ fn printed(text: &str) -> Result<Printed, String> {
             if date.len() != 10 || !date.starts_with("20") || !commit.chars().all(|c| c.is_ascii_hexdigit()) {
                 return Err(format!("no date and commit: {run}"));
             }
+            tag.run = run.into();
             tag.times = Some(if what.is_empty() { At::Columns(Columns::All) } else { at(what)? });
         } else if let Some(rest) = part.strip_prefix("within ") {
             let (percent, rest) = rest.split_once(" %, ").ok_or("within how much, and why?")?;
@@ -161,6 +164,7 @@ mod tests {
             file: Some("output/a.md".into()),
             some_rows: true,
             times: Some(At::Columns(times.clone())),
+            run: "2026-01-02, ab12".into(),
             within: Some(Within { percent: 5.0, at: At::Rows("raw".into()) }),
             rounding: 1e-12,
             not_compared: None,
