@@ -169,8 +169,8 @@ fn with_times(raw: &str, printed: &[String], documented: &[String], keep: impl F
     format!("|{}|", cells.collect::<Vec<_>>().join("|"))
 }
 
-/// Whether two cells have the same words, and numbers that differ by no more than some percent of the larger one, or are
-/// both rounding.
+/// Whether two cells have the same words, and numbers that differ by no more than some percent of the larger one, or
+/// are both rounding.
 fn are_near(a: &str, b: &str, percent: f64, rounding: f64) -> bool {
     let ((words_a, a), (words_b, b)) = (numbers(a), numbers(b));
     let near = |((text_a, a), (text_b, b)): (&(&str, f64), &(&str, f64))| {

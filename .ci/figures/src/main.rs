@@ -4,10 +4,11 @@
 //! figures [--write] [--times] [--exact] [--kept] [--profile PROFILE] [--only COMMAND]… [NAME]…
 //! ```
 //!
-//! Commands are run that have a NAME in them, or are one of those behind `--only`; without either all. `--kept` compares
-//! with what the last run has printed, and runs nothing; `--profile` builds by another profile than `--release`. `--exact`
-//! allows no figure to differ, whatever its tag says. `--write` puts printed rows into the documents; columns of times
-//! stay, but with `--times` as well, which renews day and commit in their tags. Tags are in `tag.rs`. Ends with a failure if a figure differs, or a table of figures has no tag.
+//! Commands are run that have a NAME in them, or are one of those behind `--only`; without either all. `--kept`
+//! compares with what the last run has printed, and runs nothing; `--profile` builds by another profile than
+//! `--release`. `--exact` allows no figure to differ, whatever its tag says. `--write` puts printed rows into the
+//! documents; columns of times stay, but with `--times` as well, which renews day and commit in their tags. Tags are in
+//! `tag.rs`. Ends with a failure if a figure differs, or a table of figures has no tag.
 
 mod compare;
 mod page;

@@ -19,8 +19,8 @@
 //!
 //! Numbers below 1e-12 are rounding, and all alike.
 //!
-//! COLUMNS are heads in quotes, with commas between them; `"a" to "b"` are those from a to the next b. Of a fenced block
-//! `times of DATE, COMMIT: lines with "…"` are those that begin so.
+//! COLUMNS are heads in quotes, with commas between them; `"a" to "b"` are those from a to the next b. Of a fenced
+//! block `times of DATE, COMMIT: lines with "…"` are those that begin so.
 
 /// What stands between a tag's brackets.
 #[derive(Clone, Debug, PartialEq)]
