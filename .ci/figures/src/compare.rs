@@ -18,13 +18,7 @@ pub struct Found {
 /// those with its heads. An error says that there is nothing to compare it with.
 pub fn compare(figure: &Figure, tag: &Printed, printed: &str, number: usize) -> Result<Found, String> {
     match &figure.content {
-        Content::Fence(lines) => {
-            let begin = match &tag.times {
-                Some(At::Rows(begin)) => Some(begin.as_str()),
-                _ => None,
-            };
-            fence(figure.line, lines, begin, printed)
-        }
+        Content::Fence(lines) => fence(figure.line, lines, tag, printed),
         Content::Table(table) => {
             let tables = page::tables(printed);
             let same = tables.iter().filter(|(_, found)| found.heads == table.heads).nth(number);
@@ -39,11 +33,11 @@ pub fn compare(figure: &Figure, tag: &Printed, printed: &str, number: usize) -> 
     }
 }
 
-/// The lines as they follow one another in what is printed; those that begin with some words are not compared.
-fn fence(at: usize, lines: &[String], times: Option<&str>, printed: &str) -> Result<Found, String> {
+/// The lines as they follow one another in what is printed; times are lines that begin with some words.
+fn fence(at: usize, lines: &[String], tag: &Printed, printed: &str) -> Result<Found, String> {
     let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
-    let is_time = |line: &str| times.is_some_and(|begin| line.starts_with(begin));
-    let same = |a: &str, b: &str| a == b || is_time(a) && is_time(b);
+    let is_time = |line: &str| matches!(&tag.times, Some(At::Rows(begin)) if line.starts_with(begin));
+    let same = |a: &str, b: &str| is_time(a) && is_time(b) || are_near(a, b, 0.0, tag.rounding);
     // Where most lines are the same, the earlier ones first.
     let is_same = |from: usize, k: usize| printed.get(from + k).is_some_and(|line| same(line, &lines[k]));
     let count = |from: usize| (0..lines.len()).filter(|&k| is_same(from, k)).count();
