@@ -63,20 +63,22 @@ fn energy(point: &Point) -> f64 {
 }
 
 impl Results {
-    /// Work to reach errors, over that of the reference row for the first of them.
+    /// Work to reach errors, over that of the reference row for the first of them. `benches/measure` fills in the date
+    /// and the commit of its tag.
     pub(crate) fn table(&self, rows: &[Row]) -> String {
         let Targets { forces, rms, energies } = self.targets;
         let [coarse, middle, fine] = forces.map(percent);
         let [loss, less] = energies.map(percent);
+        let within = percent(rms);
         let mut table = format!(
             "### ({}) {}\n\n\
-             <!-- printed by: cargo run --release --example work_precision_contact -->\n\
+             <!-- printed by: cargo run --release --example work_precision_contact (times of DATE, COMMIT: \
+             \"force {coarse} %\" to \"Co\", \"RMS {within} %\" to \"{less} %\") -->\n\
              | integrator | correction | mass | force {coarse} % | {middle} % | {fine} % | Co | \
-             solves · dofs {coarse} % | {middle} % | {fine} % | least % | RMS {} % | energy {loss} % | {less} % |\n\
+             solves · dofs {coarse} % | {middle} % | {fine} % | least % | RMS {within} % | energy {loss} % | {less} % |\n\
              |{}\n",
             self.letter,
             self.title,
-            percent(rms),
             " --- |".repeat(14)
         );
         let at = |row: usize, target: f64, work: Of<'_>, error: Of<'_>| {
