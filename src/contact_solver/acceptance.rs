@@ -112,7 +112,7 @@ impl<T: Real> Settings<T> {
         let alone = |i: usize| problem.offset[i].abs() / problem.delassus(i, i).sqrt();
         let coupled = (0..problem.size()).filter(|&i| problem.delassus(i, i) > T::zero());
         let reach = coupled.map(alone).fold(T::zero(), T::max);
-        let accepted = self.tolerance * scale;
+        let accepted = (self.tolerance * scale).max(nothing());
         let at_rest = |(&q, &set): (&T, &AdmissibleSet)| {
             if set == AdmissibleSet::Free { q == T::zero() } else { q >= T::zero() }
         };
@@ -129,6 +129,11 @@ impl<T: Real> Settings<T> {
         let share = T::epsilon().powf(T::of(0.4));
         Ok(Acceptance { problem, accepted, reach: share * reach, largest: share * T::of(32.0) * scale, suspect: 0 })
     }
+}
+
+/// Violations so small have lost their digits: motions that have died out leave nothing to be solved.
+pub(super) fn nothing<T: Real>() -> T {
+    T::min_positive_value() / T::epsilon()
 }
 
 /// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given

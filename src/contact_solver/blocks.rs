@@ -1,5 +1,6 @@
 //! Problems with cones, block by block: when they count as solved, sweeps until they are, and why they are not.
 
+use super::acceptance::nothing;
 use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::real::Real;
@@ -40,7 +41,8 @@ impl<T: Real> BlockAcceptance<T> {
     /// The rule for a problem, whose rest is known to be sound.
     pub(super) fn of(problem: &ContactProblem<'_, T>, tolerance: T) -> Self {
         let scale = T::largest(problem.offset);
-        Self { accepted: tolerance * scale, largest: T::epsilon().powf(T::of(0.4)) * T::of(32.0) * scale }
+        let accepted = (tolerance * scale).max(nothing());
+        Self { accepted, largest: T::epsilon().powf(T::of(0.4)) * T::of(32.0) * scale }
     }
 
     /// Whether every block is solved.

@@ -382,7 +382,9 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
     }
     // Scaled by a power of two, which rounds nothing: squares of small forces stay in range.
     #[allow(clippy::cast_possible_truncation)]
-    let exponent = (largest.value().log2().floor() as i32).max(-1000);
+    let least = T::min_positive_value().value().log2() as i32 + 8;
+    #[allow(clippy::cast_possible_truncation)]
+    let exponent = (largest.value().log2().floor() as i32).max(least);
     let (down, up) = (T::of(2.0_f64.powi(-exponent)), T::of(2.0_f64.powi(exponent)));
     for r in r.iter_mut() {
         *r *= down;
@@ -409,7 +411,9 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
         product::<T, B>(lower, p, q);
         let shares = p.iter().zip(q.iter()).map(|(&p, &q)| (p * q).value());
         let worst = shares.enumerate().fold((0, f64::INFINITY), |w, (i, x)| if x < w.1 { (i, x) } else { w });
-        return Outcome::Indefinite { curvature: dot(p, q) / dot(p, p), dof: worst.0 };
+        let curvature = dot(p, q) / dot(p, p);
+        // (A solution beyond all numbers is one of a singular matrix.)
+        return Outcome::Indefinite { curvature: if curvature.is_nan() { 0.0 } else { curvature }, dof: worst.0 };
     }
     for ((b, x), inverse) in b.chunks_exact_mut(B).zip(x.chunks_exact(B)).zip(scaling.chunks_exact(B * B)) {
         b.copy_from_slice(&lower_transposed::<T, B>(inverse, node(x, 0)).map(|x| up * x));

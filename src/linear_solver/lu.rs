@@ -154,11 +154,15 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
 /// The most passes that scale the matrix; each halves the logarithms of rows and columns out of scale.
 const PASSES: usize = 6;
 
+/// The exponent of the largest power of two that is not above a positive x.
+fn binary_exponent<T: Real>(x: T) -> i32 {
+    let (mantissa, exponent, _) = x.integer_decode();
+    i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed()
+}
+
 /// The power of two next to 1/√x for a positive x; one for x within a factor of four of one.
 fn reciprocal_root<T: Real>(x: T) -> T {
-    let (mantissa, exponent, _) = x.integer_decode();
-    let exponent = i32::from(exponent) + mantissa.checked_ilog2().unwrap_or(0).cast_signed();
-    T::of(2.0).powi(-(exponent / 2))
+    T::of(2.0).powi(-(binary_exponent(x) / 2))
 }
 
 /// A pseudo-random number between −1 and 1, at least ½ in size.
@@ -206,8 +210,11 @@ impl<T: Real> Factor<T> {
     /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds
     /// units that belong to dofs.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
-        self.scaled.copy_from_slice(a.val());
-        self.rows.fill(T::one());
+        // Largest entries of about one first: what follows does not see the unit of the matrix.
+        let size = a.val()[largest(a.val())].abs();
+        let unit = if size > T::zero() { T::of(2.0).powi(-binary_exponent(size)) } else { T::one() };
+        T::scale_into(unit, a.val(), &mut self.scaled);
+        self.rows.fill(unit);
         self.columns.fill(T::one());
         for _ in 0..PASSES {
             if self.balance()? {

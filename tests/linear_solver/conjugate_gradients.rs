@@ -210,6 +210,26 @@ fn units_do_not_matter() {
 }
 
 #[test]
+fn forces_that_are_hardly_numbers_have_solutions() {
+    let a = matrix::<f32>(50, chain(50, 0.1));
+    for preconditioner in ALL {
+        let mut factor = factorized(&ConjugateGradients::default().preconditioner(preconditioner), &a);
+        let mut natural = rhs::<f32>(50);
+        factor.solve(&mut natural).unwrap();
+        for exponent in [-60, -110, -130] {
+            let unit = 2.0_f32.powi(exponent / 2);
+            let mut small: Vec<f32> = rhs::<f32>(50).iter().map(|x| x * unit * unit).collect();
+            factor.solve(&mut small).unwrap();
+            // (Below 2⁻¹²⁶ numbers lose their digits.)
+            let most = 1e-4 + 2.0_f32.powi(-149 - exponent) * 50.0;
+            let worst = small.iter().zip(&natural).map(|(x, y)| (x / unit / unit - y).abs()).fold(0.0, f32::max);
+            let size = natural.iter().fold(0.0_f32, |size, x| size.max(x.abs()));
+            assert!(worst < most * size, "2^{exponent}: {worst:e} of {size:e}");
+        }
+    }
+}
+
+#[test]
 fn zero_and_nan_come_back_as_they_are() {
     let a = matrix::<f64>(50, chain(50, 0.1));
     for preconditioner in ALL {

@@ -200,6 +200,28 @@ fn units_do_not_matter() {
     }
 }
 
+#[test]
+fn the_unit_of_a_matrix_changes_no_bit_of_a_solution() {
+    let mut random = Congruential(9);
+    for n in [4, 60] {
+        let entries = strewn(n, 3, 3.0, &mut random);
+        let b = random.vector(n, 1.0);
+        let solution = |exponent: i32| -> Vec<f64> {
+            let unit = 2.0_f64.powi(exponent);
+            let a = matrix::<f64>(n, entries.iter().map(|&(i, j, x)| (i, j, unit * x)));
+            let mut factor = Lu.analyze(a.symbolic(), &[]).unwrap();
+            factor.factorize(a.as_ref()).unwrap();
+            let mut x = b.clone();
+            factor.solve(&mut x).unwrap();
+            x.iter().map(|x| x * unit).collect()
+        };
+        let natural = solution(0);
+        for exponent in [1, -1, 20, -33, 300] {
+            assert_eq!(solution(exponent), natural, "2^{exponent}");
+        }
+    }
+}
+
 fn chain(n: usize, stiffness: impl Fn(usize) -> f64) -> Entries {
     let spring = |i: usize| {
         let k = stiffness(i);

@@ -3,17 +3,18 @@
 
 use contact_dynamics::analysis;
 use contact_dynamics::contact::{ContactJacobian, ContactLaw, Cylinder, Obstacle, Side, Sphere};
+use contact_dynamics::contact_solver::{ContactSolver, GaussSeidel, Lemke, Pivoting};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::traits::ComplexField;
 use contact_dynamics::integrator::Newmark;
 use contact_dynamics::partitioned::Frame;
 use contact_dynamics::tableau::{Stage, Tableau, U, Z};
 use contact_dynamics::{
-    Automatic, Bathe, ByBody, Cholesky, Composite, ConjugateGradients, Diagonal, Error, JumpProjection, LinearRows,
-    LinearSolver, LinearSystem, Lu, Mass, Newton, Park, PersistencyCorrection, Real, Result, Simulation, StartUp,
-    TimeIntegrator, Tridiagonal,
+    ActiveSet, Automatic, Bathe, Bdf2, ByBody, Cholesky, Composite, ConjugateGradients, Diagonal, Error,
+    JumpProjection, LinearRows, LinearSolver, LinearSystem, Lu, Mass, Newton, Park, PersistencyCorrection, Real,
+    Result, Simulation, StartUp, TimeIntegrator, Tridiagonal,
 };
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{free, matrix};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -273,6 +274,37 @@ fn after_a_panic_of_the_host_everything_is_refused_and_nothing_is_lost() {
                 reference.step().unwrap();
             }
             assert_eq!(again.state(), reference.state());
+        }
+    }
+}
+
+#[test]
+fn motion_that_dies_out_leaves_nothing_to_be_solved() {
+    let solvers: [fn() -> Box<dyn ContactSolver<f64>>; 4] = [
+        || Box::new(ActiveSet::default()),
+        || Box::new(Pivoting::default()),
+        || Box::new(Lemke::default()),
+        || Box::new(GaussSeidel::default()),
+    ];
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+        [|| Box::new(Newmark::trapezoidal()), || Box::new(Bathe::default()), || Box::new(Bdf2)];
+    for solver in solvers {
+        for scheme in schemes {
+            // One mass is held, the other flies on: what rounding has left of the first one's motion decays below all
+            // numbers.
+            let rows = LinearRows::new().equality(&[(1, -1.0)], 0.0).unilateral(&[(2, 1.0)], 0.0);
+            let mut run = Simulation::builder(free(&[1.0, 0.51, 0.7]), scheme(), 3.09)
+                .velocity(vec![-1.97e-6; 3])
+                .constraint(rows)
+                .corrector(PersistencyCorrection::with_history_projection())
+                .contact_solver(solver())
+                .build()
+                .unwrap();
+            for _ in 0..600 {
+                run.step().unwrap();
+            }
+            let v = run.state().velocity();
+            assert!((v[0] / -1.97e-6 - 1.0).abs() < 1e-12 && v[1].abs() < 1e-18 && v[2].abs() < 1e-18, "{v:?}");
         }
     }
 }

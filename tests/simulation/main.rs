@@ -12,6 +12,7 @@ mod messages;
 mod newton;
 mod properties;
 mod quiet_input;
+mod random_scenes;
 mod stability;
 mod start;
 mod step_control;

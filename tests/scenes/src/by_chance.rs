@@ -9,7 +9,7 @@ mod watch;
 pub use meeting::{Meeting, meetings};
 
 use crate::random::Congruential;
-use bodies::{decades, pick};
+pub(crate) use bodies::{decades, pick};
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, Composite, Error, GeneralizedAlpha, MoreauJean, Newmark, NohBathe, PersistencyCorrection,
     Result, Simulation, StepControl, TimeIntegrator,

@@ -4,7 +4,7 @@ use crate::masses::{Body, MassMatrix, Treatment};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
-use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Result, TimeIntegrator, mass};
+use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Real, Result, TimeIntegrator, mass};
 
 /// Makes an integrator.
 pub type Make = fn() -> Result<Box<dyn TimeIntegrator>>;
@@ -57,7 +57,7 @@ impl Correction {
     }
 
     /// The correctors; `transit` is the time of a wave through a contact element.
-    pub fn correctors(self, transit: f64) -> Result<Vec<Box<dyn Corrector<f64>>>> {
+    pub fn correctors<T: Real>(self, transit: f64) -> Result<Vec<Box<dyn Corrector<T>>>> {
         let history = || Box::new(PersistencyCorrection::with_history_projection());
         Ok(match self {
             Self::None => Vec::new(),

@@ -32,6 +32,7 @@ pub mod plot;
 pub mod pounding;
 pub mod propagated;
 pub mod random;
+pub mod random_scenes;
 pub mod ranks;
 pub mod reduced;
 pub mod schemes;

@@ -6,14 +6,14 @@ use contact_dynamics::contact::{Facet, Surface};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// One of some choices.
-pub(super) fn pick<T: Copy>(choices: &[T], random: &mut Congruential) -> T {
+pub(crate) fn pick<T: Copy>(choices: &[T], random: &mut Congruential) -> T {
     let place = random.unit() * choices.len() as f64;
     let index = (1..choices.len()).take_while(|&next| place >= next as f64).count();
     choices[index]
 }
 
 /// A power of ten whose exponent is drawn.
-pub(super) fn decades(low: f64, high: f64, random: &mut Congruential) -> f64 {
+pub(crate) fn decades(low: f64, high: f64, random: &mut Congruential) -> f64 {
     10.0_f64.powf(random.within(low, high))
 }
 

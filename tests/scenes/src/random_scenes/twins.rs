@@ -1,0 +1,283 @@
+//! The second run of a scene, and how it must agree with the first.
+
+use super::recipe::{Precision, Recipe, Twin};
+use super::run::{Finding, Run, Verdict, named};
+use crate::random::Congruential;
+use crate::schemes;
+use contact_dynamics::{Error, Real, State};
+
+/// What is compared of a state, in natural units.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trace {
+    /// u, v, a, by dof; reported forces and raw ones, by row.
+    lists: [Vec<f64>; 5],
+}
+
+const NAMES: [&str; 5] = ["u", "v", "a", "forces", "raw forces"];
+
+impl Trace {
+    pub(super) fn of<T: Real>(recipe: &Recipe, state: &State<T>) -> Self {
+        let [length, mass, time] = recipe.units;
+        let contacts = state.contacts();
+        let force = mass * length / (time * time);
+        let list = |x: &[T], unit: f64| x.iter().map(|x| x.value() / unit).collect::<Vec<_>>();
+        Self {
+            lists: [
+                list(state.displacement(), length),
+                list(state.velocity(), length / time),
+                list(state.acceleration(), length / (time * time)),
+                list(contacts.forces(), force),
+                list(contacts.raw_forces(), force),
+            ],
+        }
+    }
+
+    fn is_same(&self, other: &Self, least: f64) -> bool {
+        // (Zeros have no sign here, and what is subnormal has lost its digits.)
+        let same = |x: &f64, y: &f64| x == y || x.abs().max(y.abs()) < least;
+        self.lists.iter().flatten().zip(other.lists.iter().flatten()).all(|(x, y)| same(x, y))
+    }
+
+    /// Forces as they act on dofs: those of rows that follow from others are not unique. Accelerations of schemes that
+    /// impose contact on velocities are left out: behind an impact rounding decides whether a contact counts as closed,
+    /// and they with it.
+    fn on_dofs(mut self, recipe: &Recipe) -> Self {
+        if !schemes::all()[recipe.scheme].takes_corrections() {
+            self.lists[2].fill(0.0);
+        }
+        for list in &mut self.lists[3..] {
+            let mut on_dofs = vec![0.0; recipe.dofs()];
+            for (row, force) in recipe.rows.iter().zip(&*list) {
+                row.terms.iter().for_each(|&(dof, x)| on_dofs[dof] += x * force);
+            }
+            *list = on_dofs;
+        }
+        self
+    }
+
+    /// Back to the places of the first run.
+    fn replaced(&self, dofs: &[usize], rows: &[usize]) -> Self {
+        let by_dof = |x: &[f64]| dofs.iter().map(|&dof| x[dof]).collect::<Vec<_>>();
+        let by_row = |x: &[f64]| {
+            let mut y = vec![0.0; x.len()];
+            x.iter().zip(rows).for_each(|(x, &row)| y[row] = *x);
+            y
+        };
+        let [u, v, a, forces, raw] = &self.lists;
+        Self { lists: [by_dof(u), by_dof(v), by_dof(a), by_row(forces), by_row(raw)] }
+    }
+}
+
+/// The largest of each list so far, in all steps, or what the others make of it in a step: what differences are
+/// measured by.
+#[derive(Default)]
+struct Scales([f64; 5]);
+
+impl Scales {
+    fn see(&mut self, recipe: &Recipe, trace: &Trace) {
+        for (scale, list) in self.0.iter_mut().zip(&trace.lists) {
+            *scale = list.iter().fold(*scale, |most, x| most.max(x.abs()));
+        }
+        let h = recipe.h;
+        let lightest = recipe.mass.iter().filter(|m| **m > 0.0).fold(f64::INFINITY, |least, m| m.min(least));
+        let [u, v, a, forces, raw] = self.0;
+        let forces = forces.max(raw);
+        let a = a.max(forces / lightest).max(v / h);
+        let v = v.max(h * a);
+        self.0 = [u.max(h * v), v, a, forces, forces];
+    }
+
+    /// The largest difference, and of what.
+    fn difference(&self, one: &Trace, other: &Trace) -> (f64, &'static str) {
+        let mut worst = (0.0, "");
+        for (((x, y), scale), name) in one.lists.iter().zip(&other.lists).zip(self.0).zip(NAMES) {
+            let largest = x.iter().zip(y).fold(0.0_f64, |most, (x, y)| most.max((x - y).abs()));
+            let share = if scale > 0.0 { largest / scale } else { 0.0 };
+            if share > worst.0 {
+                worst = (share, name);
+            }
+        }
+        worst
+    }
+}
+
+/// Runs the twin, and compares it with the states of the first run.
+pub(super) fn compare<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Option<Finding> {
+    if recipe.is_exact() { exact::<T>(recipe, first, verdict) } else { close::<T>(recipe, first, verdict) }
+}
+
+/// The same bits, and the same error where the first run ended.
+fn exact<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Option<Finding> {
+    let mut other = recipe.clone();
+    if let Twin::PowersOfTwo(exponents) = recipe.twin {
+        for (unit, exponent) in other.units.iter_mut().zip(exponents) {
+            *unit *= 2.0_f64.powi(exponent);
+        }
+    }
+    let find = |what: &'static str, step: usize, words: String| Some(Finding { what, step, words });
+    let what = match recipe.twin {
+        Twin::Repeated => "a repeated run differs",
+        Twin::Resumed => "a resumed run differs",
+        _ => "units of powers of two change bits",
+    };
+    let mut run = match (Run::<T>::new(&other), verdict.built) {
+        (Ok(run), true) => run,
+        (Ok(_), false) => return find(what, 0, "the first was refused, the second not".into()),
+        (Err(_), false) => return None,
+        (Err(error), true) => return find(what, 0, format!("the second is refused: {error}")),
+    };
+    for (step, trace) in first.iter().enumerate() {
+        if step > 0
+            && let Err(error) = run.advance()
+        {
+            return find(what, step, format!("the second is refused: {error}"));
+        }
+        let of_second = Trace::of(&other, run.run.state());
+        if !trace.is_same(&of_second, T::min_positive_value().value().sqrt() * 1e14) {
+            let mut scales = Scales::default();
+            scales.see(recipe, trace);
+            let (size, name) = scales.difference(trace, &of_second);
+            return find(what, step, format!("{name} by {size:e}"));
+        }
+        if recipe.twin == Twin::Resumed && 2 * step + 1 >= first.len() && 2 * step < first.len() + 1 {
+            run = match run.resumed() {
+                Ok(run) => run,
+                // (By now it may have grown too stiff for explicit steps.)
+                Err(Error::BeyondStability { .. }) => return None,
+                Err(error) => return find(what, step, format!("it is refused: {error}")),
+            };
+        }
+        verdict.compared += 1;
+    }
+    if let Some((before, _)) = verdict.refused.as_ref().filter(|_| first.len() <= recipe.steps) {
+        let name = run.advance().map_or_else(|error| named(&error).0, |()| "no error".into());
+        if name != *before {
+            return find(what, first.len(), format!("{before} before, now {name}"));
+        }
+    }
+    None
+}
+
+/// Differences grow no faster than those that roundings of the data make; where these are large, rounding decides.
+fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Option<Finding> {
+    let eps = T::epsilon().value();
+    let other = Written::new(recipe);
+    let runs = (Run::<T>::new(&other.recipe), Run::<T>::new(&other.rounded[0]), Run::<T>::new(&other.rounded[1]));
+    let (Ok(mut run), Ok(mut one), Ok(mut two)) = runs else { return None };
+    let (mut scales, mut least, mut most) = (Scales::default(), 0.0_f64, 0.0_f64);
+    for (step, trace) in first.iter().enumerate() {
+        if step > 0 {
+            // (What is refused by one of them is at the edge of being refused.)
+            if run.advance().and(one.advance()).and(two.advance()).is_err() {
+                break;
+            }
+        }
+        let trace = trace.clone().on_dofs(recipe);
+        scales.see(recipe, &trace);
+        for run in [&one, &two] {
+            let of_run = Trace::of(run.recipe, run.run.state()).on_dofs(recipe);
+            least = least.max(scales.difference(&trace, &of_run).0);
+        }
+        let (size, name) = scales.difference(&trace, &other.read(&run).on_dofs(recipe));
+        most = most.max(size);
+        if least > eps.powf(0.6) {
+            break;
+        }
+        if most > 1e5 * (least + eps) {
+            let what = match recipe.twin {
+                Twin::Permuted => "another order changes results",
+                Twin::Moving => "a common velocity changes results",
+                _ => "units change results",
+            };
+            let words = format!("{name} by {most:e}, roundings of the data by {least:e}");
+            return Some(Finding { what, step, words });
+        }
+        verdict.compared += 1;
+    }
+    None
+}
+
+/// A scene written differently.
+struct Written {
+    recipe: Recipe,
+    /// The scene as it was with its data rounded differently.
+    rounded: [Recipe; 2],
+    /// Where its dofs are, and which rows come first.
+    dofs: Vec<usize>,
+    rows: Vec<usize>,
+    /// By axis.
+    velocity: Vec<f64>,
+}
+
+impl Written {
+    fn new(recipe: &Recipe) -> Self {
+        let eps = if recipe.precision == Precision::Single { f32::EPSILON.into() } else { f64::EPSILON };
+        let mut dofs: Vec<usize> = (0..recipe.dofs()).collect();
+        let mut rows: Vec<usize> = (0..recipe.rows.len()).collect();
+        let mut velocity = vec![0.0; recipe.axes];
+        let mut other = recipe.clone();
+        let mut random = Congruential(recipe.dofs() as u64 + 77 * recipe.steps as u64);
+        match recipe.twin {
+            Twin::Permuted => {
+                for list in [&mut dofs, &mut rows] {
+                    for i in (1..list.len()).rev() {
+                        list.swap(i, (random.unit() * (i + 1) as f64) as usize);
+                    }
+                }
+                other = recipe.permuted(&dofs, &rows);
+            }
+            Twin::Moving => {
+                let fastest = recipe.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+                velocity.fill_with(|| 3.0 * fastest * random.signed());
+                for (dof, v) in other.velocity.iter_mut().enumerate() {
+                    *v += velocity[dof % recipe.axes];
+                }
+            }
+            Twin::PowersOfTen(exponents) => {
+                for (unit, exponent) in other.units.iter_mut().zip(exponents) {
+                    *unit *= 10.0_f64.powi(exponent);
+                }
+            }
+            _ => {}
+        }
+        Self { recipe: other, rounded: [1, 2].map(|seed| rounded(recipe, seed, eps)), dofs, rows, velocity }
+    }
+
+    /// The state of its run, as the first run would have it.
+    fn read<T: Real>(&self, run: &Run<'_, T>) -> Trace {
+        let mut trace = Trace::of(&self.recipe, run.run.state()).replaced(&self.dofs, &self.rows);
+        let t = run.run.time() / self.recipe.units[2];
+        let axes = self.recipe.axes;
+        let [u, v, ..] = &mut trace.lists;
+        for (dof, (u, v)) in u.iter_mut().zip(v).enumerate() {
+            *u -= self.velocity[dof % axes] * t;
+            *v -= self.velocity[dof % axes];
+        }
+        trace
+    }
+}
+
+/// With all numbers changed by some roundings.
+fn rounded(recipe: &Recipe, seed: u64, eps: f64) -> Recipe {
+    let mut random = Congruential(seed);
+    let mut near = |x: &mut f64| *x *= 1.0 + 4.0 * eps * random.signed();
+    let mut other = recipe.clone();
+    other.mass.iter_mut().for_each(&mut near);
+    for element in &mut other.elements {
+        // (One factor, so that rigid motions stay free.)
+        let mut factor = 1.0;
+        near(&mut factor);
+        element.stiffness.iter_mut().for_each(|k| *k *= factor);
+    }
+    let [u, v] = [&mut other.displacement, &mut other.velocity];
+    let free = |dof: usize| other.supports.iter().all(|support| support.dof != dof);
+    for list in [u, v] {
+        list.iter_mut().enumerate().filter(|(dof, _)| free(*dof)).for_each(|(_, x)| near(x));
+    }
+    other.load.constant.iter_mut().chain(&mut other.load.amplitude).for_each(&mut near);
+    for row in &mut other.rows {
+        near(&mut row.gap);
+        near(&mut row.amplitude);
+    }
+    other
+}

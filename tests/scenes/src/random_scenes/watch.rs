@@ -1,0 +1,223 @@
+//! What must hold in every step, and after one that is refused.
+
+use super::recipe::{Contacting, Recipe, Row};
+use super::run::{Finding, Run, Verdict, named};
+use crate::schemes;
+use contact_dynamics::contact::ContactLaw;
+use contact_dynamics::{Error, History, Real, Simulation, State};
+
+/// Gaps are met within so many roots of the rounding, of the sizes of their terms.
+const ROUNDING: f64 = 10.0;
+
+pub(super) struct Watch<'a> {
+    recipe: &'a Recipe,
+    /// Contact is imposed on displacements of the state.
+    on_positions: bool,
+    is_free: bool,
+    /// Nothing brings energy in.
+    conserves: bool,
+    start: f64,
+    momentum: Vec<f64>,
+    /// The largest of each so far: force, the sum of the sizes of momenta by dof, and u, h v and h² a of each dof.
+    force: f64,
+    size: f64,
+    ways: Vec<f64>,
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new<T: Real>(recipe: &'a Recipe, run: &mut Simulation<'static, T>) -> Self {
+        let listed = &schemes::all()[recipe.scheme];
+        let is_free = recipe.is_free();
+        let rests = recipe.rows.iter().all(|row| row.amplitude == 0.0) && recipe.supports.is_empty();
+        let mut watch = Self {
+            recipe,
+            on_positions: listed.takes_corrections(),
+            is_free,
+            conserves: rests && recipe.load.constant.is_empty(),
+            start: run.energy().total().value(),
+            momentum: Vec::new(),
+            force: 0.0,
+            size: 0.0,
+            ways: vec![0.0; recipe.dofs()],
+        };
+        watch.see(run.state(), recipe.step_size());
+        watch.momentum = watch.momenta(run);
+        watch
+    }
+
+    /// After a step.
+    pub(super) fn look<T: Real>(&mut self, run: &mut Run<'_, T>, verdict: &mut Verdict) -> Option<Finding> {
+        let step = run.step;
+        let find = |what: &'static str, words: String| Some(Finding { what, step, words });
+        let total = run.run.energy().total().value();
+        let state = run.run.state();
+        let contacts = state.contacts();
+        let lists = [
+            ("u", state.displacement()),
+            ("v", state.velocity()),
+            ("a", state.acceleration()),
+            ("gaps", contacts.gaps()),
+            ("forces", contacts.forces()),
+            ("raw forces", contacts.raw_forces()),
+            ("impulses", contacts.impulses()),
+        ];
+        if let Some((name, _)) = lists.iter().find(|(_, list)| list.iter().any(|x| !x.is_finite())) {
+            return find("not finite", name.to_string());
+        }
+        // (A run without correction may grow beyond numbers whose squares there are.)
+        let overflows = self.size > T::max_value().value().sqrt() * 1e-3;
+        if !total.is_finite() && !overflows {
+            return find("not finite", format!("energy {total}"));
+        }
+        self.see(state, run.run.history().step_size());
+        let finding = self.complementarity(state, run.run.history().step_size(), step).or_else(|| self.cone(run, step));
+        if finding.is_some() {
+            return finding;
+        }
+        if self.conserves {
+            let gain = if self.start > 0.0 { total / self.start } else { 0.0 };
+            verdict.gain = verdict.gain.max(gain);
+        }
+        if self.is_free {
+            let now = self.momenta(&run.run);
+            let change = now.iter().zip(&self.momentum).fold(0.0_f64, |most, (x, y)| most.max((x - y).abs()));
+            verdict.momentum = verdict.momentum.max(change / self.size.max(f64::MIN_POSITIVE));
+        }
+        None
+    }
+
+    /// Rigid rows are not violated, push, and push only where they are closed.
+    fn complementarity<T: Real>(&mut self, state: &State<T>, h: f64, step: usize) -> Option<Finding> {
+        let find = |what: &'static str, words: String| Some(Finding { what, step, words });
+        let contacts = state.contacts();
+        let eps = T::epsilon().value();
+        let forces = contacts.raw_forces().iter().chain(contacts.forces());
+        self.force = forces.fold(self.force, |most, force| most.max(force.value().abs()));
+        // What forces keep from happening is known to its rounding.
+        let mut forced = vec![0.0; self.recipe.dofs()];
+        for (row, raw) in self.recipe.rows.iter().zip(contacts.raw_forces()) {
+            for &(dof, x) in &row.terms {
+                let m = self.recipe.mass[dof] * self.recipe.units[1];
+                let way = if m > 0.0 { h * h * (x * raw.value()).abs() / m } else { f64::INFINITY };
+                forced[dof] += if raw.is_zero() { 0.0 } else { way };
+            }
+        }
+        let way = |dof: usize, x: f64| x.abs() * self.ways[dof].max(forced[dof]);
+        let size = |row: &Row| {
+            let product: f64 = row.terms.iter().map(|&(dof, x)| way(dof, x)).sum();
+            product + (row.gap.abs() + row.amplitude.abs()) * self.recipe.units[0]
+        };
+        // (What iterates is accurate for the largest row.)
+        let iterates = matches!(self.recipe.contact_solver, Contacting::GaussSeidel | Contacting::ProjectedGradient)
+            || self.recipe.rows.iter().any(|row| row.friction.is_some());
+        let largest = self.recipe.rows.iter().map(size).fold(0.0, f64::max);
+        for (r, row) in self.recipe.rows.iter().enumerate() {
+            let (gap, raw) = (contacts.gaps()[r].value(), contacts.raw_forces()[r].value());
+            if row.law != ContactLaw::Rigid {
+                continue;
+            }
+            if raw < -16.0 * eps * self.force {
+                return find("a rigid row pulls", format!("row {r}: {raw:e}"));
+            }
+            if !self.on_positions {
+                continue;
+            }
+            let size = if iterates { largest } else { size(row) };
+            let bound = ROUNDING * (eps.sqrt() * size + 1e2 * eps * largest);
+            if gap < -bound {
+                return find("a gap is violated", format!("row {r}: {gap:e} of {size:e}"));
+            }
+            if raw > 0.0 && gap > bound {
+                return find("an open row pushes", format!("row {r}: {raw:e} at a gap of {gap:e} of {size:e}"));
+            }
+        }
+        None
+    }
+
+    fn cone<T: Real>(&self, run: &Run<'_, T>, step: usize) -> Option<Finding> {
+        let contacts = run.run.state().contacts();
+        let u = run.run.state().displacement();
+        let size = u.iter().fold(0.0_f64, |most, u| most.max(u.value().abs()));
+        let heaviest = self.recipe.mass.iter().fold(0.0_f64, |most, m| most.max(*m)) * self.recipe.units[1];
+        let h = run.run.history().step_size();
+        let eps = T::epsilon().value();
+        let noise = 1e3 * eps * size * heaviest / (h * h);
+        for (r, row) in self.recipe.rows.iter().enumerate() {
+            let Some((coefficient, _)) = row.friction else { continue };
+            let rubs = contacts.friction_forces(r).iter().fold(0.0_f64, |size, f| size.hypot(f.value()));
+            let most = coefficient * contacts.forces()[r].value().max(0.0);
+            let bound = most * (1.0 + 1e7 * eps) + 1e7 * eps * (1.0 + coefficient) * self.force + noise;
+            if rubs > bound {
+                let words = format!("row {r}: {rubs:e} beyond {most:e}, largest force {:e}", self.force);
+                return Some(Finding { what: "friction beyond its cone", step, words });
+            }
+        }
+        None
+    }
+
+    /// After a step that is refused: everything is as it was, and a second attempt ends as the first.
+    pub(super) fn after_failure<T: Real>(
+        &self,
+        run: &mut Run<'_, T>,
+        error: &Error,
+        before: &State<T>,
+        history: &History<T>,
+    ) -> Option<Finding> {
+        let step = run.step;
+        let find = |what: &'static str, words: String| Some(Finding { what, step, words });
+        let (name, words) = named(error);
+        if name != "StepNotFinite" && name != "EnergyNotFinite" && words.contains("NaN") {
+            return find("an error speaks of NaN", words);
+        }
+        let now = run.run.state();
+        if now != before || bits(now) != bits(before) {
+            return find("a refused step changes the state", words);
+        }
+        if past(run.run.history()) != past(history) {
+            return find("a refused step changes the history", words);
+        }
+        let again = run.advance().map_or_else(|error| named(&error).1, |()| "no error".into());
+        if again != words {
+            return find("a second attempt ends differently", format!("{words}; then: {again}"));
+        }
+        None
+    }
+
+    /// Whether nothing is left of the motion but what has no digits: of bodies that are held, say.
+    pub(super) fn has_died_out<T: Real>(&self, state: &State<T>) -> bool {
+        let least = T::min_positive_value().value().powf(0.25);
+        let left = state.displacement().iter().zip(state.velocity()).zip(&self.ways);
+        let h = self.recipe.step_size();
+        left.into_iter().all(|((u, v), way)| u.value().abs().max(h * v.value().abs()) <= least * way)
+    }
+
+    /// Along each axis.
+    fn momenta<T: Real>(&self, run: &Simulation<'static, T>) -> Vec<f64> {
+        let Recipe { axes, .. } = *self.recipe;
+        let unit = |axis: usize| -> Vec<T> {
+            (0..self.recipe.dofs()).map(|dof| if dof % axes == axis { T::one() } else { T::zero() }).collect()
+        };
+        (0..axes).map(|axis| run.momentum(&unit(axis)).map_or(f64::NAN, Real::value)).collect()
+    }
+
+    /// What rounding is measured by.
+    fn see<T: Real>(&mut self, state: &State<T>, h: f64) {
+        let products = self.recipe.mass.iter().zip(state.velocity()).map(|(m, v)| m * v.value().abs());
+        self.size = self.size.max(products.sum::<f64>() * self.recipe.units[1]);
+        let motion = state.displacement().iter().zip(state.velocity()).zip(state.acceleration());
+        for (way, ((u, v), a)) in self.ways.iter_mut().zip(motion) {
+            *way = way.max(u.value().abs()).max(h * v.value().abs()).max(h * h * a.value().abs());
+        }
+    }
+}
+
+/// Past states, and the step that made the newest.
+fn past<T: Real>(history: &History<T>) -> Vec<u64> {
+    let states = (1..history.len()).filter_map(|k| history.past(k)).flat_map(|(u, v, a)| [u, v, a].concat());
+    states.map(|x| x.value().to_bits()).chain([history.step_size().to_bits()]).collect()
+}
+
+fn bits<T: Real>(state: &State<T>) -> Vec<u64> {
+    let lists = [state.displacement(), state.velocity(), state.acceleration()];
+    lists.concat().into_iter().map(|x| x.value().to_bits()).chain([state.time().to_bits()]).collect()
+}

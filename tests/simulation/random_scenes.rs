@@ -1,0 +1,53 @@
+//! Some of the scenes that `--example random_scenes` draws by the thousand, and how it makes them smaller.
+
+use contact_dynamics_scenes::random_scenes::{KINDS, Recipe, shrunk};
+
+#[test]
+fn scenes_by_chance_hold_what_must_hold() {
+    let (mut built, mut closed, mut compared) = (0, 0, 0);
+    for seed in 0..3000 {
+        let recipe = Recipe::of_seed(seed);
+        let verdict = recipe.examine();
+        if let Some(finding) = verdict.finding {
+            panic!("`--example random_scenes -- --scene {seed}`: {finding}\n{}", recipe.summary());
+        }
+        built += usize::from(verdict.built);
+        closed += verdict.closed;
+        compared += verdict.compared;
+    }
+    assert!(built > 1500 && closed > 10_000 && compared > 40_000, "{built} {closed} {compared}");
+}
+
+#[test]
+fn all_kinds_are_drawn_and_refusals_have_words() {
+    let mut seen = Vec::new();
+    for seed in 0..200 {
+        let recipe = Recipe::of_seed(seed);
+        if !seen.contains(&recipe.kind) {
+            seen.push(recipe.kind);
+        }
+        if let Some((name, words)) = recipe.examine().refused {
+            assert!(!name.is_empty() && words.len() > 20, "{name}: {words}");
+        }
+    }
+    assert!(KINDS.iter().all(|kind| seen.contains(kind)), "{seen:?}");
+}
+
+#[test]
+fn scenes_shrink_to_what_they_fail_by() {
+    // Say that whatever is pressed twice fails: nothing but two pressed rows and a step to press them is left.
+    let fails = |recipe: &Recipe| recipe.rows.len() >= 2 && recipe.examine().closed > 0;
+    let mut shrunken = 0;
+    for seed in 0..40 {
+        let recipe = Recipe::of_seed(seed);
+        if !fails(&recipe) {
+            continue;
+        }
+        let least = shrunk(&recipe, fails);
+        assert!(fails(&least) && least.rows.len() == 2, "{seed}: {}", least.summary());
+        assert!(least.damping.iter().all(|d| *d == 0.0) && least.load.amplitude.iter().all(|f| *f == 0.0), "{least:?}");
+        assert!(least.dofs() <= recipe.dofs() && least.steps <= recipe.steps);
+        shrunken += 1;
+    }
+    assert!(shrunken >= 5, "{shrunken}");
+}
