@@ -278,9 +278,12 @@ fn after_a_panic_of_the_host_everything_is_refused_and_nothing_is_lost() {
     }
 }
 
+/// Makes a contact solver.
+type Solver = fn() -> Box<dyn ContactSolver<f64>>;
+
 #[test]
 fn motion_that_dies_out_leaves_nothing_to_be_solved() {
-    let solvers: [fn() -> Box<dyn ContactSolver<f64>>; 4] = [
+    let solvers: [Solver; 4] = [
         || Box::new(ActiveSet::default()),
         || Box::new(Pivoting::default()),
         || Box::new(Lemke::default()),
