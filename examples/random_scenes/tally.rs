@@ -1,6 +1,6 @@
 //! What came of many scenes, in tables.
 
-use contact_dynamics_scenes::random_scenes::{KINDS, Recipe, Verdict};
+use contact_dynamics_scenes::random_scenes::{KINDS, Precision, Recipe, Verdict};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::AddAssign;
@@ -34,6 +34,11 @@ pub(crate) struct Tally {
     kinds: BTreeMap<&'static str, Count>,
     /// By the name of the error: before the first step, and later, with the words of the first.
     refused: BTreeMap<String, ([u64; 2], u64, String)>,
+    /// Scenes in single precision on which nothing acts from outside; those whose momentum changes by more than 3 %, and
+    /// by how much at most if they are run in double precision.
+    single: u64,
+    drifting: u64,
+    in_double: f64,
     /// Seeds by what fails.
     findings: BTreeMap<&'static str, Vec<u64>>,
 }
@@ -49,6 +54,14 @@ impl Tally {
             ended: u64::from(verdict.built && verdict.refused.is_some()),
             findings: u64::from(verdict.finding.is_some()),
         };
+        if recipe.precision == Precision::Single && recipe.conserves_momentum() && verdict.built {
+            self.single += 1;
+            if verdict.momentum > 0.03 {
+                let double = Recipe { precision: Precision::Double, ..recipe.clone() };
+                self.drifting += 1;
+                self.in_double = self.in_double.max(double.examine().momentum);
+            }
+        }
         if let Some((name, words)) = verdict.refused {
             let refused = self.refused.entry(name).or_insert(([0; 2], seed, words));
             refused.0[usize::from(verdict.built)] += 1;
@@ -62,6 +75,9 @@ impl Tally {
         for (kind, count) in other.kinds {
             *self.kinds.entry(kind).or_default() += count;
         }
+        self.single += other.single;
+        self.drifting += other.drifting;
+        self.in_double = self.in_double.max(other.in_double);
         for (name, (counts, seed, words)) in other.refused {
             let all = self.refused.entry(name).or_insert(([0; 2], seed, words));
             all.0[0] += counts[0];
@@ -104,6 +120,12 @@ impl fmt::Display for Tally {
             let words = words.replace('|', "/");
             writeln!(f, "| {name} | {before} | {later} | {seed}: {words} |")?;
         }
+        let Self { single, drifting, in_double, .. } = self;
+        writeln!(
+            f,
+            "\nmomentum in f32: changes by more than 3 % of the sum of all in {drifting} of {single} scenes without \
+             outer forces, in the same scenes in f64 by {in_double:.0e} at most"
+        )?;
         for (what, seeds) in &self.findings {
             writeln!(f, "\n{what}: {} scenes, {:?}", seeds.len(), &seeds[..seeds.len().min(10)])?;
         }

@@ -213,6 +213,12 @@ impl Recipe {
             && self.rows.iter().all(|row| rigid(&row.terms) && rubs(row))
     }
 
+    /// Whether momentum is conserved: nothing acts from outside, and nothing is known to change it.
+    #[must_use]
+    pub fn conserves_momentum(&self) -> bool {
+        self.is_free() && self.correction != Correction::ZeroAcceleration
+    }
+
     /// What a row makes of a unit along an axis.
     pub(super) fn along(&self, terms: &Terms, axis: usize) -> f64 {
         terms.iter().filter(|(dof, _)| dof % self.axes == axis).map(|(_, weight)| weight).sum()
