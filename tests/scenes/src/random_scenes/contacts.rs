@@ -23,12 +23,9 @@ pub(super) struct Setting {
 
 impl Setting {
     fn row(&self, terms: Terms, tangents: Vec<Terms>, random: &mut Congruential) -> Row {
-        let gap = if self.starts_closed && pick(&[true, false], random) {
-            0.0
-        } else {
-            self.way * pick(&[random.within(0.0, 1.0), random.within(0.0, 12.0)], &mut random.clone())
-        };
-        random.unit();
+        let touches = self.starts_closed && pick(&[true, false], random);
+        let [near, far] = [1.0, 12.0].map(|ways| random.within(0.0, ways));
+        let gap = if touches { 0.0 } else { self.way * pick(&[near, far], random) };
         let mut row = Row { terms, gap, amplitude: 0.0, frequency: 0.0, law: ContactLaw::Rigid, friction: None };
         if self.moves && pick(&[true, false], random) {
             row.frequency = random.within(0.01, 0.3) / self.h;
@@ -92,6 +89,25 @@ impl Setting {
         };
         let tangents = frame[1..].iter().map(|tangent| direction(tangent)).collect();
         self.row(direction(&frame[0]), tangents, random)
+    }
+
+    /// A wall that pushes the first mass, levers from each mass to the next, a stop behind the last one, and sums of
+    /// these rows: what follows from others, and contradicts them once the wall has gone too far.
+    pub(super) fn levers(&self, masses: usize, random: &mut Congruential) -> Vec<Row> {
+        let mut rows = vec![self.row(vec![(0, 1.0)], Vec::new(), random)];
+        rows[0].amplitude = -self.way * random.within(0.0, 10.0);
+        rows[0].frequency = random.within(0.01, 0.1) / self.h;
+        for i in 1..masses {
+            let lever = random.within(0.3, 1.5);
+            rows.push(self.row(vec![(i, 1.0), (i - 1, -lever)], Vec::new(), random));
+        }
+        rows.push(self.row(vec![(masses - 1, -1.0)], Vec::new(), random));
+        for _ in 0..pick(&[0, 1, 3], random) {
+            let [one, other] = [0, 0].map(|_: usize| (random.unit() * rows.len() as f64) as usize);
+            let by = [random.within(0.2, 3.0), random.within(0.2, 3.0)];
+            rows.push(sum(&rows[one], &rows[other], by));
+        }
+        rows
     }
 
     /// Each box on the one below, the lowest on the floor; walls beside some of them.

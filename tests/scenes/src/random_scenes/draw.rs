@@ -23,7 +23,7 @@ impl Recipe {
         let spread = Spread::new(random);
         let bodies = match kind {
             "plate" => Bodies::plate(spread, random),
-            "cloud" | "squeeze" => Bodies::cloud(spread, random),
+            "cloud" => Bodies::cloud(spread, random),
             "pile" => Bodies::pile(spread, random),
             "block" => Bodies::block(spread, random),
             _ => Bodies::chains(spread, random),
@@ -42,7 +42,7 @@ impl Recipe {
         let room = if precision == Precision::Single { 0.25 } else { 1.0 };
         let speed = decades(-6.0 * room, 6.0 * room, random);
         let way = speed * h;
-        let free = pick(&[true, false, false], random) && kind != "pile";
+        let free = pick(&[true, false, false], random) && kind != "pile" && kind != "squeeze";
         let softest = bodies.mass.iter().fold(f64::INFINITY, |least, m| least.min(*m)) / (h * h);
         let stiffest = bodies.elements.iter().flat_map(|e| &e.stiffness).fold(0.0_f64, |most, k| most.max(k.abs()));
         let heaviest = bodies.mass.iter().fold(0.0_f64, |most, m| most.max(*m));
@@ -65,6 +65,7 @@ impl Recipe {
         };
         let rows = match kind {
             "pile" => setting.stacked(n / 2, random),
+            "squeeze" => setting.levers(n, random),
             "block" if !free && pick(&[true, true, false], random) => setting.floor(&bodies, random),
             _ => setting.rows(&bodies, random),
         };
@@ -90,9 +91,8 @@ impl Recipe {
             1 => vec![-speed; n],
             _ => vec![0.0; n],
         };
-        let displacement =
+        let mut displacement =
             if pick(&[true, false, false, false], random) { random.vector(n, way) } else { vec![0.0; n] };
-        let mut displacement = displacement;
         for support in &supports {
             displacement[support.dof] = 0.0;
             velocity[support.dof] = support.amplitude * support.frequency;
