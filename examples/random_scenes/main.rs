@@ -22,13 +22,16 @@ const SHRUNK: usize = 2;
 struct Options {
     seconds: u64,
     seed: u64,
+    /// Scenes at most.
+    most: u64,
     scene: Option<u64>,
     output: std::path::PathBuf,
 }
 
 impl Options {
     fn from_command_line() -> Result<Self, Anything> {
-        let mut options = Self { seconds: 20, seed: 1, scene: None, output: "output/random_scenes".into() };
+        let mut options =
+            Self { seconds: 20, seed: 1, most: u64::MAX, scene: None, output: "output/random_scenes".into() };
         let mut arguments = std::env::args().skip(1);
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or(USAGE);
@@ -36,7 +39,7 @@ impl Options {
                 "--seconds" => options.seconds = value()?.parse()?,
                 "--seed" => options.seed = value()?.parse()?,
                 "--scene" => options.scene = Some(value()?.parse()?),
-                "--quick" => options.seconds = 5,
+                "--quick" => options.most = 1000,
                 "--output" => options.output = value()?.into(),
                 unknown => return Err(format!("unknown option {unknown}; {USAGE}").into()),
             }
@@ -77,6 +80,9 @@ fn run(options: &Options) -> Tally {
         let mut tally = Tally::default();
         while Instant::now() < end {
             let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed - options.seed >= options.most {
+                break;
+            }
             let recipe = Recipe::of_seed(seed);
             tally.add(seed, &recipe, recipe.examine());
         }

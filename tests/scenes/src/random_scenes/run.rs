@@ -36,7 +36,7 @@ pub struct Verdict {
     pub compared: usize,
     /// Largest energy over that at the start, where nothing brings energy in.
     pub gain: f64,
-    /// Largest change of momentum over Σ m (|v| + |u|/h), where nothing acts from outside.
+    /// Largest change of momentum over Σ m (|v| + |u|/h + h |a|), where nothing acts from outside.
     pub momentum: f64,
 }
 

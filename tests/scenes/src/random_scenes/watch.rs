@@ -9,7 +9,7 @@ use contact_dynamics::{Error, History, Real, Simulation, State};
 /// Gaps are met within so many roots of the rounding, of the sizes of their terms.
 const ROUNDING: f64 = 10.0;
 
-/// Momentum is conserved up to this share of the largest Σ m (|v| + |u|/h): steps of a thousand periods magnify rounding.
+/// Momentum is conserved up to this share of the largest Σ m (|v| + |u|/h + h |a|): steps of a thousand periods magnify rounding.
 const MOMENTUM: f64 = 1e-6;
 
 pub(super) struct Watch<'a> {
@@ -21,7 +21,7 @@ pub(super) struct Watch<'a> {
     conserves: bool,
     start: f64,
     momentum: Vec<f64>,
-    /// The largest of each so far: force, the sum of the sizes of momenta by dof (and of m u/h), and u, h v and h² a of each dof.
+    /// The largest of each so far: force, the sum of the sizes of momenta by dof (and of m u/h and m h a), and u, h v and h² a of each dof.
     force: f64,
     size: f64,
     ways: Vec<f64>,
@@ -214,12 +214,11 @@ impl<'a> Watch<'a> {
 
     /// What rounding is measured by.
     fn see<T: Real>(&mut self, state: &State<T>, h: f64) {
-        let speeds =
-            state.displacement().iter().zip(state.velocity()).map(|(u, v)| u.value().abs() / h + v.value().abs());
-        let products = self.recipe.mass.iter().zip(speeds).map(|(m, v)| m * v);
+        let motion = || state.displacement().iter().zip(state.velocity()).zip(state.acceleration());
+        let speed = |((u, v), a): ((&T, &T), &T)| u.value().abs() / h + v.value().abs() + h * a.value().abs();
+        let products = self.recipe.mass.iter().zip(motion().map(speed)).map(|(m, v)| m * v);
         self.size = self.size.max(products.sum::<f64>() * self.recipe.units[1]);
-        let motion = state.displacement().iter().zip(state.velocity()).zip(state.acceleration());
-        for (way, ((u, v), a)) in self.ways.iter_mut().zip(motion) {
+        for (way, ((u, v), a)) in self.ways.iter_mut().zip(motion()) {
             *way = way.max(u.value().abs()).max(h * v.value().abs()).max(h * h * a.value().abs());
         }
     }
