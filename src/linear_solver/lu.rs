@@ -211,11 +211,12 @@ impl<T: Real> Factor<T> {
     /// units that belong to dofs.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
         // Largest entries of about one first: what follows does not see the unit of the matrix.
-        let size = a.val()[largest(a.val())].abs();
-        let unit = if size > T::zero() { T::of(2.0).powi(-binary_exponent(size)) } else { T::one() };
+        // (The reciprocal of a subnormal number may be none.)
+        let size = a.val()[largest(a.val())].abs().max(T::min_positive_value());
+        let (unit, root) = (T::of(2.0).powi(-binary_exponent(size)), reciprocal_root(size));
         T::scale_into(unit, a.val(), &mut self.scaled);
-        self.rows.fill(unit);
-        self.columns.fill(T::one());
+        self.rows.fill(root);
+        self.columns.fill(unit / root);
         for _ in 0..PASSES {
             if self.balance()? {
                 break;

@@ -17,7 +17,7 @@ use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::Solid;
-use contact_dynamics_scenes::sparse::{matrix, rectangular};
+use contact_dynamics_scenes::sparse::{factorized, matrix, rectangular};
 use contact_dynamics_scenes::truss::{PendulumReference, Truss};
 
 /// Dense row-major matrices, for references.
@@ -220,6 +220,12 @@ fn the_unit_of_a_matrix_changes_no_bit_of_a_solution() {
             assert_eq!(solution(exponent), natural, "2^{exponent}");
         }
     }
+    // Subnormal numbers have no reciprocal.
+    let least = 2.0_f64.powi(-1060);
+    let mut factor = factorized(&Lu, &matrix(1, [(0, 0, least)]));
+    let mut x = [3.0 * least];
+    factor.solve(&mut x).unwrap();
+    assert_eq!(x, [3.0]);
 }
 
 fn chain(n: usize, stiffness: impl Fn(usize) -> f64) -> Entries {

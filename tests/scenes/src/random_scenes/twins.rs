@@ -139,7 +139,7 @@ fn exact<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             let (size, name) = scales.difference(trace, &of_second);
             return find(what, step, format!("{name} by {size:e}"));
         }
-        if recipe.twin == Twin::Resumed && 2 * step + 1 >= first.len() && 2 * step < first.len() + 1 {
+        if recipe.twin == Twin::Resumed && step == first.len() / 2 {
             run = match run.resumed() {
                 Ok(run) => run,
                 // (By now it may have grown too stiff for explicit steps.)

@@ -92,7 +92,7 @@ impl<'a> Watch<'a> {
             verdict.momentum = verdict.momentum.max(share);
             // (A correction that sets a to zero is known to change momentum; single precision is looked at in double.)
             if self.recipe.conserves_momentum() && self.recipe.precision == Precision::Double && share > MOMENTUM {
-                return find("momentum changes", format!("by {share:e} of Σ m |v|"));
+                return find("momentum changes", format!("by {share:e} of Σ m (|v| + |u|/h + h |a|)"));
             }
         }
         None
