@@ -74,8 +74,11 @@ fn rows_hold_the_slope_of_offsets() {
     }
 }
 
+/// The facets of one.
+type Tetrahedron = [[usize; 3]; 4];
+
 /// Two tetrahedra, a ridge 0.1 above another one and across it.
-fn ridges() -> ([[f64; 3]; 8], [[usize; 3]; 4], [[usize; 3]; 4]) {
+fn ridges() -> ([[f64; 3]; 8], Tetrahedron, Tetrahedron) {
     let nodes = [
         [-1.0, 0.1, 0.0],
         [1.0, 0.0, 0.0],

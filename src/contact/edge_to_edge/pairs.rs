@@ -185,9 +185,6 @@ impl Pair<'_> {
         velocity: &impl Fn(usize) -> Point,
     ) -> f64 {
         let of_edge = |edge: usize, [from, to]: [f64; 2]| {
-            if from == to {
-                return 0.0;
-            }
             let gradient = crossing.share_gradient(edge, self.ends(at));
             let speeds = self.nodes().map(velocity);
             (to - from) * gradient.into_iter().zip(speeds).map(|(weight, speed)| dot(weight, speed)).sum::<f64>()
@@ -207,7 +204,7 @@ impl Pair<'_> {
         let lines = crossing.acceleration(ends, speeds);
         let way = self.way(velocity);
         let (_, slopes) = self.by_shares(crossing);
-        if slopes == [0.0; 2] || way == 0.0 {
+        if slopes.iter().all(|slope| *slope == 0.0) || way == 0.0 {
             return lines;
         }
         let bend = self.opening(crossing).map(|(edge, [.., bend])| (edge, bend));

@@ -54,7 +54,7 @@ impl Slide {
                 }
             }
         };
-        (slide.slopes != [0.0; 2] || slide.bend != 0.0).then_some(slide)
+        (slide.slopes.iter().any(|slope| *slope != 0.0) || slide.bend != 0.0).then_some(slide)
     }
 
     /// A⁻¹ b.
