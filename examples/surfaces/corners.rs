@@ -9,11 +9,12 @@ use std::fmt::Write;
 /// A rise of the energy that is not the scheme's own.
 const GAIN: f64 = 0.01;
 
-const CONTACTS: [(&str, Keeps); 4] = [
+const CONTACTS: [(&str, Keeps); 5] = [
     ("two passes", Keeps::TwoPasses),
     ("two passes, edges", Keeps::TwoPassesAndEdges),
     ("mortar", Keeps::Mortar),
     ("bodies", Keeps::Bodies),
+    ("bodies, of itself", Keeps::Itself),
 ];
 
 /// How often energy is gained, how much, how deep nodes and edges get, and how many steps are refused.

@@ -1,12 +1,13 @@
-//! Contact of two bodies with faces, corners and edges: the constraints that keep all of them apart.
+//! Contact of bodies with faces, corners and edges, two or many: the constraints that keep all of them apart.
 
 use super::edge_to_edge::{self, EdgeToEdge};
-use super::surface::{Facet, Nodes};
+use super::surface::{Facet, Nodes, Ramp, Surface, Thickness};
 use super::{ContactConstraint, ContactLaw, Mortar, NodeToFacet};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Contact of two deforming bodies whose surfaces may have corners and edges: what
+/// Contact of deforming bodies whose surfaces may have corners and edges, of two ([`new`](Self::new)), or of any number
+/// and of bodies that fold ([`of_itself`](Self::of_itself)): what
 /// [`SimulationBuilder::constraints`](crate::SimulationBuilder::constraints) takes.
 ///
 /// Weighted gaps spread contact over faces, but see none where facets stand at more than 60° to each other: a
@@ -18,6 +19,9 @@ use crate::real::Real;
 ///    facets, and of the master's nodes with the slave's facets;
 /// 3. [`EdgeToEdge`], in three dimensions.
 ///
+/// Of a surface against itself they are [`NodeToFacet::of_itself`], which sees corners and faces, and
+/// [`EdgeToEdge::of_itself`] in three dimensions.
+///
 /// Smooth bodies have the first one only, and pay for nothing else. Where a face with its edges lies on a face there
 /// are more rows than independent gaps: the multipliers are then those of least norm, and their sums are what matters.
 ///
@@ -28,8 +32,8 @@ use crate::real::Real;
 ///
 /// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
 /// - Nodes within faces are kept out in the mean over their facets only, as by [`Mortar`]: by a tenth of an element in
-///   blocks that fall on edges (`docs/contact.md` has a table).
-/// - A body against itself: [`NodeToFacet::of_itself`].
+///   blocks that fall on edges (`docs/contact.md` has a table). Of itself there are no weighted gaps: pressures are those
+///   of nodes on facets.
 ///
 /// ```
 /// use contact_dynamics::contact::BodyContact;
@@ -66,9 +70,13 @@ use crate::real::Real;
 pub struct BodyContact<T: Real, const D: usize> {
     coordinates: Vec<[T; D]>,
     dofs: Vec<[usize; D]>,
-    /// Facets of the slave and of the master.
+    /// Facets of the slave and of the master; of a surface against itself all of them, and none.
     facets: [Vec<Facet>; 2],
     sharp: [Vec<usize>; 2],
+    /// Of a surface against itself, how many rings of facets around a node it does not meet.
+    rings: Option<usize>,
+    offsets: Option<Vec<T>>,
+    ramp: Option<[[f64; 2]; 2]>,
     angle: f64,
     law: ContactLaw,
     friction: f64,
@@ -93,11 +101,59 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
+        let facets = [slave.into_iter().map(Into::into).collect(), master.into_iter().map(Into::into).collect()];
+        Self::between(coordinates, dofs, facets, None)
+    }
+
+    /// Contact of a surface with itself, of a body that folds or of any number of bodies whose surfaces are given as
+    /// one: every node with all facets that are not around it, and every edge with all edges that are not. Nothing needs
+    /// to be said of who meets whom. What a node or an edge does not meet of its own body is told by
+    /// [`NodeToFacet::of_itself`]; nothing may be inside of itself in the reference configuration.
+    ///
+    /// Give the whole surfaces, as [`Surface::of_cells`](super::Surface::of_cells) finds them of all bodies at once.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::{BodyContact, Surface};
+    ///
+    /// // Three cubes, one upon the other, 0.1 apart.
+    /// let corners = [[0, 0], [1, 0], [1, 1], [0, 1]];
+    /// let heights = [0.0, 1.0, 1.1, 2.1, 2.2, 3.2];
+    /// let coordinates: Vec<[f64; 3]> =
+    ///     heights.iter().flat_map(|&z| corners.map(|[x, y]| [f64::from(x), f64::from(y), z])).collect();
+    /// let dofs: Vec<[usize; 3]> = (0..24).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+    /// let cells = [0, 8, 16].map(|first| [0, 1, 2, 3, 4, 5, 6, 7].map(|node| first + node));
+    /// let surface = Surface::of_cells(&coordinates, cells)?;
+    /// let contact = BodyContact::of_itself(&coordinates, &dofs, &surface)?;
+    /// // Nodes on facets, and edges on edges.
+    /// assert_eq!(contact.constraints()?.len(), 2);
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`NodeToFacet::of_itself`].
+    pub fn of_itself<F: Into<Facet>>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        facets: impl IntoIterator<Item = F>,
+    ) -> Result<Self> {
+        Self::between(coordinates, dofs, [facets.into_iter().map(Into::into).collect(), Vec::new()], Some(1))
+    }
+
+    fn between(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        facets: [Vec<Facet>; 2],
+        rings: Option<usize>,
+    ) -> Result<Self> {
         let mut contact = Self {
             coordinates: coordinates.to_vec(),
             dofs: dofs.to_vec(),
-            facets: [slave.into_iter().map(Into::into).collect(), master.into_iter().map(Into::into).collect()],
+            facets,
             sharp: [Vec::new(), Vec::new()],
+            rings,
+            offsets: None,
+            ramp: None,
             angle: edge_to_edge::SHARP,
             law: ContactLaw::Rigid,
             friction: 0.0,
@@ -105,6 +161,39 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         };
         contact.find_sharp_nodes()?;
         Ok(contact)
+    }
+
+    /// How many rings of facets around a node or an edge it does not meet, of [its own surface](Self::of_itself); by
+    /// default 1 ([`NodeToFacet::rings`]). It has no meaning for two surfaces.
+    #[must_use]
+    pub fn rings(mut self, rings: usize) -> Self {
+        self.rings = self.rings.map(|_| rings);
+        self
+    }
+
+    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: faces by so much
+    /// ([`Mortar::offsets`], [`NodeToFacet::offsets`]), edges and corners rounded with this radius
+    /// ([`EdgeToEdge::offsets`]).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`](crate::Error::Dimension) unless there is one a node of the mesh; the others are those of
+    /// [`constraints`](Self::constraints).
+    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
+        Thickness::default().set(offsets, self.coordinates.len())?;
+        self.offsets = Some(offsets.to_vec());
+        Ok(self)
+    }
+
+    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time, as [`Mortar::ramp`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`](crate::Error::Parameter) unless all are finite and the second time is later.
+    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+        Ramp::new(times, factors)?;
+        self.ramp = Some([times, factors]);
+        Ok(self)
     }
 
     /// The law of all rows.
@@ -142,12 +231,20 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(self)
     }
 
-    /// The nodes at sharp edges and corners of the slave, and of the master, ascending.
+    /// The nodes at sharp edges and corners of the slave, and of the master, ascending; of a surface against itself the
+    /// same list twice.
     pub fn sharp_nodes(&self) -> &[Vec<usize>; 2] {
         &self.sharp
     }
 
     fn find_sharp_nodes(&mut self) -> Result<()> {
+        if self.rings.is_some() {
+            let nodes = Nodes::new(&self.coordinates, &self.dofs)?;
+            let surface = Surface::of_facets(self.facets[0].iter().copied(), D, &nodes.coordinates)?;
+            let sharp = surface.sharp_nodes(self.angle, &nodes.coordinates);
+            self.sharp = [sharp.clone(), sharp];
+            return Ok(());
+        }
         let [slave, master] = self.facets.each_ref().map(|facets| facets.iter().copied());
         let (nodes, surfaces) = Nodes::with_surfaces(&self.coordinates, &self.dofs, slave, master)?;
         self.sharp = surfaces.map(|surface| surface.sharp_nodes(self.angle, &nodes.coordinates));
@@ -155,36 +252,87 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     }
 
     /// The constraints, in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's on
-    /// the slave's, edges on edges. What a body has nothing for is left out.
+    /// the slave's, edges on edges; of a surface against itself nodes on facets, edges on edges. What a body has nothing
+    /// for is left out.
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`](crate::Error::Parameter) unless the reach is positive and finite.
     pub fn constraints(self) -> Result<Vec<Box<dyn ContactConstraint<T>>>> {
-        let Self { coordinates, dofs, facets, sharp, angle, law, friction, reach } = self;
+        let Self { coordinates, dofs, facets, sharp, rings, .. } = &self;
         let of = |body: usize| facets[body].iter().copied();
-        let mut faces = Mortar::new(&coordinates, &dofs, of(0), of(1))?.with_law(law).friction(friction);
-        if let Some(reach) = reach {
-            faces = faces.reach(reach)?;
-        }
-        let mut constraints: Vec<Box<dyn ContactConstraint<T>>> = vec![Box::new(faces)];
-        for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
-            let corners = NodeToFacet::one_pass(&coordinates, &dofs, nodes, of(1 - body))?.facing(of(body))?;
-            let mut corners = corners.with_law(law).friction(friction);
-            if let Some(reach) = reach {
-                corners = corners.reach(reach)?;
+        let mut constraints: Vec<Box<dyn ContactConstraint<T>>> = Vec::new();
+        if let Some(rings) = *rings {
+            let nodes = NodeToFacet::of_itself(coordinates, dofs, of(0))?.rings(rings);
+            constraints.push(Box::new(self.given(nodes)?));
+        } else {
+            constraints.push(Box::new(self.given(Mortar::new(coordinates, dofs, of(0), of(1))?)?));
+            for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
+                let corners = NodeToFacet::one_pass(coordinates, dofs, nodes, of(1 - body))?.facing(of(body))?;
+                constraints.push(Box::new(self.given(corners)?));
             }
-            constraints.push(Box::new(corners));
         }
         if D == 3 && sharp.iter().all(|nodes| !nodes.is_empty()) {
             let places: Vec<[T; 3]> = coordinates.iter().map(|x| std::array::from_fn(|i| x[i])).collect();
             let dofs: Vec<[usize; 3]> = dofs.iter().map(|dofs| std::array::from_fn(|i| dofs[i])).collect();
-            let mut edges = EdgeToEdge::new(&places, &dofs, of(0), of(1))?.sharp(angle)?;
-            if let Some(reach) = reach {
-                edges = edges.reach(reach)?;
-            }
-            constraints.push(Box::new(edges.with_law(law).friction(friction)));
+            let edges = match *rings {
+                Some(rings) => EdgeToEdge::of_itself(&places, &dofs, of(0))?.rings(rings),
+                None => EdgeToEdge::new(&places, &dofs, of(0), of(1))?,
+            };
+            constraints.push(Box::new(self.given(edges.sharp(self.angle)?)?));
         }
         Ok(constraints)
     }
+
+    /// One of the constraints with what it is given.
+    fn given<C: Part<T>>(&self, part: C) -> Result<C> {
+        let mut part = part.with_law(self.law).friction(self.friction);
+        if let Some(reach) = self.reach {
+            part = part.reach(reach)?;
+        }
+        if let Some(offsets) = &self.offsets {
+            part = part.offsets(offsets)?;
+        }
+        match self.ramp {
+            Some([times, factors]) => part.ramp(times, factors),
+            None => Ok(part),
+        }
+    }
 }
+
+/// What all constraints of the list take.
+trait Part<T: Real>: Sized {
+    fn with_law(self, law: ContactLaw) -> Self;
+    fn friction(self, coefficient: f64) -> Self;
+    fn reach(self, reach: T) -> Result<Self>;
+    fn offsets(self, offsets: &[T]) -> Result<Self>;
+    fn ramp(self, times: [f64; 2], factors: [f64; 2]) -> Result<Self>;
+}
+
+macro_rules! part {
+    ($($constraint:ident),*) => {$(
+        impl<T: Real> Part<T> for $constraint<T> {
+            fn with_law(self, law: ContactLaw) -> Self {
+                $constraint::with_law(self, law)
+            }
+
+            fn friction(self, coefficient: f64) -> Self {
+                $constraint::friction(self, coefficient)
+            }
+
+            fn reach(self, reach: T) -> Result<Self> {
+                $constraint::reach(self, reach)
+            }
+
+            fn offsets(self, offsets: &[T]) -> Result<Self> {
+                $constraint::offsets(self, offsets)
+            }
+
+            fn ramp(self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+                $constraint::ramp(self, times, factors)
+            }
+        }
+    )*};
+}
+
+part!(Mortar, NodeToFacet, EdgeToEdge);

@@ -6,7 +6,7 @@ mod pairs;
 mod passage;
 mod rows;
 
-use super::surface::{Facet, Neighborhood, Nodes, Point, Reach, Surface, add_scaled};
+use super::surface::{Facet, Kin, Neighborhood, Nodes, Offsets, Point, Ramp, Reach, Surface, Thickness, add_scaled};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -113,6 +113,9 @@ pub struct EdgeToEdge<T: Real> {
     nodes: Nodes,
     surfaces: [Surface; 2],
     edges: [Vec<Edge>; 2],
+    /// What edges do not meet of a surface against itself, and by how many rings it was found.
+    kin: Option<Kin>,
+    rings: usize,
     /// Nodes of the edges, by edge.
     ends_of: [Vec<[usize; 2]>; 2],
     /// For each dof whether an edge has it.
@@ -121,6 +124,7 @@ pub struct EdgeToEdge<T: Real> {
     finest: f64,
     law: ContactLaw,
     friction: f64,
+    thickness: Thickness,
     reach: Reach,
     /// Edges of the second surface near each of the first.
     neighborhood: Neighborhood,
@@ -153,23 +157,147 @@ impl<T: Real> EdgeToEdge<T> {
         other: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
         let (nodes, surfaces) = Nodes::with_surfaces(coordinates, dofs, one, other)?;
-        let mut contact = Self {
+        let mut contact = Self::between(nodes, surfaces);
+        contact.find_edges(SHARP)?;
+        Ok(contact)
+    }
+
+    /// Contact of the edges of a surface with each other, of a body that folds or of several bodies whose surfaces are
+    /// given as one: beside [`NodeToFacet::of_itself`](super::NodeToFacet::of_itself), or in a
+    /// [`BodyContact::of_itself`](super::BodyContact::of_itself).
+    ///
+    /// Each pair of edges is met once, the one of the smaller index being the first. Edges do not meet those beside
+    /// whose facets one of their own nodes is within one [ring](Self::rings), nor any that is behind one of their nodes
+    /// by more than half of the material there, as it is thick in the reference configuration.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::{Contacts, EdgeToEdge};
+    ///
+    /// // The ridge of a tetrahedron across that of another, 0.1 above it; one list of facets.
+    /// let coordinates = [
+    ///     [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 1.0, -1.0],
+    ///     [0.0, -1.0, 0.1], [0.0, 1.0, 0.1], [-1.0, 0.0, 1.1], [1.0, 0.0, 1.1],
+    /// ];
+    /// let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+    /// let facets = [
+    ///     [0, 1, 3], [1, 0, 2], [0, 3, 2], [1, 2, 3],
+    ///     [4, 5, 7], [5, 4, 6], [4, 7, 6], [5, 6, 7],
+    /// ];
+    /// let mut contact = EdgeToEdge::of_itself(&coordinates, &dofs, facets)?;
+    /// contact.search(0.0, &[0.0; 24], &[0.0; 24], 0.0)?;
+    /// let (contacts, edges) = (Contacts::of(&contact), contact.edges());
+    /// let pairs: Vec<_> = (0..contacts.len()).map(|row| contacts.name(row)).collect();
+    /// assert!(pairs.iter().any(|&(one, other)| [edges[0][one], edges[1][other]] == [[0, 1], [4, 5]]));
+    /// assert!(pairs.iter().all(|&(one, other)| one < other));
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`new`](Self::new) about coordinates, dofs and facets.
+    pub fn of_itself<F: Into<Facet>>(
+        coordinates: &[[T; 3]],
+        dofs: &[[usize; 3]],
+        facets: impl IntoIterator<Item = F>,
+    ) -> Result<Self> {
+        let nodes = Nodes::new(coordinates, dofs)?;
+        let surface = Surface::of_facets(facets, 3, &nodes.coordinates)?;
+        let mut contact = Self::between(nodes, [surface.clone(), surface]);
+        contact.rings = 1;
+        contact.find_kin();
+        contact.find_edges(SHARP)?;
+        Ok(contact)
+    }
+
+    /// Of two surfaces, whose edges are still to be found.
+    fn between(nodes: Nodes, surfaces: [Surface; 2]) -> Self {
+        Self {
             ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
             nodes,
             reach: Reach::new(surfaces[0].typical().max(surfaces[1].typical())),
             surfaces,
             edges: [Vec::new(), Vec::new()],
+            kin: None,
+            rings: 0,
             ends_of: [Vec::new(), Vec::new()],
             acts: Vec::new(),
             finest: f64::INFINITY,
             law: ContactLaw::Rigid,
             friction: 0.0,
+            thickness: Thickness::default(),
             neighborhood: Neighborhood::default(),
             rows: Rows::new(),
             found: Rows::new(),
-        };
-        contact.find_edges(SHARP)?;
-        Ok(contact)
+        }
+    }
+
+    /// How many rings of facets around the nodes of an edge it does not meet the edges of, of
+    /// [its own surface](Self::of_itself), as [`NodeToFacet::rings`](super::NodeToFacet::rings). By default 1.
+    #[must_use]
+    pub fn rings(mut self, rings: usize) -> Self {
+        self.rings = rings;
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        self
+    }
+
+    fn find_kin(&mut self) {
+        let body = self.surfaces[0].nodes().to_vec();
+        let known = (self.reach.least(), self.thickness.overlap(&[body.clone(), body]));
+        self.kin = Some(Kin::new(&self.surfaces[0], self.rings, &self.nodes.coordinates, known));
+        self.reach.forget();
+    }
+
+    /// Rounds the edges: how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh,
+    /// as [`NodeToFacet::offsets`](super::NodeToFacet::offsets). The gap is that of the lines less the radii of both
+    /// edges where they are closest, which are linear between nodes. Edges of a surface that lies inside of its facets
+    /// (negative offsets) are found a little early, by up to 0.4 of the offset at right angles: between its faces a body
+    /// is smaller by more than that.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::EdgeToEdge;
+    ///
+    /// // Two ridges that cross, 0.1 apart, of which each is coated by 0.02.
+    /// let coordinates = [
+    ///     [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 1.0, -1.0],
+    ///     [0.0, -1.0, 0.1], [0.0, 1.0, 0.1], [-1.0, 0.0, 1.1], [1.0, 0.0, 1.1],
+    /// ];
+    /// let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+    /// let (below, above) = ([[0, 1, 3], [1, 0, 2]], [[4, 5, 7], [5, 4, 6]]);
+    /// let mut contact = EdgeToEdge::new(&coordinates, &dofs, above, below)?.offsets(&[0.02; 8])?;
+    /// contact.search(0.0, &[0.0; 24], &[0.0; 24], 0.0)?;
+    /// let mut gap = [0.0];
+    /// contact.gaps(0.0, &[0.0; 24], &mut gap)?;
+    /// assert!((gap[0] - 0.06_f64).abs() < 1e-15);
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
+        self.thickness.set(offsets, self.nodes.coordinates.len())?;
+        self.reach.forget();
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        Ok(self)
+    }
+
+    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time, as [`Mortar::ramp`](super::Mortar::ramp).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+        self.thickness.ramp = Ramp::new(times, factors)?;
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        Ok(self)
     }
 
     /// The law of all rows.
@@ -195,6 +323,9 @@ impl<T: Real> EdgeToEdge<T> {
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
         self.reach.set_least(reach)?;
+        if self.kin.is_some() {
+            self.find_kin();
+        }
         Ok(self)
     }
 
@@ -243,7 +374,10 @@ impl<T: Real> EdgeToEdge<T> {
             body.sort_unstable();
             body.dedup();
         }
-        nodes.read_bodies(bodies)?;
+        match (&self.kin, bodies) {
+            (None, bodies) => nodes.read_bodies(bodies)?,
+            (Some(_), [body, _]) => nodes.read_body(body),
+        }
         self.acts.clear();
         self.acts.resize(nodes.dofs().len(), false);
         self.finest = edges.iter().flatten().map(|edge| edge.length).fold(f64::INFINITY, f64::min);
@@ -255,8 +389,10 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(())
     }
 
-    fn pair(&self, [first, second]: [usize; 2]) -> Pair<'_> {
-        pair(&self.edges, &self.surfaces, [first, second])
+    /// The edges at t.
+    fn sides(&self, t: f64) -> Sides<'_> {
+        let Self { edges, surfaces, kin, thickness, .. } = self;
+        Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) }
     }
 
     /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
@@ -268,16 +404,18 @@ impl<T: Real> EdgeToEdge<T> {
         self.neighborhood.build(one, other, listed);
     }
 
-    fn find_rows(&mut self, u: &[T], v: &[T], ahead: f64) {
-        let Self { nodes, edges, surfaces, neighborhood, found, reach, law, .. } = self;
+    fn find_rows(&mut self, (t, u, v): (f64, &[T], &[T]), ahead: f64) {
+        let Self { nodes, edges, surfaces, kin, thickness, neighborhood, found, reach, law, .. } = self;
+        let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
+        let [thick, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
         let at = |node: usize| nodes.positions[node];
         let velocity = |node: usize| nodes.vector(node, v);
         for (first, edge) in edges[0].iter().enumerate() {
             let bounds = edge.bounds(&nodes.positions);
             for &second in neighborhood.of(first) {
-                let pair = pair(edges, surfaces, [first, second]);
-                let way = ahead * pair.way(&velocity);
-                if !bounds.inflated(reach.least() + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
+                let Some(pair) = sides.meeting([first, second]) else { continue };
+                let way = growth + ahead * pair.way(&velocity);
+                if !bounds.inflated(reach.least() + thick + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
                     continue;
                 }
                 if let Some(crossing) = pair.near(reach.least(), way, &at) {
@@ -285,15 +423,45 @@ impl<T: Real> EdgeToEdge<T> {
                     let row = pair.row(&crossing, &at);
                     // (A spring is to be compressed.)
                     let inside = if law.is_compliant() { 0.0 } else { pair.kept_inside(row.0) };
-                    found.push(([first, second], crossing, inside), row, names, u);
+                    let round = (pair.radius(&crossing), pair.offsets.factor);
+                    found.push(([first, second], crossing, inside), round, row, names, u);
                 }
             }
         }
     }
 }
 
-fn pair<'a>(edges: &'a [Vec<Edge>; 2], surfaces: &'a [Surface; 2], [first, second]: [usize; 2]) -> Pair<'a> {
-    Pair { edges: [&edges[0][first], &edges[1][second]], surfaces: surfaces.each_ref() }
+/// The edges of two surfaces, or twice those of one, at some time.
+#[derive(Clone, Copy)]
+struct Sides<'a> {
+    edges: &'a [Vec<Edge>; 2],
+    surfaces: &'a [Surface; 2],
+    kin: Option<&'a Kin>,
+    offsets: Offsets<'a>,
+}
+
+impl<'a> Sides<'a> {
+    fn pair(&self, [first, second]: [usize; 2]) -> Pair<'a> {
+        let (edges, surfaces) = ([&self.edges[0][first], &self.edges[1][second]], self.surfaces.each_ref());
+        let depth = self.kin.map_or(f64::INFINITY, |kin| {
+            let nodes = edges.iter().flat_map(|edge| edge.nodes);
+            nodes.map(|node| kin.depth(surfaces[0].place(node))).fold(f64::INFINITY, f64::min)
+        });
+        Pair { edges, surfaces, offsets: self.offsets, depth }
+    }
+
+    /// Two edges that may meet: of one surface each pair once, and none whose facets are near each other on it.
+    fn meeting(&self, [first, second]: [usize; 2]) -> Option<Pair<'a>> {
+        let apart = self.kin.is_none_or(|kin| {
+            let keeps = |one: &Edge, other: &Edge| {
+                let places = one.nodes.map(|node| self.surfaces[0].place(node));
+                other.facets().iter().any(|&facet| places.iter().any(|&place| kin.keeps_apart(place, facet)))
+            };
+            let [one, other] = [&self.edges[0][first], &self.edges[1][second]];
+            first < second && !keeps(one, other) && !keeps(other, one)
+        });
+        apart.then(|| self.pair([first, second]))
+    }
 }
 
 impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
@@ -307,8 +475,9 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
         let Rows { affine, pairs, crossings, .. } = &self.rows;
+        let sides = self.sides(0.0);
         for (row, (&index, crossing)) in pairs.iter().zip(crossings).enumerate() {
-            let pair = self.pair(index);
+            let pair = sides.pair(index);
             let [ends, _] = pair.ends(&|node| self.nodes.positions[node]);
             let position = Edge::point(ends, crossing.shares[0].clamp(0.0, 1.0));
             let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -328,16 +497,17 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         }
     }
 
-    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         let boxes = self.nodes.move_to(u)?;
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
         if self.edges.iter().all(|edges| !edges.is_empty()) {
-            let range = self.reach.least() + ahead * speeds[0].farthest(&speeds[1]);
+            let [thick, growth] = self.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
+            let range = self.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
                 self.update_lists(range);
-                self.find_rows(u, v, ahead);
+                self.find_rows((t, u, v), ahead);
             }
         }
         let (rows, found) = (&self.rows, &self.found);
@@ -346,23 +516,25 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         Ok(Candidates::changed_if(!same))
     }
 
-    fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         // A trial state that is not finite: the gaps say so.
         if self.rows.pairs.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
-        let Self { nodes, edges, surfaces, rows, found, .. } = self;
+        let Self { nodes, edges, surfaces, kin, thickness, rows, found, .. } = self;
+        let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
         let at = |node: usize| nodes.positions[node];
         found.clear();
         for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {
-            let pair = pair(edges, surfaces, index);
+            let pair = sides.pair(index);
             // Edges that have become parallel: the row stays as it was.
             let crossing = Crossing::of(pair.ends(&at)).filter(|crossing| crossing.sine >= 0.5 * LEAST_SINE);
             match crossing.map(|crossing| crossing.as_seen_along(before.normal)) {
                 Some(crossing) => {
                     let names = (pair.nodes(), |node| nodes.places(node));
-                    found.push((index, crossing, rows.inside[row]), pair.row(&crossing, &at), names, u);
+                    let round = (pair.radius(&crossing), pair.offsets.factor);
+                    found.push((index, crossing, rows.inside[row]), round, pair.row(&crossing, &at), names, u);
                 }
                 None => found.keep(rows, row),
             }
@@ -372,21 +544,30 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         Ok(Candidates::changed_if(!same))
     }
 
-    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.pairs.len()) {
-            *gap = self.rows.affine.gap(row, u);
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        let now = self.thickness.ramp.at(t);
+        for ((row, gap), (radius, then)) in gaps.iter_mut().enumerate().zip(&self.rows.rounding) {
+            *gap = self.rows.affine.gap(row, u) - T::of((now - then) * radius);
         }
         Ok(())
     }
 
-    fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let Rows { pairs, crossings, .. } = &self.rows;
+        let (sides, ramp) = (self.sides(t), &self.thickness.ramp);
+        let [change, bend] = [ramp.rate(t), ramp.acceleration(t)];
         for (rates, (&index, crossing)) in rates.iter_mut().zip(pairs.iter().zip(crossings)) {
-            let pair = self.pair(index);
+            let pair = sides.pair(index);
             let at = |node: usize| add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
             let velocity = |node: usize| self.nodes.vector(node, v);
-            let acceleration = pair.acceleration(crossing, &at, &velocity);
-            *rates = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
+            let mut acceleration = pair.acceleration(crossing, &at, &velocity);
+            let mut rate = 0.0;
+            if change != 0.0 {
+                let radius = pair.radius(crossing);
+                rate = -change * radius;
+                acceleration -= 2.0 * change * pair.sliding(crossing, &at, &velocity) + bend * radius;
+            }
+            *rates = GapRates { rate: T::of(rate), acceleration: T::of(acceleration) };
         }
         Ok(Rates::Given)
     }

@@ -6,12 +6,11 @@ mod integrals;
 mod pairs;
 mod passage;
 mod points;
-mod ramp;
 mod rates;
 mod rows;
 mod second_order;
 
-use super::surface::{Bounds, Facet, Nodes, Point, Reach, Surface, sub};
+use super::surface::{Bounds, Facet, Nodes, Point, Ramp, Reach, Surface, Thickness, sub};
 use super::{
     BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
 };
@@ -19,9 +18,8 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use bonds::Bonds;
 use dual::Multiplier;
-use integrals::{Integrals, Offsets};
+use integrals::Integrals;
 use pairs::Pairs;
-use ramp::Ramp;
 use rows::{Made, Rows};
 
 /// Share of the reach above which a row that nothing lies over any more is open.
@@ -111,9 +109,7 @@ pub struct Mortar<T: Real> {
     law: ContactLaw,
     friction: f64,
     reach: Reach,
-    /// How far surfaces lie outside of their facets, by node; empty if they do not.
-    offsets: Vec<f64>,
-    ramp: Ramp,
+    thickness: Thickness,
     bonds: Option<Bonds<T>>,
     multiplier: Multiplier,
     pairs: Pairs,
@@ -158,8 +154,7 @@ impl<T: Real> Mortar<T> {
             master,
             law: ContactLaw::Rigid,
             friction: 0.0,
-            offsets: Vec::new(),
-            ramp: Ramp::default(),
+            thickness: Thickness::default(),
             bonds: None,
             multiplier: Multiplier::default(),
             pairs: Pairs::default(),
@@ -231,7 +226,7 @@ impl<T: Real> Mortar<T> {
     /// Refuses bonds of surfaces with offsets, for what lies upon what is found for facets, and with dual functions.
     fn with_fitting_bonds(self) -> Result<Self> {
         let (part, reason) = match (self.bonds.is_some(), self.multiplier) {
-            (true, _) if !self.offsets.is_empty() => (
+            (true, _) if !self.thickness.is_none() => (
                 "bonds between surfaces with offsets",
                 "what is bonded is found where facets lie upon each other; give facets on the surfaces",
             ),
@@ -270,14 +265,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node);
     /// [`Error::Incompatible`] with [bonds](Self::bonded).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        let (expected, found) = (self.nodes.coordinates.len(), offsets.len());
-        if found != expected {
-            return Err(Error::Dimension { what: "the list of offsets by node", expected, found });
-        }
-        self.offsets = offsets.iter().map(|offset| offset.value()).collect();
-        if let Some((index, &value)) = self.offsets.iter().enumerate().find(|(_, offset)| !offset.is_finite()) {
-            return Err(Error::NotFinite { what: "the list of offsets (by node)", index, value });
-        }
+        self.thickness.set(offsets, self.nodes.coordinates.len())?;
         self.reach.forget();
         self.with_fitting_bonds()
     }
@@ -294,7 +282,7 @@ impl<T: Real> Mortar<T> {
     ///
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.ramp = Ramp::new(times, factors)?;
+        self.thickness.ramp = Ramp::new(times, factors)?;
         Ok(self)
     }
 
@@ -391,16 +379,7 @@ impl<T: Real> Mortar<T> {
 
     /// Bounds of the sum of the offsets of both surfaces at t, below and above zero.
     fn thickest(&self, t: f64) -> [f64; 2] {
-        if self.offsets.is_empty() {
-            return [0.0; 2];
-        }
-        let factor = self.ramp.at(t);
-        let of = |body: &Vec<usize>| {
-            let sizes = body.iter().map(|&node| factor * self.offsets[node]);
-            sizes.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-        };
-        let [one, other] = self.nodes.bodies().each_ref().map(of);
-        [(one[0] + other[0]).min(0.0), (one[1] + other[1]).max(0.0)]
+        self.thickness.bounds(self.nodes.bodies(), self.thickness.ramp.at(t))
     }
 
     /// How deep surfaces may be in each other at t and be found.
@@ -420,9 +399,8 @@ impl<T: Real> Mortar<T> {
     }
 
     fn integrate(&mut self, t: f64) {
-        let Self { integrals, slave, master, nodes, pairs, offsets, ramp, multiplier, .. } = self;
-        let offsets = Offsets { by_node: offsets, factor: ramp.at(t) };
-        integrals.integrate([slave, master], &nodes.positions, offsets, *multiplier, |facet| pairs.of(facet));
+        let Self { integrals, slave, master, nodes, pairs, thickness, multiplier, .. } = self;
+        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, |facet| pairs.of(facet));
     }
 }
 
@@ -465,7 +443,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         if boxes[0].inflated(range).intersects(&boxes[1]) {
             self.find_pairs(t, range);
             self.integrate(t);
-            let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.ramp.at(t), u };
+            let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.thickness.ramp.at(t), u };
             let is_bonded = |place: usize| self.bonds.as_ref().is_some_and(|bonds| bonds.hold(place));
             for place in (0..self.slave.nodes().len()).filter(|&place| !is_bonded(place)) {
                 self.found.push(place, &self.integrals, &made);
@@ -498,8 +476,8 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
         let near = self.rows.places.iter().all(is_covered)
             || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
-        let Self { rows, found, integrals, nodes, slave, reach, ramp, .. } = self;
-        let made = Made { rubs: count > 0, nodes, factor: ramp.at(t), u };
+        let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
+        let made = Made { rubs: count > 0, nodes, factor: thickness.ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, &made) {
                 continue;
@@ -519,7 +497,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.ramp.at(t);
+        let factor = self.thickness.ramp.at(t);
         let (own, tied) = gaps.split_at_mut(self.rows.spots.len());
         for (row, (gap, spot)) in own.iter_mut().zip(&self.rows.spots).enumerate() {
             *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);

@@ -4,11 +4,13 @@ mod candidates;
 mod passage;
 mod rows;
 
-use super::surface::{Bounds, Facet, Kin, Neighborhood, Nodes, Point, Reach, Shape, Surface, add_scaled, overhang};
+use super::surface::{
+    Bounds, Facet, Kin, Neighborhood, Nodes, Point, Ramp, Reach, Shape, Surface, Thickness, add_scaled, overhang,
+};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use candidates::pass_of;
+use candidates::{gap_of, pass_of};
 use rows::Rows;
 
 /// One direction of contact: nodes against a surface.
@@ -135,6 +137,7 @@ pub struct NodeToFacet<T: Real> {
     passes: Vec<Pass>,
     law: ContactLaw,
     friction: f64,
+    thickness: Thickness,
     reach: Reach,
     rebuilds: usize,
     /// The node that a node of the first pass stands on exactly, where that one may stand on it.
@@ -249,6 +252,7 @@ impl<T: Real> NodeToFacet<T> {
             passes: vec![Pass::new(nodes)],
             law: ContactLaw::Rigid,
             friction: 0.0,
+            thickness: Thickness::default(),
             rebuilds: 0,
             partners: Vec::new(),
             rows: Rows::with_capacity(0, 0),
@@ -316,7 +320,9 @@ impl<T: Real> NodeToFacet<T> {
     }
 
     fn find_kin(&mut self) {
-        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, self.reach.least()));
+        let body = self.surface.nodes().to_vec();
+        let known = (self.reach.least(), self.thickness.overlap(&[body.clone(), body]));
+        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, known));
         self.reach.forget();
     }
 
@@ -350,6 +356,60 @@ impl<T: Real> NodeToFacet<T> {
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
+    }
+
+    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh, and of nodes that
+    /// belong to no facet how thick they are: half the thickness of a shell whose facets are its middle surface, the
+    /// thickness of a coating, the radius of a cable; negative if they lie inside. Between nodes the shape functions
+    /// interpolate. The gap is the distance less the offsets of the node and of the closest point of the facet, and a
+    /// node meets the facet whose surface is closest. What a varying offset changes by as the closest point slides is in
+    /// the rows: forces then have a share along the facet, and keep linear and angular momentum.
+    ///
+    /// Forces act on nodes and facets: that a friction force acts at a distance from the middle surface is left out. In
+    /// dents sides are found that share a vertex with the closest facet: so in a dent of 90° with an offset of no more
+    /// than a facet's length. [Of itself](Self::of_itself) a body meets what is near beyond its [rings](Self::rings), so
+    /// a fold tighter than its offset is inside of itself.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactConstraint;
+    /// use contact_dynamics::contact::NodeToFacet;
+    ///
+    /// // The middle surfaces of two sheets, 0.1 apart, of which each is 0.06 thick.
+    /// let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.1], [1.0, 0.1]];
+    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    /// let mut contact = NodeToFacet::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])?.offsets(&[0.03; 4])?;
+    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
+    /// let mut gaps = [0.0; 2];
+    /// contact.gaps(0.0, &[0.0; 8], &mut gaps)?;
+    /// assert!(gaps.iter().all(|gap: &f64| (gap - 0.04).abs() < 1e-15));
+    /// # Ok::<(), contact_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
+        self.thickness.set(offsets, self.nodes.coordinates.len())?;
+        self.reach.forget();
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        Ok(self)
+    }
+
+    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
+    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration, as
+    /// [`Mortar::ramp`](super::Mortar::ramp).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+        self.thickness.ramp = Ramp::new(times, factors)?;
+        if self.kin.is_some() {
+            self.find_kin();
+        }
+        Ok(self)
     }
 
     /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the
@@ -476,23 +536,25 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         }
     }
 
-    fn search(&mut self, _t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
         let boxes = self.nodes.move_to(u)?;
         let motions = self.reach.motions(&self.nodes);
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
-        let range = self.reach.least() + ahead * speeds[0].farthest(&speeds[1]);
+        let [thick, growth] = self.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
+        let near = self.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
+        let range = near + thick;
         // Facets go on a little beyond the rim.
         let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
         for pass in &mut self.passes {
-            pass.clearance.fill(range);
+            pass.clearance.fill(near);
         }
         if boxes[0].inflated(wide).intersects(&boxes[1]) {
             self.update_lists(&motions, range);
             self.partners.fill(None);
             for pass in 0..self.passes.len() {
-                self.find_rows(pass, (&boxes[1 - pass].inflated(wide), &speeds[1 - pass]), u, v, ahead);
+                self.find_rows(pass, (&boxes[1 - pass].inflated(wide), &speeds[1 - pass]), (t, u, v), ahead);
             }
         }
         let (rows, found) = (&self.rows, &self.found);
@@ -518,14 +580,15 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         self.look_at(step)
     }
 
-    fn gaps(&mut self, _t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        let factor = self.thickness.ramp.at(t);
         for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
-            *gap = self.rows.affine.gap(row, u);
+            *gap = gap_of(&self.rows, row, factor, u);
         }
         Ok(())
     }
 
-    fn rates(&mut self, _t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let Rows { identities, stands, .. } = &self.rows;
         for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(stands) {
             let surface = self.own_surface.as_ref().filter(|_| pass_of(candidate) > 0).unwrap_or(&self.surface);
@@ -533,8 +596,16 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
             let [x, speed] = self.moving(node, u, v);
             let [shape, velocity] = [0, 1].map(|k| Shape::new(corners.map(|corner| corner[k]), facet.count));
-            let acceleration = stand.acceleration(x, speed, &shape, &velocity);
-            *out = GapRates { rate: T::zero(), acceleration: T::of(acceleration) };
+            let mut acceleration = stand.acceleration(x, speed, &shape, &velocity);
+            let (offsets, ramp) = (self.thickness.at(t), &self.thickness.ramp);
+            let mut rate = 0.0;
+            if !offsets.is_none() {
+                let [slides, bends] = stand.sliding(speed, (&shape, &velocity), offsets.at_corners(facet));
+                rate = -ramp.rate(t) * stand.offset;
+                acceleration -=
+                    offsets.factor * bends + 2.0 * ramp.rate(t) * slides + ramp.acceleration(t) * stand.offset;
+            }
+            *out = GapRates { rate: T::of(rate), acceleration: T::of(acceleration) };
         }
         Ok(Rates::Given)
     }

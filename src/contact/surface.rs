@@ -5,22 +5,27 @@ mod dent;
 mod facet;
 mod kin;
 mod nodes;
+mod offsets;
 mod outer;
 mod output;
 mod overlap;
 mod projection;
+mod ramp;
 mod reach;
 mod search;
 mod second_difference;
 mod second_order;
 mod shape;
 mod sharp;
+mod slide;
 
 pub use facet::Facet;
 pub(crate) use kin::Kin;
 pub(crate) use nodes::{Nodes, points};
+pub(crate) use offsets::{Offsets, Thickness};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand};
+pub(crate) use ramp::Ramp;
 pub(crate) use reach::Reach;
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use second_difference::SecondDifference;
@@ -419,6 +424,35 @@ impl Surface {
         found
     }
 
+    /// Whether a point at this way from a side or a vertex of a facet is in front of a facet there that the others lie
+    /// behind of: it is outside then, on whichever side of the mean normal. (The facets whose closest points are nearer
+    /// may be none that its node meets.)
+    fn is_outside(&self, facet: usize, location: Location, arm: Point, positions: &[Point]) -> bool {
+        /// Share of a facet that a point is in front of one: edges that are flush, to a little, are those of one surface.
+        const FLUSH: f64 = 0.02;
+        const ROUNDING: f64 = 1e-9;
+        let (corner, neighbor) = match location {
+            Location::Side(k) => (k, self.neighbors[facet][k].map(|(neighbor, _)| neighbor)),
+            Location::Vertex(k) => (k, None),
+            Location::Inside | Location::Beyond => return false,
+        };
+        let at = positions[self.facets[facet].nodes[corner]];
+        let is_there = |other: usize| match location {
+            Location::Side(_) => other == facet || Some(other) == neighbor,
+            _ => true,
+        };
+        let there = || self.facets_at(facet, corner).filter(|&other| is_there(other));
+        there().any(|one| {
+            let shape = self.facets[one].shape(positions);
+            let Some(normal) = shape.normal(&[1.0 / shape.corners().len() as f64; 4]) else { return false };
+            let is_behind = |other: usize| {
+                let shape = self.facets[other].shape(positions);
+                dot(normal, sub(shape.middle(), at)) <= ROUNDING * shape.size()
+            };
+            dot(normal, arm) > FLUSH * shape.size() && there().all(|other| other == one || is_behind(other))
+        })
+    }
+
     /// The normal along which a node at p stands on a facet, and its signed distance along it.
     ///
     /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
@@ -458,7 +492,8 @@ impl Surface {
         if touching || foot.location == Location::Inside {
             return Some((mean, dot(mean, arm)));
         }
-        let side = if dot(mean, arm) < 0.0 { -1.0 } else { 1.0 };
+        let is_behind = dot(mean, arm) < 0.0 && !self.is_outside(facet, location, arm, positions);
+        let side = if is_behind { -1.0 } else { 1.0 };
         Some((unit(arm)?.map(|x| side * x), side * foot.distance))
     }
 }

@@ -1,7 +1,8 @@
 //! Bodies with faces, corners and edges: what keeps them apart, and how many constraints that takes.
 
-use contact_dynamics::contact::{BodyContact, Facet};
+use contact_dynamics::contact::{BodyContact, EdgeToEdge, Facet, Surface};
 use contact_dynamics::{Composite, Error, PersistencyCorrection, Simulation, StepControl};
+use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::random::xorshift;
@@ -46,6 +47,90 @@ fn a_reentrant_corner_is_not_sharp() {
     let triangle = [[6, 7], [7, 8], [8, 6]].map(Facet::from);
     let contact = BodyContact::new(&coordinates, &dofs, l, triangle).unwrap();
     assert_eq!(contact.sharp_nodes(), &[vec![0, 1, 2, 4, 5], vec![6, 7, 8]]);
+}
+
+#[test]
+fn a_surface_against_itself_has_nodes_and_edges() {
+    let cubes =
+        Solid::block([1.0; 3], [2; 3], MATERIAL).with(Solid::block([1.0; 3], [2; 3], MATERIAL).moved([0.0, 0.0, 1.1]));
+    let of_itself = || {
+        let surface = Surface::of_cells(&cubes.nodes, &cubes.elements).unwrap();
+        BodyContact::of_itself(&cubes.nodes, &cubes.node_dofs(), &surface).unwrap()
+    };
+    assert_eq!(of_itself().sharp_nodes().each_ref().map(Vec::len), [2 * (8 + 12); 2]);
+    assert_eq!(of_itself().constraints().unwrap().len(), 2);
+    // What is not sharp has no edges.
+    assert_eq!(of_itself().sharp(1.6).unwrap().constraints().unwrap().len(), 1);
+    let square = Solid::rectangle([1.0; 2], [2; 2], MATERIAL);
+    let surface = Surface::of_cells(&square.nodes, &square.elements).unwrap();
+    let flat = BodyContact::of_itself(&square.nodes, &square.node_dofs(), &surface).unwrap();
+    assert_eq!(flat.constraints().unwrap().len(), 1);
+}
+
+#[test]
+fn edges_of_bodies_that_do_not_fold_do_not_meet_each_other() {
+    let block = Solid::block([1.0; 3], [3; 3], MATERIAL);
+    let plates = [1, 2].map(|layers| Solid::block([1.0, 1.0, 0.02], [6, 6, layers], MATERIAL));
+    let wedge = Solid::block([1.0; 3], [4; 3], MATERIAL).mapped(|[x, y, z]| [x, y, z * (0.02 + 0.4 * x)]);
+    for solid in plates.iter().chain([&block, &wedge]) {
+        let surface = Surface::of_cells(&solid.nodes, &solid.elements).unwrap();
+        for reach in [0.05, 0.3, 2.0] {
+            let edges = EdgeToEdge::of_itself(&solid.nodes, &solid.node_dofs(), &surface).unwrap();
+            let mut edges = edges.reach(reach).unwrap();
+            let velocity: Vec<f64> = solid.nodes.iter().flat_map(|[x, y, _]| [-y, *x, 0.0]).collect();
+            for speed in [0.0, 1.0] {
+                let (u, v) = (vec![0.0; solid.dofs()], velocity.iter().map(|v| speed * v).collect::<Vec<_>>());
+                edges.search_on(0.0, &u, &v, 0.05).unwrap();
+                // (What spins sees some that are open, around its corners.)
+                let mut gaps = vec![0.0; edges.candidates()];
+                edges.gap(0.0, &u, &mut gaps);
+                assert!(gaps.iter().all(|gap| *gap > 0.0), "{reach} {speed}: {gaps:?}");
+                assert!(speed > 0.0 || gaps.is_empty(), "{reach}: {gaps:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn piles_of_bodies_gain_no_energy() {
+    // Two and three cubes, the upper ones turned, fall on each other with edges across edges; in two units of length.
+    let cube = |angle: f64, height: f64| {
+        let cube = Solid::block([1.0; 3], [2; 3], MATERIAL).moved([-0.5, -0.5, -0.5]);
+        cube.rotated([1.0, 0.0, 0.0], angle).rotated([0.0, 0.0, 1.0], 1.3 * angle).moved([0.1 * angle, 0.0, height])
+    };
+    for count in [2, 3] {
+        let tilts = [std::f64::consts::FRAC_PI_4, -0.6, 0.4];
+        let pile = (1..count).fold(cube(tilts[0], 0.0), |pile, k| pile.with(cube(tilts[k], 1.45 * k as f64)));
+        let fall = |unit: f64| {
+            let nodes: Vec<[f64; 3]> = pile.nodes.iter().map(|x| x.map(|x| unit * x)).collect();
+            let surface = Surface::of_cells(&nodes, &pile.elements).unwrap();
+            let contact = BodyContact::of_itself(&nodes, &pile.node_dofs(), &surface).unwrap();
+            let velocity = pile.nodes.iter().flat_map(|x| [0.0, 0.0, -0.1 * unit * (x[2] / 1.45).round()]);
+            let mut run = Simulation::builder(pile.system::<f64>(), Composite, 0.1)
+                .velocity(velocity.collect())
+                .constraints(contact.constraints().unwrap())
+                .corrector(PersistencyCorrection::with_history_projection())
+                .step_control(StepControl::halving(1e-3).unwrap())
+                .build()
+                .unwrap();
+            let up: Vec<f64> = (0..pile.dofs()).map(|dof| f64::from(u8::from(dof % 3 == 2))).collect();
+            let (energy, momentum) = (run.energy().total(), run.momentum(&up).unwrap());
+            let (mut most, mut pressed) = (energy, 0);
+            while run.time() < 12.0 {
+                run.step().unwrap();
+                most = most.max(run.energy().total());
+                pressed = pressed.max(run.state().contacts().forces().iter().filter(|force| **force > 0.0).count());
+            }
+            let change = run.momentum(&up).unwrap() - momentum;
+            assert!(pressed > 0 && most < 1.001 * energy, "{count}, {unit}: {pressed} press, {}", most / energy);
+            assert!(change.abs() < 1e-10 * momentum.abs(), "{count}, {unit}: {change:e} of {momentum:e}");
+            run.state().displacement().iter().map(|u| u / unit).collect::<Vec<_>>()
+        };
+        let end = fall(1.0);
+        let largest = end.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        let other = fall(1024.0);
+        assert!(end.iter().zip(other).all(|(one, other)| (one - other).abs() < 1e-9 * largest), "{count}");
+    }
 }
 
 #[test]

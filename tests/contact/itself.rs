@@ -77,6 +77,24 @@ fn nothing_is_inside_where_nothing_was() {
 }
 
 #[test]
+fn what_hangs_beside_an_edge_is_outside() {
+    // A thin plate beside a box: its outer corner faces the top of the box, not the side that is nearer, and is behind
+    // the mean of the normals at the edge between both.
+    let flat = Solid::rectangle([1.0; 2], [1; 2], MATERIAL)
+        .with(Solid::rectangle([0.08, 1.0], [1, 1], MATERIAL).moved([1.02, 0.7]));
+    let found = rows(of_itself(&flat).reach(1.0).unwrap());
+    assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
+    let [below, beside] = [0, 1].map(|k| Surface::of_cells(&flat.nodes, &flat.elements[k..=k]).unwrap());
+    let two = NodeToFacet::new(&flat.nodes, &flat.node_dofs(), &beside, &below).unwrap();
+    let found = rows(two.reach(1.0).unwrap());
+    assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
+    let deep = Solid::block([1.0; 3], [1; 3], MATERIAL)
+        .with(Solid::block([0.08, 0.5, 1.0], [1; 3], MATERIAL).moved([1.02, 0.2, 0.7]));
+    let found = rows(of_itself(&deep).reach(1.0).unwrap());
+    assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
+}
+
+#[test]
 fn arms_of_a_hairpin_face_each_other() {
     let slot = 0.1;
     let pin = Folding::hairpin(slot, 0.0).solid;

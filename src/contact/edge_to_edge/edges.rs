@@ -64,6 +64,11 @@ impl Edge {
         edges
     }
 
+    /// The two facets beside it.
+    pub(super) fn facets(&self) -> [usize; 2] {
+        self.sides.map(|(facet, _)| facet)
+    }
+
     /// Nodes of the two facets beside it.
     pub(super) fn around<'a>(&self, surface: &'a Surface) -> impl Iterator<Item = usize> + use<'a> {
         self.sides.into_iter().flat_map(|(facet, _)| surface.facets()[facet].nodes().iter().copied())

@@ -2,7 +2,7 @@
 
 use super::edges::Edge;
 use super::lines::{Crossing, Ways};
-use crate::contact::surface::{Bounds, Point, Surface, add_scaled, sub};
+use crate::contact::surface::{Bounds, Offsets, Point, Surface, add_scaled, dot, sub};
 
 /// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
 /// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
@@ -38,6 +38,10 @@ const LARGEST_TURN: f64 = 0.5;
 pub(super) struct Pair<'a> {
     pub(super) edges: [&'a Edge; 2],
     pub(super) surfaces: [&'a Surface; 2],
+    /// By how much the edges are rounded.
+    pub(super) offsets: Offsets<'a>,
+    /// How deep the edges may lie in each other where they are those of one body.
+    pub(super) depth: f64,
 }
 
 impl Pair<'_> {
@@ -55,6 +59,22 @@ impl Pair<'_> {
     pub(super) fn way(&self, vector: &impl Fn(usize) -> Point) -> f64 {
         let [one, other] = self.edges.map(|edge| Bounds::of_points(edge.ends(vector)));
         one.farthest(&other)
+    }
+
+    /// The radii of the edges at their ends, without their factor.
+    fn radii(&self) -> [[f64; 2]; 2] {
+        self.edges.map(|edge| edge.nodes.map(|node| self.offsets.of(node)))
+    }
+
+    /// The sum of the radii of both edges where they are closest, without its factor.
+    pub(super) fn radius(&self, crossing: &Crossing) -> f64 {
+        let between = |([from, to], share): ([f64; 2], f64)| from + share * (to - from);
+        self.radii().into_iter().zip(crossing.shares).map(between).sum()
+    }
+
+    /// The gap of the lines less the radii.
+    pub(super) fn clear(&self, crossing: &Crossing) -> f64 {
+        crossing.gap - self.offsets.factor * self.radius(crossing)
     }
 
     fn shorter(&self) -> f64 {
@@ -97,21 +117,23 @@ impl Pair<'_> {
     /// step in which they move against each other by a way of about this length.
     pub(super) fn near(&self, reach: f64, way: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
         let crossing = Crossing::of(self.ends(at)).filter(|crossing| {
+            let rounded = (self.offsets.factor * self.radius(crossing)).abs();
             let mut excess = crossing.excess().into_iter().zip(self.edges);
             // Where lines meet at an angle φ their closest points move 1/sin φ times as fast as they do.
             crossing.sine >= LEAST_SINE
-                && crossing.gap.abs() <= reach + way
+                && crossing.gap.abs() <= reach + rounded + way
                 && excess.all(|(x, edge)| x * edge.length <= UNFORESEEN * edge.length + 2.0 * way / crossing.sine)
         })?;
         let shorter = self.shorter();
-        let touches = crossing.gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
-        let turn = if touches { LARGEST_TURN } else { (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN) };
+        let turn = (UNFORESEEN + 2.0 * way / shorter).min(LARGEST_TURN);
         let deepest = reach.min(DEEPEST * shorter) + way;
         let is_near = |crossing: &Crossing| {
-            let misses = self.misses_normal(crossing, at);
+            let (misses, gap) = (self.misses_normal(crossing, at), self.clear(crossing));
+            let touches = gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
             // What is in already must be in the bodies, and meet; what comes must come from outside.
-            let inside = || misses <= ROUNDING && crossing.gap >= -deepest && self.is_inside(crossing, at);
-            misses <= turn && (touches || crossing.gap >= -SHALLOW * shorter || inside())
+            let inside = || misses <= ROUNDING && gap >= -deepest && self.is_inside(crossing, at);
+            let is_met = misses <= if touches { LARGEST_TURN } else { turn };
+            is_met && crossing.gap >= -self.depth && (touches || gap >= -SHALLOW * shorter || inside())
         };
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
@@ -137,13 +159,40 @@ impl Pair<'_> {
     /// The gap of the edges, and its derivatives by the positions of the four ends: those of the lines where closest
     /// points are on the edges. Beyond an end the gap opens, slowly at first, so that both are continuous.
     pub(super) fn row(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> (f64, [Point; 4]) {
-        let row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
-        let Some((edge, [opening, slope, _])) = self.opening(crossing) else { return (crossing.gap, row) };
-        let gradient = crossing.share_gradient(edge, self.ends(at));
-        (crossing.gap + opening, [0, 1, 2, 3].map(|k| add_scaled(row[k], slope, gradient[k])))
+        let mut row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
+        let (opening, slopes) = self.by_shares(crossing);
+        for (edge, slope) in slopes.into_iter().enumerate().filter(|&(_, slope)| slope != 0.0) {
+            let gradient = crossing.share_gradient(edge, self.ends(at));
+            row = [0, 1, 2, 3].map(|k| add_scaled(row[k], slope, gradient[k]));
+        }
+        (self.clear(crossing) + opening, row)
     }
 
-    /// d²g/dτ² of that gap along straight ways at some velocities. (Shares beyond an end from differences.)
+    /// The opening of the gap beyond an end, and what the gap changes by with the shares along either edge, from that
+    /// and from their radii.
+    fn by_shares(&self, crossing: &Crossing) -> (f64, [f64; 2]) {
+        let mut slopes = self.radii().map(|[from, to]| -self.offsets.factor * (to - from));
+        let Some((edge, [opening, slope, _])) = self.opening(crossing) else { return (0.0, slopes) };
+        slopes[edge] += slope;
+        (opening, slopes)
+    }
+
+    /// The rate of the sum of the radii, in full size, along straight ways at some velocities.
+    pub(super) fn sliding(
+        &self,
+        crossing: &Crossing,
+        at: &impl Fn(usize) -> Point,
+        velocity: &impl Fn(usize) -> Point,
+    ) -> f64 {
+        let of_edge = |edge: usize, [from, to]: [f64; 2]| {
+            let gradient = crossing.share_gradient(edge, self.ends(at));
+            let speeds = self.nodes().map(velocity);
+            (to - from) * gradient.into_iter().zip(speeds).map(|(weight, speed)| dot(weight, speed)).sum::<f64>()
+        };
+        self.radii().into_iter().enumerate().map(|(edge, radii)| of_edge(edge, radii)).sum()
+    }
+
+    /// d²g/dτ² of that gap along straight ways at some velocities. (Shares from differences.)
     pub(super) fn acceleration(
         &self,
         crossing: &Crossing,
@@ -154,13 +203,22 @@ impl Pair<'_> {
         let (ends, speeds) = (self.ends(at), self.ends(velocity));
         let lines = crossing.acceleration(ends, speeds);
         let way = self.way(velocity);
-        let Some((edge, [_, slope, bend])) = self.opening(crossing).filter(|_| way > 0.0) else { return lines };
+        let (_, slopes) = self.by_shares(crossing);
+        if slopes.iter().all(|slope| *slope == 0.0) || way == 0.0 {
+            return lines;
+        }
+        let bend = self.opening(crossing).map(|(edge, [.., bend])| (edge, bend));
         let time = STEP * self.shorter() / way;
         let ways = Ways::new(ends, speeds);
-        let share = |time: f64| Crossing::of(ways.at(time)).map_or(crossing.shares[edge], |then| then.shares[edge]);
-        let [before, now, after] = [-time, 0.0, time].map(share);
-        let (first, second) = ((after - before) / (2.0 * time), (after - 2.0 * now + before) / (time * time));
-        lines + slope * second + bend * first * first
+        let shares =
+            [-time, 0.0, time].map(|time| Crossing::of(ways.at(time)).map_or(crossing.shares, |then| then.shares));
+        let of_edge = |edge: usize| {
+            let [before, now, after] = shares.map(|shares| shares[edge]);
+            let (first, second) = ((after - before) / (2.0 * time), (after - 2.0 * now + before) / (time * time));
+            let bend = bend.filter(|bend| bend.0 == edge).map_or(0.0, |bend| bend.1);
+            slopes[edge] * second + bend * first * first
+        };
+        lines + of_edge(0) + of_edge(1)
     }
 }
 

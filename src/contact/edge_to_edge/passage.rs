@@ -37,7 +37,7 @@ impl<T: Real> EdgeToEdge<T> {
     fn look_along(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
         for (row, &index) in self.rows.pairs.iter().enumerate() {
-            if let Err((what, way, gap)) = self.look_at_row(row, step, &self.pair(index), (&start, &end)) {
+            if let Err((what, way, gap)) = self.look_at_row(row, step, index, (&start, &end)) {
                 return Err(step.refuse((index[0], index[1]), what, way, gap));
             }
         }
@@ -53,7 +53,7 @@ impl<T: Real> EdgeToEdge<T> {
             let list = listed.then(|| self.neighborhood.of(first));
             for k in 0..list.map_or(self.edges[1].len(), <[usize]>::len) {
                 let index = [first, list.map_or(k, |list| list[k])];
-                let pair = self.pair(index);
+                let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
                 // What a spring stops goes in.
                 let springs = self.law.is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
                 if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
@@ -72,9 +72,10 @@ impl<T: Real> EdgeToEdge<T> {
         &self,
         row: usize,
         step: &Stride<'_, T>,
-        pair: &Pair<'_>,
+        index: [usize; 2],
         (start, end): (&impl Fn(usize) -> Point, &impl Fn(usize) -> Point),
     ) -> std::result::Result<(), (&'static str, f64, f64)> {
+        let [pair_before, pair] = step.t.map(|t| self.sides(t).pair(index));
         if step.closed[0][row] || !step.closed[1][row] {
             return Ok(());
         }
@@ -84,22 +85,23 @@ impl<T: Real> EdgeToEdge<T> {
             return Ok(());
         };
         let [from, to] = [from, to].map(|crossing| crossing.as_seen_along(normal));
+        let gap = pair_before.clear(&from);
         let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
         let way = norm(motion(by, to.shares));
         if way <= FINE * self.finest {
             return Ok(());
         }
         if !pair.is_about(&to, end) {
-            return Err(("was stopped where the edges do not meet", way, from.gap));
+            return Err(("was stopped where the edges do not meet", way, gap));
         }
-        if (to.gap + self.rows.inside[row]).abs() > LARGEST_MISS * way {
-            return Err(("was stopped away from the other edge", way, from.gap));
+        if (pair.clear(&to) + self.rows.inside[row]).abs() > LARGEST_MISS * way {
+            return Err(("was stopped away from the other edge", way, gap));
         }
         let speed = motion(pair.ends(&|node| self.nodes.vector(node, step.v)), from.shares);
         let size = norm(speed);
         let shares = || [from.normal, to.normal].map(|normal| dot(normal, speed) / size);
         if way > COARSE * self.finest && size > 0.0 && press_differently(shares()) {
-            return Err(("was stopped along a normal that is not the one where the edges met", way, from.gap));
+            return Err(("was stopped along a normal that is not the one where the edges met", way, gap));
         }
         Ok(())
     }

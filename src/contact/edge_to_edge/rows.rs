@@ -14,19 +14,28 @@ pub(super) struct Rows<T> {
     /// By how much they were in each other at the search, but for what a step takes them out; gaps are measured from
     /// there.
     pub(super) inside: Vec<f64>,
+    /// The sum of their radii in full size, and the factor that the gap was made with.
+    pub(super) rounding: Vec<(f64, f64)>,
     /// The lines through them, with the normal along which the first edge opens.
     pub(super) crossings: Vec<Crossing>,
 }
 
 impl<T: Real> Rows<T> {
     pub(super) fn new() -> Self {
-        Self { affine: AffineRows::with_capacity(0, 0), pairs: Vec::new(), inside: Vec::new(), crossings: Vec::new() }
+        Self {
+            affine: AffineRows::with_capacity(0, 0),
+            pairs: Vec::new(),
+            inside: Vec::new(),
+            rounding: Vec::new(),
+            crossings: Vec::new(),
+        }
     }
 
     pub(super) fn clear(&mut self) {
         self.affine.clear();
         self.pairs.clear();
         self.inside.clear();
+        self.rounding.clear();
         self.crossings.clear();
     }
 
@@ -34,6 +43,7 @@ impl<T: Real> Rows<T> {
     pub(super) fn push<'a>(
         &mut self,
         (pair, crossing, inside): ([usize; 2], Crossing, f64),
+        rounding: (f64, f64),
         (gap, row): (f64, [Point; 4]),
         (nodes, places): ([usize; 4], impl Fn(usize) -> &'a [usize]),
         u: &[T],
@@ -41,6 +51,7 @@ impl<T: Real> Rows<T> {
         let entries = nodes.into_iter().zip(row).flat_map(|(node, weights)| places(node).iter().copied().zip(weights));
         self.affine.push(gap + inside, entries, u);
         self.inside.push(inside);
+        self.rounding.push(rounding);
         self.pairs.push(pair);
         self.crossings.push(crossing);
     }
@@ -50,6 +61,7 @@ impl<T: Real> Rows<T> {
         self.affine.keep(&other.affine, row);
         self.pairs.push(other.pairs[row]);
         self.inside.push(other.inside[row]);
+        self.rounding.push(other.rounding[row]);
         self.crossings.push(other.crossings[row]);
     }
 }

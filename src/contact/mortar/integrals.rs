@@ -17,23 +17,15 @@
 use super::dual::{self, Blend, Multiplier};
 use super::points::{self, Addends, Column, Points, column};
 use super::second_order::{Pair, Shares};
-use crate::contact::surface::{Base, Facet, Point, RimSample, Sample, Surface, add_scaled, dot};
+use crate::contact::surface::{Base, Facet, Offsets, Point, RimSample, Sample, Surface, add_scaled, dot};
 
 /// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
 const LEAST: f64 = 1e-6;
 
-/// How far surfaces lie outside of their facets: by node, times a factor. A list of none is zero.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Offsets<'a> {
-    pub(super) by_node: &'a [f64],
-    pub(super) factor: f64,
-}
-
 impl Offsets<'_> {
     /// At the corners of a slave facet and of a master facet, without the factor.
     fn between(&self, slave: &Facet, master: &Facet) -> Outside {
-        let of = |facet: &Facet| facet.nodes.map(|node| self.by_node.get(node).copied().unwrap_or(0.0));
-        Outside([of(slave), of(master)])
+        Outside([slave, master].map(|facet| self.at_corners(facet)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What surfaces have gone through in a step: weighted gaps along the way.
 
 use super::Mortar;
-use super::integrals::{Integrals, Offsets};
+use super::integrals::Integrals;
 use super::pairs::Pairs;
 use crate::contact::surface::{Bounds, Point, add_scaled, sub};
 use crate::contact::{LARGEST_MISS, Stride};
@@ -70,8 +70,7 @@ impl<T: Real> Mortar<T> {
                 positions[node] = add_scaled(ends[0][node], share, sub(ends[1][node], ends[0][node]));
             }
             pairs.take_near(surfaces, positions, reach, depth);
-            let factor = self.ramp.at(step.t[0] + share * (step.t[1] - step.t[0]));
-            let offsets = Offsets { by_node: &self.offsets, factor };
+            let offsets = self.thickness.at(step.t[0] + share * (step.t[1] - step.t[0]));
             integrals.sum(surfaces, positions, offsets, self.multiplier, |facet| pairs.of(facet));
             for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
                 if look == 0 {

@@ -1,7 +1,7 @@
 //! Rates of weighted gaps along a motion.
 
 use super::Mortar;
-use super::integrals::{Integrals, Offsets};
+use super::integrals::Integrals;
 use crate::contact::GapRates;
 use crate::contact::surface::{Point, SecondDifference};
 use crate::real::Real;
@@ -17,11 +17,10 @@ impl<T: Real> Mortar<T> {
     /// ∂g/∂t, which is that of the offsets, and Ġ v + ∂ġ/∂t, by differences of integrals without derivatives. A node
     /// that nothing lies over on the way has the row that it had: none of the latter.
     pub(super) fn rates_along(&mut self, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) {
-        let Self {
-            nodes, slave, master, offsets, ramp, pairs, rows, rates, ahead, multiplier, integrals: known, ..
-        } = self;
+        let Self { nodes, slave, master, thickness, pairs, rows, rates, ahead, multiplier, integrals: known, .. } =
+            self;
         let Rates { integrals, differences } = rates;
-        let change = ramp.rate(t);
+        let change = thickness.ramp.rate(t);
         for (out, spot) in out.iter_mut().zip(&rows.spots) {
             out.rate = T::of(-change * spot.offset);
         }
@@ -32,7 +31,7 @@ impl<T: Real> Mortar<T> {
             let is_there = |&node: &usize| bits(positions, node) == bits(&nodes.positions, node);
             let is_known = time.to_bits() == t.to_bits() && all().all(is_there);
             if !is_known {
-                let offsets = Offsets { by_node: offsets, factor: ramp.at(time) };
+                let offsets = thickness.at(time);
                 integrals.sum([&*slave, &*master], positions, offsets, *multiplier, |facet| pairs.of(facet));
             }
             let sums = if is_known { &known.sums } else { &integrals.sums };

@@ -1,8 +1,9 @@
 //! Which rows there are: a search finds them, and following moves them to where their nodes stand.
 
+use super::rows::Rows;
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Kin, Point, Stand, Surface};
+use crate::contact::surface::{Bounds, Ground, Kin, Offsets, Point, Stand, Surface};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -23,11 +24,17 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass, in the order of its nodes: of those near enough in the box given, which the other body
+    /// The rows of one pass at t, in the order of its nodes: of those near enough in the box given, which the other body
     /// makes with its velocities in theirs within the time `ahead`.
-    pub(super) fn find_rows(&mut self, pass: usize, (near, speeds): (&Bounds, &Bounds), u: &[T], v: &[T], ahead: f64) {
+    pub(super) fn find_rows(
+        &mut self,
+        pass: usize,
+        (near, speeds): (&Bounds, &Bounds),
+        (t, u, v): (f64, &[T], &[T]),
+        ahead: f64,
+    ) {
         let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
-        self.find_rows_and(pass, (near, speeds), u, v, ahead, &mut clearance);
+        self.find_rows_and(pass, (near, speeds), (t, u, v), ahead, &mut clearance);
         self.passes[pass].clearance = clearance;
     }
 
@@ -35,21 +42,22 @@ impl<T: Real> NodeToFacet<T> {
         &mut self,
         pass: usize,
         (near, speeds): (&Bounds, &Bounds),
-        u: &[T],
-        v: &[T],
+        (t, u, v): (f64, &[T], &[T]),
         ahead: f64,
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, kin, nodes, passes, reach, partners, found, .. } = self;
-        let positions = &nodes.positions;
+        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, partners, found, .. } = self;
+        let places = (&nodes.positions[..], thickness.at(t));
+        let positions = places.0;
         let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
-        let Some(ground) = ground(pass, passes, surfaces, positions, Self::rounding()) else { return };
+        let [_, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
+        let Some(ground) = ground(pass, passes, surfaces, places, Self::rounding()) else { return };
         let ground = Ground { boxes: Some(&passes[pass].boxes), ..ground };
         for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
             if !near.contains(positions[node]) {
                 continue;
             }
-            let way = ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
+            let way = growth + ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
             let (distance, stand) = ground.clearance(place, reach.least() + way);
             *clearance = distance;
             let Some(stand) = stand.map(|stand| ground.first_side(stand, way)) else { continue };
@@ -71,7 +79,8 @@ impl<T: Real> NodeToFacet<T> {
             let others = beside.map(|stand| (beside_of(pass, stand.facet), stand));
             for (candidate, stand) in std::iter::once((pass, first)).chain(others) {
                 let vertices = ground.surface.facets()[stand.facet].nodes();
-                found.push((node, candidate), stand, vertices, |node| nodes.places(node), u);
+                let row = (stand, ground.slope(&stand));
+                found.push((node, candidate), row, vertices, |node| nodes.places(node), u);
             }
         }
     }
@@ -80,9 +89,11 @@ impl<T: Real> NodeToFacet<T> {
     pub(super) fn move_rows(&mut self, t: f64, u: &[T]) -> Result<()> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, kin, nodes, passes, reach, rows, found, .. } = self;
+        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, rows, found, .. } = self;
         let motions = reach.motions(nodes);
-        let positions = &nodes.positions;
+        let places = (&nodes.positions[..], thickness.at(t));
+        let positions = places.0;
+        let [thick, _] = thickness.sizes(nodes.bodies(), [t; 2]);
         let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
         let mut next = 0;
         for group in rows.identities.chunk_by(|x, y| (x.0, pass_of(x.1)) == (y.0, pass_of(y.1))) {
@@ -90,9 +101,9 @@ impl<T: Real> NodeToFacet<T> {
             let first = next;
             next += group.len();
             let stands = &rows.stands[first..next];
-            let ground = ground(pass, passes, surfaces, positions, Self::rounding());
-            // The list of the node has all facets as near as this.
-            let known = reach.known_around(node, positions[node], &motions[1 - pass]);
+            let ground = ground(pass, passes, surfaces, places, Self::rounding());
+            // The list of the node has all facets whose surface is as near as this.
+            let known = reach.known_around(node, positions[node], &motions[1 - pass]) - thick;
             let ground = ground.filter(|_| known > 0.0);
             let Stand { place, facet, .. } = stands[0];
             let closest = ground.and_then(|ground| {
@@ -102,15 +113,15 @@ impl<T: Real> NodeToFacet<T> {
                 let row = first + k;
                 let stand = ground.and_then(|ground| {
                     let stand = ground.followed(stands, k, closest)?;
-                    Some((stand, ground.surface.facets()[stand.facet].nodes()))
+                    Some((stand, ground.slope(&stand), ground.surface.facets()[stand.facet].nodes()))
                 });
                 match stand {
-                    Some((stand, vertices)) => match old.followed_by(stand, t) {
-                        Some(stand) => found.push(group[k], stand, vertices, |node| nodes.places(node), u),
+                    Some((stand, slope, vertices)) => match old.followed_by(stand, t) {
+                        Some(stand) => found.push(group[k], (stand, slope), vertices, |node| nodes.places(node), u),
                         None => found.keep(rows, row),
                     },
                     // There is nothing near that it could press on.
-                    None if known > 0.0 && rows.affine.gap(row, u).value() > OPEN * reach.least() => {
+                    None if known > 0.0 && gap_of(rows, row, places.1.factor, u).value() > OPEN * reach.least() => {
                         found.keep(rows, row);
                     }
                     // (The first stands for all.)
@@ -124,6 +135,12 @@ impl<T: Real> NodeToFacet<T> {
         }
         Ok(())
     }
+}
+
+/// The gap of a row at u, where offsets have this factor.
+pub(super) fn gap_of<T: Real>(rows: &Rows<T>, row: usize, factor: f64, u: &[T]) -> T {
+    let stand = &rows.stands[row];
+    rows.affine.gap(row, u) - T::of((factor - stand.factor) * stand.offset)
 }
 
 /// The candidate of a row beside the one that a node has in a pass.
@@ -141,10 +158,11 @@ fn ground<'a>(
     pass: usize,
     passes: &'a [Pass],
     (surface, own_surface, kin): (&'a Surface, Option<&'a Surface>, Option<&'a Kin>),
-    positions: &'a [Point],
+    (positions, offsets): (&'a [Point], Offsets<'a>),
     rounding: f64,
 ) -> Option<Ground<'a>> {
     let Pass { nodes, neighborhood, .. } = &passes[pass];
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    Some(Ground { nodes, neighborhood: Some(neighborhood), surface, boxes: None, own, kin, positions, rounding })
+    let neighborhood = Some(neighborhood);
+    Some(Ground { nodes, neighborhood, surface, boxes: None, own, kin, positions, offsets, rounding })
 }

@@ -66,14 +66,15 @@ impl<T: Real> NodeToFacet<T> {
                 }
                 // Lists know what a node may meet, unless it was faster than its velocity promised.
                 let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.reach.listed());
-                let [start, end] = [&ends[0], &ends[1]].map(|positions| Ground {
+                let [start, end] = [0, 1].map(|k| Ground {
                     nodes: &list.nodes,
                     neighborhood,
                     surface,
                     boxes: None,
                     own,
                     kin: self.kin.as_ref(),
-                    positions,
+                    positions: &ends[k],
+                    offsets: self.thickness.at(step.t[k]),
                     rounding: Self::rounding(),
                 });
                 let likely = row.map(|row| self.rows.stands[row].facet);
@@ -121,7 +122,8 @@ impl Crossing<'_> {
         let way = against(&|node| sub(end.positions[node], start.positions[node]));
         let length = norm(way);
         let coarse = length > COARSE * start.surface.finest();
-        let linear = gap + dot(from.normal, way);
+        // (With what the offset has grown by.)
+        let linear = gap + dot(from.normal, way) - (end.offsets.factor - from.factor) * from.offset;
         if let Some([false, true]) = closed {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
                 return Err(("was stopped where the surface has ended", length, gap));
@@ -163,9 +165,7 @@ impl Crossing<'_> {
         let own_normal = start.own_normal(place);
         let ends = [start.positions[node], end.positions[node]];
         let whole = Bounds::of_points(ends);
-        start.near(place).any(|index| {
-            let facet = self.facet(index);
-            let corners = [start, end].map(|ground| facet.nodes.map(|vertex| ground.positions[vertex]));
+        let goes_through = |facet: &Facet, corners: [[Point; 4]; 2]| {
             let swept = Bounds::of_points(corners.iter().flatten().copied());
             if !whole.intersects(&swept) {
                 return false;
@@ -179,6 +179,10 @@ impl Crossing<'_> {
                 let corners = corners.map(|corners| triangle.map(|k| corners[k]));
                 pierces(ends, corners, segment, length, |normal| start.meets(normal, own_normal))
             })
+        };
+        start.near(place).any(|index| {
+            let mut layers = start.layers(place, index).zip(end.layers(place, index));
+            layers.any(|(from, to)| goes_through(self.facet(index), [from, to]))
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The rows of nodes on facets: entries of G, where the nodes stand, and the gaps there.
 
 use crate::contact::affine_rows::AffineRows;
-use crate::contact::surface::Stand;
+use crate::contact::surface::{Point, Stand, add_scaled};
 use crate::real::Real;
 
 /// The rows that a search found, where they are linearized.
@@ -28,18 +28,19 @@ impl<T: Real> Rows<T> {
         self.stands.clear();
     }
 
-    /// Appends the row of a node on the vertices of a facet.
+    /// Appends the row of a node on the vertices of a facet, with the derivatives of their offsets, if they have any.
     pub(super) fn push<'a>(
         &mut self,
         (node, pass): (usize, usize),
-        stand: Stand,
+        (stand, slope): (Stand, Option<[Point; 5]>),
         vertices: &[usize],
         dofs: impl Fn(usize) -> &'a [usize],
         u: &[T],
     ) {
         let shares = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(stand.weights.map(|w| -w)));
-        let entries = shares.flat_map(|(node, share)| {
+        let entries = shares.enumerate().flat_map(|(k, (node, share))| {
             let along = stand.normal.map(|component| share * component);
+            let along = slope.map_or(along, |slope| add_scaled(along, -stand.factor, slope[k]));
             dofs(node).iter().copied().zip(along)
         });
         self.affine.push(stand.gap, entries, u);

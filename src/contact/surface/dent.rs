@@ -48,12 +48,16 @@ impl Ground<'_> {
 
     /// Whether a node is outside over a side or a vertex that facets share: they make no dent there.
     fn is_around(&self, stand: &Stand) -> bool {
-        !stand.is_inside() && stand.gap > 0.0 && !self.touches(stand)
+        !stand.is_inside() && stand.distance > 0.0 && !self.is_rounding(stand.distance, stand.facet)
     }
 
+    /// Whether the surfaces of a node and of its facet touch.
     fn touches(&self, stand: &Stand) -> bool {
-        let shape = self.surface.facets()[stand.facet].shape(self.positions);
-        stand.gap.abs() <= self.rounding * shape.size()
+        self.is_rounding(stand.gap, stand.facet)
+    }
+
+    fn is_rounding(&self, length: f64, facet: usize) -> bool {
+        length.abs() <= self.rounding * self.surface.facets()[facet].shape(self.positions).size()
     }
 
     /// Whether two facets rise from a vertex that they share, each in front of the other, and so does the point that
@@ -126,6 +130,7 @@ impl Ground<'_> {
         let p = self.positions[self.nodes[place]];
         let (shape, foot) = self.surface.project_on_plane(facet, p, beyond, self.positions)?;
         let normal = shape.normal(&foot.weights).filter(|_| foot.location != Location::Beyond)?;
-        Some(Stand::inside(place, facet, &foot, normal, dot(normal, sub(p, foot.point))))
+        let distance = dot(normal, sub(p, foot.point));
+        Some(self.stand((place, facet), Location::Inside, foot.weights, normal, distance))
     }
 }

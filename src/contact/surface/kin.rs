@@ -2,7 +2,7 @@
 
 use super::Surface;
 use super::search::{Bounds, Neighborhood};
-use super::shape::{Point, dot, sub};
+use super::shape::{Point, dot};
 
 /// Cosine of the angle between the normals of a node and a facet of its own surface up to which they face each other
 /// (102°): across a convex edge of a right angle they do not.
@@ -27,8 +27,8 @@ pub(crate) struct Kin {
 
 impl Kin {
     /// Finds the facets within `rings` of each node (none: those that have it), and how thick the material is behind
-    /// it, as far as `reach`.
-    pub(crate) fn new(surface: &Surface, rings: usize, positions: &[Point], reach: f64) -> Self {
+    /// it, as far as `reach`. Surfaces with offsets below zero may lie in each other by an `overlap`, and just touch.
+    pub(crate) fn new(surface: &Surface, rings: usize, positions: &[Point], (reach, overlap): (f64, f64)) -> Self {
         let mut kin = Self { starts: vec![0], facets: Vec::new(), depths: Vec::new() };
         let mut own: Vec<usize> = Vec::new();
         for &node in surface.nodes() {
@@ -45,7 +45,7 @@ impl Kin {
             kin.facets.extend(&own);
             kin.starts.push(kin.facets.len());
         }
-        kin.depths = kin.depths(surface, positions, reach);
+        kin.depths = kin.depths(surface, positions, (reach, overlap));
         kin
     }
 
@@ -61,7 +61,9 @@ impl Kin {
 
     /// Behind a node, as far as a facet that it is behind of, there is material, as nothing is inside of itself in the
     /// reference configuration: a share of the least distance.
-    fn depths(&self, surface: &Surface, positions: &[Point], reach: f64) -> Vec<f64> {
+    fn depths(&self, surface: &Surface, positions: &[Point], (reach, overlap): (f64, f64)) -> Vec<f64> {
+        /// Shares of an overlap that are rounding.
+        const ROUNDING: f64 = 1e-6;
         let mut lists = Neighborhood::default();
         let points = surface.nodes().iter().map(|&node| Bounds::of_points([positions[node]]));
         lists.build(points, surface.boxes(positions), reach);
@@ -69,9 +71,13 @@ impl Kin {
             let Some(own) = surface.node_normal(node, positions) else { return reach };
             let behind =
                 lists.of(place).iter().filter(|&&facet| !self.keeps_apart(place, facet)).filter_map(|&facet| {
-                    let (shape, foot) = surface.project(facet, positions[node], positions)?;
+                    let projected = surface.project(facet, positions[node], positions)?;
+                    let (shape, foot) = &projected;
                     let normal = shape.normal(&foot.weights)?;
-                    let is_behind = dot(normal, sub(positions[node], foot.point)) < 0.0;
+                    // (Beside a side or a vertex a node may be behind the plane of a facet, and outside.)
+                    let counts = (ROUNDING, &|_| true);
+                    let (_, height) = surface.direction(facet, positions[node], &projected, counts, positions)?;
+                    let is_behind = height < 0.0 && foot.distance > (1.0 + ROUNDING) * overlap;
                     (is_behind && dot(own, normal) <= INSIDE).then_some(foot.distance)
                 });
             DEPTH * behind.fold(reach / DEPTH, f64::min)

@@ -2,6 +2,7 @@
 
 use super::Surface;
 use super::kin::{FACING, Kin};
+use super::offsets::Offsets;
 use super::search::{Bounds, Neighborhood, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
 use std::cell::OnceCell;
@@ -34,11 +35,16 @@ pub(crate) struct Stand {
     pub(crate) place: usize,
     /// Index of the facet in the surface.
     pub(crate) facet: usize,
-    location: Location,
+    pub(super) location: Location,
     /// Shape functions of the facet's vertices at the closest point.
     pub(crate) weights: [f64; 4],
     pub(crate) normal: Point,
+    /// The distance from that point along the normal, and what is left of it by the offsets of both surfaces.
+    pub(super) distance: f64,
     pub(crate) gap: f64,
+    /// The sum of these offsets in full size, and the factor that the gap was made with.
+    pub(crate) offset: f64,
+    pub(crate) factor: f64,
     /// How often the node has jumped to another facet or normal since the search.
     jumps: u8,
     /// Where it stood last at the two times that rows are followed to in a step (where the gap is met, where the
@@ -60,6 +66,7 @@ pub(crate) struct Ground<'a> {
     /// What nodes do not meet of it, if it is the same surface.
     pub(crate) kin: Option<&'a Kin>,
     pub(crate) positions: &'a [Point],
+    pub(crate) offsets: Offsets<'a>,
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
     pub(crate) rounding: f64,
 }
@@ -72,6 +79,19 @@ impl Ground<'_> {
         let count = list.map_or(self.surface.facets().len(), <[usize]>::len);
         let apart = move |&facet: &usize| kin.is_none_or(|kin| !kin.keeps_apart(place, facet));
         (0..count).map(move |k| list.map_or(k, |list| list[k])).filter(apart)
+    }
+
+    /// The corners of a facet, as far out along its normal as a node that touches its surface is, and the facet itself
+    /// if that is behind.
+    pub(crate) fn layers(&self, place: usize, facet: usize) -> impl Iterator<Item = [Point; 4]> + use<> {
+        let facet = &self.surface.facets()[facet];
+        let corners = facet.nodes.map(|vertex| self.positions[vertex]);
+        let (shape, own) = (facet.shape(self.positions), self.offsets.of(self.nodes[place]));
+        let offsets = self.offsets.at_corners(facet).map(|offset| self.offsets.factor * (own + offset));
+        let normal = shape.normal(&[1.0 / facet.nodes().len() as f64; 4]).filter(|_| !self.offsets.is_none());
+        let outer = normal.map(|normal| std::array::from_fn(|k| add_scaled(corners[k], offsets[k], normal)));
+        let is_behind = outer.is_none() || offsets[..facet.nodes().len()].iter().all(|offset| *offset > 0.0);
+        outer.into_iter().chain(is_behind.then_some(corners))
     }
 
     /// Whether a node with this normal, if it has one, meets the front of a facet with that one.
@@ -94,19 +114,26 @@ impl Ground<'_> {
         })
     }
 
-    /// The closest facet within `reach` of the node at a place of the list; none beyond the rim. Found sooner if it is
-    /// the one that is `likely`.
+    /// The closest facet of the node at a place of the list, if its surface is within `reach`; none beyond the rim.
+    /// Found sooner if it is the one that is `likely`.
     pub(crate) fn closest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<Stand> {
         let (facet, projected) = self.nearest(place, reach, likely)?;
         self.on(place, facet, &projected)
     }
 
-    /// The distance of that facet, or of its rim, and the stand on it; `reach` if there is no facet as near.
+    /// A bound of the distance of that surface, or of its rim, and the stand on it; `reach` if there is none as near.
     pub(crate) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
-        match self.nearest(place, reach, None) {
-            Some((facet, projected)) => (projected.1.distance, self.on(place, facet, &projected)),
-            None => (reach, None),
-        }
+        let Some((facet, projected)) = self.nearest(place, reach, None) else { return (reach, None) };
+        let stand = self.on(place, facet, &projected);
+        let height = self.height(place, facet, &projected.1);
+        (stand.map_or(height, |stand| height.min(stand.gap.abs())), stand)
+    }
+
+    /// How far a node is from a facet less their offsets: where offsets are the same everywhere the closest facet comes
+    /// first, otherwise that whose surface is closest.
+    fn height(&self, place: usize, facet: usize, foot: &Foot) -> f64 {
+        let Offsets { factor, .. } = self.offsets;
+        foot.distance - factor * self.offsets.upon(self.nodes[place], &self.surface.facets()[facet], &foot.weights)
     }
 
     fn nearest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<(usize, (Shape, Foot))> {
@@ -125,27 +152,33 @@ impl Ground<'_> {
             }
             likely => likely,
         };
-        let mut best: Option<(usize, (Shape, Foot))> = None;
+        // (Distances of surfaces, and what offsets may take from those of the facets at most.)
+        let is_even = self.offsets.is_none();
+        let most =
+            |facet: usize| if is_even { 0.0 } else { self.offsets.most(self.nodes[place], &surface.facets()[facet]) };
+        let mut best: Option<(usize, (Shape, Foot), f64)> = None;
         for facet in first.into_iter().chain(self.near(place).filter(|&facet| Some(facet) != first)) {
-            let limit = best.map_or(reach, |(_, (_, foot))| foot.distance);
+            let limit = best.map_or(reach, |(.., depth)| depth) + most(facet);
             let bounds = bounds(facet);
             if bounds.distance(p) > limit + overhang(&bounds) {
                 continue;
             }
             let Some(projected) = surface.project(facet, p, positions) else { continue };
-            let foot = &projected.1;
+            let depth = self.height(place, facet, &projected.1);
             // (Of two that share the point the one that comes first.)
-            let is_better = |&(other, (_, best)): &(usize, (Shape, Foot))| {
-                foot.is_better_than(&best) || (facet < other && !best.is_better_than(foot))
+            let foot = Foot { distance: depth, ..projected.1 };
+            let is_better = |&(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
+                let best = Foot { distance: depth, ..best };
+                foot.is_better_than(&best) || (facet < other && !best.is_better_than(&foot))
             };
-            if foot.distance > reach || best.is_some_and(|best| !is_better(&best)) {
+            if depth > reach || best.is_some_and(|best| !is_better(&best)) {
                 continue;
             }
             if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, facet, &projected) {
-                best = Some((facet, projected));
+                best = Some((facet, projected, depth));
             }
         }
-        best
+        best.map(|(facet, projected, _)| (facet, projected))
     }
 
     /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node
@@ -176,8 +209,23 @@ impl Ground<'_> {
             return None;
         }
         let p = self.positions[self.nodes[place]];
-        let (normal, gap) = self.direction(place, facet, p, projected)?;
-        Some(Stand { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] })
+        let (normal, distance) = self.direction(place, facet, p, projected)?;
+        Some(self.stand((place, facet), location, weights, normal, distance))
+    }
+
+    /// Of a node on a facet, with the offsets of both.
+    pub(super) fn stand(
+        &self,
+        (place, facet): (usize, usize),
+        location: Location,
+        weights: [f64; 4],
+        normal: Point,
+        distance: f64,
+    ) -> Stand {
+        let offset = self.offsets.upon(self.nodes[place], &self.surface.facets()[facet], &weights);
+        let factor = self.offsets.factor;
+        let gap = distance - factor * offset;
+        Stand { place, facet, location, weights, normal, distance, gap, offset, factor, jumps: 0, seen: [None; 2] }
     }
 }
 
@@ -188,12 +236,6 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 impl Stand {
-    /// On a facet along its own normal.
-    pub(super) fn inside(place: usize, facet: usize, foot: &Foot, normal: Point, gap: f64) -> Self {
-        let (location, weights) = (Location::Inside, foot.weights);
-        Self { place, facet, location, weights, normal, gap, jumps: 0, seen: [None; 2] }
-    }
-
     /// Whether the node stands on the facet along its own normal, not over a side or a vertex.
     pub(super) fn is_inside(&self) -> bool {
         self.location == Location::Inside

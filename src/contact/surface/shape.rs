@@ -198,6 +198,24 @@ impl Shape {
         }
     }
 
+    /// The derivatives of the shape functions of a triangle or a quadrilateral by the parameters of its tangents.
+    pub(super) fn derivatives(&self, weights: &[f64; 4]) -> [[f64; 4]; 2] {
+        if self.count == 3 {
+            return [[-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0]];
+        }
+        let [xi, eta] = Self::coordinates(weights);
+        let [left, right, bottom, top] = [1.0 - xi, 1.0 + xi, 1.0 - eta, 1.0 + eta].map(|x| 0.25 * x);
+        [[-bottom, bottom, top, -top], [-left, -right, right, left]]
+    }
+
+    /// The same along side k.
+    pub(super) fn along_side(&self, k: usize) -> [f64; 4] {
+        let mut along = [0.0; 4];
+        along[k] = -1.0;
+        along[self.after(k)] = 1.0;
+        along
+    }
+
     /// ∂²x/∂ξ∂η of a quadrilateral; the other shapes are flat.
     pub(crate) fn twist(&self) -> Point {
         if self.count < 4 {

@@ -4,7 +4,7 @@ use crate::OnSystem;
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, EdgeToEdge, Mortar, NodeToFacet};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, ContactLaw, EdgeToEdge, Mortar, NodeToFacet};
 use contact_dynamics::{PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -33,6 +33,8 @@ pub enum Keeps {
     TwoPassesAndEdges,
     Mortar,
     Bodies,
+    /// Both as one surface against itself.
+    Itself,
 }
 
 /// Two blocks of hex8 elements.
@@ -121,6 +123,11 @@ impl Fall {
         self.stack.edges()?.reach(0.2)
     }
 
+    fn of_itself(&self) -> Result<Vec<Box<dyn ContactConstraint<f64>>>> {
+        let Solid { nodes, .. } = &self.stack.solid;
+        BodyContact::of_itself(nodes, &self.stack.solid.node_dofs(), self.stack.surfaces().concat())?.constraints()
+    }
+
     /// Lets the block fall until t = `until`, by steps of a Courant number.
     pub fn run(&self, keeps: Keeps, scheme: Box<dyn TimeIntegrator>, courant: f64, until: f64) -> Result<FallFigures> {
         let Self { stack, speed, crossing, .. } = self;
@@ -130,6 +137,7 @@ impl Fall {
             Keeps::TwoPassesAndEdges => vec![Box::new(self.two_passes()?), Box::new(self.edges()?)],
             Keeps::Mortar => vec![Box::new(self.mortar()?)],
             Keeps::Bodies => self.bodies()?,
+            Keeps::Itself => self.of_itself()?,
         };
         let mut run = Simulation::builder(Hyperelastic::new(solid, Law::NeoHookean), scheme, h)
             .velocity(stack.velocity_of_upper([0.0, 0.0, -speed]))

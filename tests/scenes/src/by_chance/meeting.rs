@@ -19,9 +19,11 @@ pub(super) enum Between {
     TwoPasses,
     TwoPassesAndEdges,
     OneSurface,
+    OneSurfaceWithEdges,
     Mortar,
     MortarAndEdges,
     Offsets,
+    Coated,
     Bonds,
     Tie,
 }
@@ -39,8 +41,11 @@ pub(super) enum Kind {
     /// Nodes outside of a ball that the host gives as functions.
     Function,
     Bodies(Between),
-    /// A body that folds until it meets itself.
+    /// A body that folds until it meets itself: nodes, or edges as well.
     Fold,
+    FoldWithEdges,
+    /// Three bodies that are thrown onto each other.
+    Pile,
 }
 
 /// A constraint and what it is given.
@@ -106,7 +111,7 @@ impl Meeting {
 
     /// Whether nothing acts on the bodies from outside.
     pub(super) fn is_free(&self) -> bool {
-        matches!(self.kind, Kind::Pairs | Kind::Bodies(_) | Kind::Fold)
+        matches!(self.kind, Kind::Pairs | Kind::Bodies(_) | Kind::Fold | Kind::FoldWithEdges | Kind::Pile)
     }
 
     /// Whether nothing does work on the bodies.
@@ -138,10 +143,14 @@ pub fn meetings() -> Vec<Meeting> {
         add("NodeToFacet", "two passes", Kind::Bodies(Between::TwoPasses));
         add("NodeToFacet", "of itself, two bodies", Kind::Bodies(Between::OneSurface));
         add("NodeToFacet", "of itself, a body that folds", Kind::Fold);
+        add("NodeToFacet", "offsets", Kind::Bodies(Between::Coated));
         add("Mortar", "plain", Kind::Bodies(Between::Mortar));
         add("Mortar", "offsets", Kind::Bodies(Between::Offsets));
         add("Mortar", "bonded", Kind::Bodies(Between::Bonds));
         add("Tie", "two bodies", Kind::Bodies(Between::Tie));
+        add("BodyContact", "of itself, two bodies", Kind::Bodies(Between::OneSurfaceWithEdges));
+        add("BodyContact", "of itself, three bodies", Kind::Pile);
+        add("BodyContact", "of itself, a body that folds", Kind::FoldWithEdges);
         if space == 3 {
             add("EdgeToEdge", "beside two passes", Kind::Bodies(Between::TwoPassesAndEdges));
             add("EdgeToEdge", "beside mortar", Kind::Bodies(Between::MortarAndEdges));

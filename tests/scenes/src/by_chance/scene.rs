@@ -9,8 +9,8 @@ use crate::random::Congruential;
 use crate::solids::{Material, Solid};
 use crate::sparse::{entries, matrix};
 use contact_dynamics::contact::{
-    BondStrength, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet, NodesOnObstacle, Obstacle, Plane,
-    Side, Sphere, Tie,
+    BodyContact, BondStrength, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet, NodesOnObstacle,
+    Obstacle, Plane, Side, Sphere, Tie,
 };
 use contact_dynamics::{LinearSystem, Result, System};
 
@@ -74,7 +74,8 @@ where
             Kind::Wall | Kind::Bonded => Self::on_wall(meeting.kind, &drawn, random)?,
             Kind::Function => Self::outside_ball(&drawn, random)?,
             Kind::Pairs => Self::in_pairs(&drawn, random)?,
-            Kind::Fold => Self::folding(&drawn, random, variant)?,
+            Kind::Fold | Kind::FoldWithEdges => Self::folding(meeting.kind, &drawn, random, variant)?,
+            Kind::Pile => Self::pile(&drawn, random, variant)?,
             Kind::Bodies(between) => Self::of_two(between, &drawn, random, variant)?,
         };
         let is_uniform = scene.bodies.windows(2).all(|pair| pair[0].solid.material == pair[1].solid.material);
@@ -340,7 +341,7 @@ where
     }
 
     /// A bar folded to a U, its arms thrown at each other.
-    fn folding(drawn: &Drawn<D>, random: &mut Congruential, variant: &Variant) -> Result<Self> {
+    fn folding(kind: Kind, drawn: &Drawn<D>, random: &mut Congruential, variant: &Variant) -> Result<Self> {
         let slot = 0.02 + 2.0 * drawn.gap;
         let body = Body::folded(slot, drawn.materials[0], random);
         let speed = drawn.speed;
@@ -351,8 +352,57 @@ where
         let mut scene = Self::assembled(vec![body], drawn, &velocity);
         let dofs = scene.node_dofs();
         let facets = scene.facets(variant).concat();
-        let contact = NodeToFacet::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
-        scene.constraints.push(Box::new(contact.reach(0.09 * drawn.units.length)?));
+        let reach = 0.09 * drawn.units.length;
+        scene.constraints = if kind == Kind::FoldWithEdges {
+            let contact = BodyContact::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
+            contact.reach(reach).constraints()?
+        } else {
+            let contact = NodeToFacet::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
+            vec![Box::new(contact.reach(reach)?)]
+        };
+        Ok(scene)
+    }
+
+    /// Three blocks, the first at rest, the others turned anyhow and thrown at it one after the other.
+    fn pile(drawn: &Drawn<D>, random: &mut Congruential, variant: &Variant) -> Result<Self> {
+        let [below, above] = drawn.materials;
+        let mut bodies: Vec<Body<D>> = Vec::new();
+        let mut centers: Vec<[f64; D]> = Vec::new();
+        let mut height = 0.0;
+        for (material, low, high) in [(below, 0.4, 0.7), (above, 0.2, 0.4), (below, 0.2, 0.4)] {
+            let size: [f64; D] = std::array::from_fn(|_| random.within(low, high));
+            let block = Body::block(size, material, random);
+            let any = rotation::<D>(random);
+            let is_turned = !bodies.is_empty() && pick(&[true, true, false], random);
+            let block = if is_turned { block.mapped(|x| turned(&any, x)) } else { block };
+            let lowest = block.solid.nodes.iter().map(|x| x[D - 1]).fold(f64::INFINITY, f64::min);
+            let wide = if bodies.is_empty() { 0.0 } else { 0.1 };
+            let center: [f64; D] =
+                std::array::from_fn(|k| if k + 1 == D { height - lowest } else { wide * random.signed() });
+            let block = block.mapped(|x| std::array::from_fn(|k| x[k] + center[k]));
+            let highest = block.solid.nodes.iter().map(|x| x[D - 1]).fold(f64::NEG_INFINITY, f64::max);
+            height = highest + drawn.gap;
+            bodies.push(block);
+            centers.push(center);
+        }
+        let turn = |x: [f64; D]| -> [f64; D] {
+            std::array::from_fn(|k| (0..D).map(|axis| drawn.turn[axis][k] * x[axis]).sum())
+        };
+        let flights: Vec<_> = centers
+            .iter()
+            .enumerate()
+            .map(|(body, &center)| {
+                let toward = drawn.turn[D - 1].map(|x| -drawn.speed * body as f64 * x);
+                let spins = if body == 0 { 0.0 } else { drawn.spin };
+                let together = std::array::from_fn(|k| toward[k] + drawn.drift[k]);
+                Self::flight(&Drawn { spin: spins, ..*drawn }, together, turn(center))
+            })
+            .collect();
+        let bodies = bodies.into_iter().map(|body| body.mapped(turn)).collect();
+        let mut scene = Self::assembled(bodies, drawn, &|body, x| flights[body](x));
+        let (dofs, facets) = (scene.node_dofs(), scene.facets(variant).concat());
+        let contact = BodyContact::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
+        scene.constraints = contact.reach(0.1 * drawn.units.length).constraints()?;
         Ok(scene)
     }
 
@@ -369,7 +419,7 @@ where
             let any = rotation::<D>(random);
             upper.mapped(|x| turned(&any, x))
         };
-        let thick = if between == Between::Offsets { random.within(0.0, 0.02) } else { 0.0 };
+        let thick = if matches!(between, Between::Offsets | Between::Coated) { random.within(0.0, 0.02) } else { 0.0 };
         let gap = if joined { 0.0 } else { drawn.gap + 2.0 * thick };
         let lowest = upper.solid.nodes.iter().map(|x| x[D - 1]).fold(f64::INFINITY, f64::min);
         let aside: [f64; D] = std::array::from_fn(|k| 0.5 * large[k] * random.signed());
@@ -416,6 +466,10 @@ where
                 let contact = NodeToFacet::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?;
                 Box::new(contact.friction(drawn.friction).reach(reach)?)
             }
+            Between::OneSurfaceWithEdges => {
+                let contact = BodyContact::of_itself(nodes, &dofs, lower.iter().chain(&upper).copied())?;
+                return contact.friction(drawn.friction).reach(reach).constraints();
+            }
             Between::OneSurface => {
                 let facets = lower.iter().chain(&upper).copied();
                 Box::new(NodeToFacet::of_itself(nodes, &dofs, facets)?.friction(drawn.friction).reach(reach)?)
@@ -424,6 +478,11 @@ where
             Between::Offsets => {
                 let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
                 Box::new(weighted()?.offsets(&offsets)?.friction(drawn.friction).reach(reach)?)
+            }
+            Between::Coated => {
+                let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
+                let contact = NodeToFacet::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?;
+                Box::new(contact.offsets(&offsets)?.friction(drawn.friction).reach(reach)?)
             }
             Between::Bonds => {
                 let material = self.bodies[1].solid.material;

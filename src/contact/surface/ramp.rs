@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 
 /// A factor by time: one value until the first time, another from the second on, smooth in between.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ramp {
+pub(crate) struct Ramp {
     times: [f64; 2],
     factors: [f64; 2],
 }
@@ -18,7 +18,7 @@ impl Default for Ramp {
 
 impl Ramp {
     /// Refuses what is not finite, and an end that is not after the beginning.
-    pub(super) fn new(times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+    pub(crate) fn new(times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
         if let Some(&time) = times.iter().find(|time| !time.is_finite()) {
             return refuse("a time of a ramp", time, "finite");
@@ -37,14 +37,25 @@ impl Ramp {
         ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0)
     }
 
+    /// The factor at the beginning and at the end.
+    pub(crate) fn factors(&self) -> [f64; 2] {
+        self.factors
+    }
+
+    /// How its rate changes in time.
+    pub(crate) fn acceleration(&self, t: f64) -> f64 {
+        let ([from, to], s) = (self.factors, self.place(t));
+        60.0 * (to - from) / (self.times[1] - self.times[0]).powi(2) * s * (1.0 - s) * (1.0 - 2.0 * s)
+    }
+
     /// How the factor changes in time.
-    pub(super) fn rate(&self, t: f64) -> f64 {
+    pub(crate) fn rate(&self, t: f64) -> f64 {
         let ([from, to], s) = (self.factors, self.place(t));
         30.0 * (to - from) / (self.times[1] - self.times[0]) * (s * (1.0 - s)).powi(2)
     }
 
     /// The factor at t.
-    pub(super) fn at(&self, t: f64) -> f64 {
+    pub(crate) fn at(&self, t: f64) -> f64 {
         let ([from, to], s) = (self.factors, self.place(t));
         // Its first two derivatives are zero at both ends.
         from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
