@@ -1,9 +1,9 @@
 //! Two bars that collide: H1 to H7, H11, H16 to H18, H22.
 
+use crate::Extent;
 use crate::table::Bound::AtMost;
 use crate::table::{Row, each, rows};
 use crate::tried::{ahead, clean, corrected, massless, presets, with};
-use crate::{Anything, Extent};
 use contact_dynamics::contact_solver::{ActiveSet, ContactSolver, Pivoting};
 use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Result, Simulation};
 use contact_dynamics_scenes::Bars;
@@ -18,7 +18,7 @@ const FORCE: f64 = 0.0125;
 const SPEED: f64 = 0.05;
 const H: f64 = 1e-3;
 
-pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> {
+pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     let mut all = Vec::new();
     all.extend(paper(extent));
     all.extend(phases(extent));
@@ -32,7 +32,7 @@ pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> 
     all.extend(redundant(extent));
     all.extend(changing_step(extent));
     all.extend(damped(extent));
-    Ok(all)
+    all
 }
 
 /// Figures by name, of a measurement.

@@ -1,10 +1,10 @@
 //! Friction of elastic bodies against closed forms: F1 (slabs thrown obliquely), F2 (a bar on a rough bed), F6 (partial
 //! slip), F10 (bodies that turn together).
 
+use crate::Extent;
 use crate::table::Bound::AtMost;
 use crate::table::{Outcome, Row, each, rows};
 use crate::tried::corrected;
-use crate::{Anything, Extent};
 use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet};
 use contact_dynamics::{Preset, Result};
 use contact_dynamics_scenes::bed::Bed;
@@ -14,13 +14,13 @@ use contact_dynamics_scenes::slabs::{Impact, Slab};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::two_slabs::TwoSlabs;
 
-pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> {
+pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     let mut all = slabs(extent);
     all.extend(two_slabs(extent));
     all.extend(bed(extent));
     all.extend(partial_slip(extent));
     all.extend(turning());
-    Ok(all)
+    all
 }
 
 /// Speeds along the wall at which a slab sticks and slides.

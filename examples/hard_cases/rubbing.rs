@@ -1,10 +1,10 @@
 //! Friction of few degrees of freedom: F3 (a block on an incline), F4 (the Coulomb oscillator and its belt), F5 (bodies
 //! that come to roll, a disc that spins), F8 (Painlevé's rod), F9 (modes that couple).
 
+use crate::Extent;
 use crate::small::those;
 use crate::table::Bound::{AtLeast, AtMost};
 use crate::table::{Row, each, rows};
-use crate::{Anything, Extent};
 use contact_dynamics::{ContactLaw, Error, LinearRows, LinearSystem, Result, Simulation};
 use contact_dynamics_scenes::combinations::Combination;
 use contact_dynamics_scenes::schemes::Listed;
@@ -16,7 +16,7 @@ const GRAVITY: f64 = 10.0;
 /// Where blocks begin: what is below its rounding is no creep.
 const START: f64 = 0.1;
 
-pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> {
+pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     let mut all = incline(extent);
     all.extend(scales());
     all.extend(oscillator(extent));
@@ -25,7 +25,7 @@ pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> 
     all.extend(spinning(extent));
     all.extend(painleve());
     all.extend(coupled_modes(extent));
-    Ok(all)
+    all
 }
 
 /// All schemes by which a multiplier can impose contact; backward Euler at velocity level moves by the velocity of the
@@ -276,7 +276,7 @@ fn painleve() -> Vec<Row> {
                 masses(row, 1e-3, &[mass, mass, inertia], weight, vec![-1.0, 0.0, 0.0], floor)
             };
             rod(0.999 * threshold)?.step()?;
-            let refused = match rod(1.001 * threshold).and_then(|mut run| run.step().map(|_| ())) {
+            let refused = match rod(1.001 * threshold).and_then(|mut run| run.step()) {
                 Err(Error::Jammed { normal, coupling, .. }) => (normal / coupling / threshold - 1.0).abs(),
                 Err(other) => return Err(other),
                 Ok(()) => f64::INFINITY,

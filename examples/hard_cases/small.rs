@@ -1,9 +1,9 @@
 //! Few degrees of freedom, and bodies that turn: H10 (stiff and soft springs), H12 (Hertz), H14 (Zeno's ball), H15
 //! (Newton's cradle), H19 (a pendulum and a spinning bar).
 
+use crate::Extent;
 use crate::table::Bound::{AtLeast, AtMost};
 use crate::table::{Row, each, rows};
-use crate::{Anything, Extent};
 use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{ContactLaw, LinearRows, Result, Simulation};
 use contact_dynamics_scenes::combinations::{Combination, listed};
@@ -13,13 +13,13 @@ use contact_dynamics_scenes::schemes::{self, Listed};
 use contact_dynamics_scenes::sparse::free;
 use contact_dynamics_scenes::springs;
 
-pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> {
+pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     let mut all = stiff_soft();
     all.extend(hertz(extent));
     all.extend(zeno(extent));
     all.extend(cradle());
     all.extend(large_motion(extent));
-    Ok(all)
+    all
 }
 
 /// The schemes of the list that are meant.

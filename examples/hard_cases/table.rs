@@ -170,11 +170,11 @@ fn is_rounding(x: f64) -> bool {
 /// Three digits.
 fn digits(x: f64) -> String {
     match x.abs() {
-        size if size == 0.0 => "0".into(),
-        size if size >= 1e4 || size < 1e-3 => format!("{x:.1e}").replace('-', "−"),
-        size => {
-            let scale = 10.0_f64.powi(2 - size.log10().floor() as i32);
+        0.0 => "0".into(),
+        size if (1e-3..1e4).contains(&size) => {
+            let scale = 10.0_f64.powf(2.0 - size.log10().floor());
             ((x * scale).round() / scale).to_string().replace('-', "−")
         }
+        _ => format!("{x:.1e}").replace('-', "−"),
     }
 }

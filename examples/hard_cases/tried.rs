@@ -1,9 +1,11 @@
 //! Which schemes with which corrections and masses claim to handle what.
 
 use contact_dynamics::{Composite, Newmark, Preset};
-use contact_dynamics_scenes::combinations::{Combination, Correction, listed, plain, preset};
+use contact_dynamics_scenes::combinations::{Combination, Correction, Make, listed, plain, preset};
 use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::schemes::{self, Listed};
+
+const COMPOSITE: Make = || Ok(Box::new(Composite));
 
 /// λ_v/λ_a with the projected past, after every scheme of second order that takes corrections. (Backward Euler and its
 /// like smear the fronts that are measured here.)
@@ -19,7 +21,7 @@ pub(crate) fn with(correction: Correction) -> Vec<Combination> {
 
 pub(crate) fn presets() -> Vec<Combination> {
     let tapered = Treatment::RedistributedBlend(Takers::Tapered);
-    [Preset::smooth(), Preset::conservative(), Preset::explicit()].map(|of| preset(composite, tapered, of)).into()
+    [Preset::smooth(), Preset::conservative(), Preset::explicit()].map(|of| preset(COMPOSITE, tapered, of)).into()
 }
 
 /// Contact dofs without mass, no correction: every scheme of second order that imposes contact by a multiplier.
@@ -51,9 +53,5 @@ pub(crate) fn trapezoidal(correction: Correction) -> Combination {
 
 /// The paper's scheme with a correction.
 pub(crate) fn paper(correction: Correction) -> Combination {
-    Combination { correction, ..plain(composite) }
-}
-
-fn composite() -> contact_dynamics::Result<Box<dyn contact_dynamics::TimeIntegrator>> {
-    Ok(Box::new(Composite))
+    Combination { correction, ..plain(COMPOSITE) }
 }

@@ -1,9 +1,9 @@
 //! A bar above a floor: H8, H13.
 
+use crate::Extent;
 use crate::table::Bound::{AtLeast, AtMost};
 use crate::table::{Row, each, rows};
 use crate::tried::{ahead, clean, corrected, massless, presets};
-use crate::{Anything, Extent};
 use contact_dynamics::{Error, Preset, Result, Simulation};
 use contact_dynamics_scenes::collisions::bounces;
 use contact_dynamics_scenes::combinations::{Combination, Correction, listed};
@@ -11,8 +11,8 @@ use contact_dynamics_scenes::masses::{MassMatrix, Takers};
 use contact_dynamics_scenes::schemes;
 use contact_dynamics_scenes::wall_bar::WallBar;
 
-pub(crate) fn cases(extent: &Extent) -> std::result::Result<Vec<Row>, Anything> {
-    Ok([bouncing(extent), keeping(extent), resting(extent), settling()].into_iter().flatten().collect())
+pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
+    [bouncing(extent), keeping(extent), resting(extent), settling()].into_iter().flatten().collect()
 }
 
 /// Steps by Courant numbers about ½ that differ by a tenth: bounces fall on all phases of the step.

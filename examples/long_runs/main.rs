@@ -17,6 +17,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::combinations::{Combination, Correction, Make, plain, preset};
 use contact_dynamics_scenes::masses::{Takers, Treatment};
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -109,19 +110,20 @@ fn main() -> Result<(), Anything> {
     lines.sort_by_key(|line| line.0);
     let (mut page, mut wrong) = (String::new(), Vec::new());
     for (k, scene) in scenes.iter().enumerate() {
-        page += &format!(
-            "{}\n\n| scheme | {} |\n|{}\n",
+        writeln!(
+            page,
+            "{}\n\n| scheme | {} |\n|{}",
             scene.title,
             scene.head.join(" | "),
             " --- |".repeat(scene.head.len() + 1)
-        );
+        )?;
         for ((_, row), line) in lines.iter().filter(|line| line.0.0 == k) {
             let names = rows[*row].names().into_iter().filter(|name| name != "–" && name != "lumped");
             let name = names.take(2).collect::<Vec<_>>().join(", ");
             match line {
                 Ok(line) if line.cells.is_empty() => {}
                 Ok(line) => {
-                    page += &format!("| {name} | {} |\n", line.cells.join(" | "));
+                    writeln!(page, "| {name} | {} |", line.cells.join(" | "))?;
                     wrong.extend(line.wrong.iter().map(|what| format!("{name}: {what}")));
                 }
                 // What is refused claims nothing.

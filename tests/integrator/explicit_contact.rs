@@ -102,7 +102,9 @@ fn penetrations_of_many_impacts_do_not_add_up() {
             for _ in 0..40_000 {
                 run.step().unwrap();
                 let now = run.state().displacement()[0] + bar.height;
-                (deepest, way) = (deepest.max(-now), way.max(gap - now));
+                // (Moreau and Jean's own measure is the velocity at the end of a step.)
+                let approach = h * -run.state().velocity()[0];
+                (deepest, way) = (deepest.max(-now), way.max(gap - now).max(approach));
                 gap = now;
                 touched = run.statistics().contact_changes;
             }
@@ -111,7 +113,7 @@ fn penetrations_of_many_impacts_do_not_add_up() {
             // The way of a contact node that has all the energy of the fall.
             let node = 0.5 * bar.density * bar.element_size();
             let most = h * (2.0 * bar.weight() * bar.height / node).sqrt();
-            assert!(deepest < most && touched > 50, "{name}, {courant}: {deepest} {most}, {touched} changes");
+            assert!(deepest < most && touched > 20, "{name}, {courant}: {deepest} {most}, {touched} changes");
         }
     }
 }
