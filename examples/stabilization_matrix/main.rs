@@ -5,20 +5,19 @@
 //! figure and all numbers (`stabilization_matrix.csv`); with `--quick` meshes are coarse, phases two, and times are not
 //! measured.
 //!
-//! `combinations.rs` has the rows, by rules; `scenes.rs` what is measured of them.
+//! `combinations.rs` has the rows, by rules; what is measured of them is in `tests/scenes/src/collisions.rs`.
 
 mod combinations;
 mod pareto;
 mod report;
-mod scenes;
 
 use combinations::Combination;
 use contact_dynamics::Error as Refused;
+use contact_dynamics_scenes::collisions::{Collision, Swept, bounces, disc};
 use contact_dynamics_scenes::disc::SoftDisc;
 use contact_dynamics_scenes::output::Output;
 use contact_dynamics_scenes::tables::decimal;
 use report::{Cell, Column, Results, table};
-use scenes::{Collision, Swept, bounces, disc};
 use std::error::Error;
 use std::fmt::Write;
 
@@ -113,7 +112,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let n = extent.unequal;
     let unequal = measure("unequal", n, h, &|row| Collision::unequal(n, h).measure_touching(row, phases));
     let n = extent.bouncing;
-    let bouncing = measure("bouncing", n, 0.5 * 10.0 / n as f64 / 30.0, &|row| bounces(row, n));
+    let bouncing = measure("bouncing", n, 0.5 * 10.0 / n as f64 / 30.0, &|row| bounces(row, n, 0.5));
     let (cells, until) = extent.disc;
     let body = SoftDisc::new(cells);
     let falling = measure("disc", cells, 0.05, &|row| disc(row, &body, until));

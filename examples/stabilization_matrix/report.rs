@@ -1,7 +1,7 @@
 //! Tables in Markdown, and all figures as comma-separated values.
 
 use crate::combinations::Combination;
-use crate::scenes::Swept;
+use contact_dynamics_scenes::collisions::Swept;
 use contact_dynamics_scenes::tables::decimal;
 
 /// What was measured of all combinations in one scene.

@@ -12,6 +12,7 @@ use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::{Figures, figures, record};
 use contact_dynamics_scenes::schemes::Tabulated;
 use contact_dynamics_scenes::sparse::free;
+use contact_dynamics_scenes::wall_bar::WallBar;
 
 const F0: f64 = 0.0125;
 
@@ -60,6 +61,59 @@ fn gaps_of_forward_increments_never_open_or_penetrate_in_contact() {
             assert!(worst > -1e-15, "{worst}");
             let closed = record.t.iter().zip(&record.gap).filter(|(t, _)| (0.103..0.299).contains(*t));
             assert!(closed.into_iter().all(|(_, gap)| gap.abs() < 1e-15));
+        }
+    }
+}
+
+/// The gap is looked at when the step is over, or half a step ahead (Moreau and Jean): what bodies have made of the way
+/// of a step by then is left, and stays as it is while contact lasts.
+#[test]
+fn contact_on_velocities_leaves_the_rest_of_the_step_of_the_impact() {
+    let h = 1e-3;
+    for phase in (0..10).map(|i| 0.05 + 0.1 * f64::from(i)) {
+        let bars = Bars::paper(50).delayed(phase, h);
+        let half_a_step_ahead = if phase < 0.5 { 0.5 - phase } else { 1.5 - phase };
+        let schemes: [(Box<dyn TimeIntegrator>, f64); 2] =
+            [(Box::new(CdLagrange), 1.0 - phase), (Box::new(MoreauJean::new(0.5).unwrap()), half_a_step_ahead)];
+        for (scheme, expected) in schemes {
+            let name = scheme.name();
+            let record = record::<f64>(&bars, scheme, None, h, 0.33);
+            let way = h * (bars.velocity[0] - bars.velocity[1]);
+            let inside = record.t.iter().zip(&record.gap).filter(|(t, _)| (0.103..0.29).contains(*t));
+            for (t, gap) in inside {
+                assert!((gap / way + expected).abs() < 1e-9, "{name}, phase {phase}, {t}: {}", gap / way);
+            }
+        }
+    }
+}
+
+/// A step from an open gap goes no deeper than its own way, one from a closed gap no deeper than it began: penetrations
+/// do not add up, however many impacts there are.
+#[test]
+fn penetrations_of_many_impacts_do_not_add_up() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 2] =
+        [|| Box::new(CdLagrange), || Box::new(MoreauJean::new(0.5).unwrap())];
+    for make in schemes {
+        for courant in [0.37, 0.8] {
+            let bar = WallBar::bouncing(6);
+            let h = courant * bar.element_size() / bar.wave_speed();
+            let mut run = Simulation::builder(bar.system(), make(), h).constraint(bar.contact()).build().unwrap();
+            let (mut gap, mut deepest, mut way, mut touched) = (bar.height, 0.0_f64, 0.0_f64, 0_u64);
+            for _ in 0..40_000 {
+                run.step().unwrap();
+                let now = run.state().displacement()[0] + bar.height;
+                // (Moreau and Jean's own measure is the velocity at the end of a step.)
+                let approach = h * -run.state().velocity()[0];
+                (deepest, way) = (deepest.max(-now), way.max(gap - now).max(approach));
+                gap = now;
+                touched = run.statistics().contact_changes;
+            }
+            let name = make().name();
+            assert!(deepest > 0.1 * way && deepest <= (1.0 + 1e-9) * way, "{name}, {courant}: {deepest} {way}");
+            // The way of a contact node that has all the energy of the fall.
+            let node = 0.5 * bar.density * bar.element_size();
+            let most = h * (2.0 * bar.weight() * bar.height / node).sqrt();
+            assert!(deepest < most && touched > 20, "{name}, {courant}: {deepest} {most}, {touched} changes");
         }
     }
 }

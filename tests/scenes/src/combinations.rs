@@ -1,6 +1,7 @@
 //! Integrators with corrections, laws and masses: what examples compare.
 
 use crate::masses::{Body, MassMatrix, Treatment};
+use crate::schemes::Listed;
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
@@ -8,6 +9,14 @@ use contact_dynamics::{ContactLaw, Corrector, PersistencyCorrection, Preset, Rea
 
 /// Makes an integrator.
 pub type Make = fn() -> Result<Box<dyn TimeIntegrator>>;
+
+/// How the integrator of a combination is made: of parameters that might be refused, or as one of the list of all
+/// schemes.
+#[derive(Clone, Copy, Debug)]
+pub enum Source {
+    Made(Make),
+    Listed(fn() -> Box<dyn TimeIntegrator>),
+}
 
 /// What is done to the result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +87,7 @@ impl Correction {
 /// An integrator with what goes with it; with another law it is `Combination { law, ..plain(make) }`.
 #[derive(Clone, Copy, Debug)]
 pub struct Combination {
-    pub make: Make,
+    pub source: Source,
     pub correction: Correction,
     pub law: ContactLaw,
     pub mass: Treatment,
@@ -88,8 +97,17 @@ pub struct Combination {
 
 /// An integrator alone, on a lumped mass.
 pub const fn plain(make: Make) -> Combination {
+    alone(Source::Made(make))
+}
+
+/// A scheme of the list alone, on a lumped mass.
+pub const fn listed(scheme: &Listed) -> Combination {
+    alone(Source::Listed(scheme.make))
+}
+
+const fn alone(source: Source) -> Combination {
     let (correction, mass) = (Correction::None, Treatment::Lumped);
-    Combination { make, correction, law: ContactLaw::Rigid, mass, preset: None }
+    Combination { source, correction, law: ContactLaw::Rigid, mass, preset: None }
 }
 
 /// A preset, with what it consists of.
@@ -101,7 +119,10 @@ impl Combination {
     pub fn integrator(&self) -> Result<Box<dyn TimeIntegrator>> {
         match &self.preset {
             Some(preset) => Ok(preset.integrator()),
-            None => (self.make)(),
+            None => match self.source {
+                Source::Made(make) => make(),
+                Source::Listed(make) => Ok(make()),
+            },
         }
     }
 

@@ -4,6 +4,7 @@ pub mod bars;
 pub mod bed;
 pub mod boxes;
 pub mod by_chance;
+pub mod collisions;
 pub mod combinations;
 pub mod curved;
 pub mod damped_contact;

@@ -114,7 +114,11 @@ impl WallBar {
 
     /// Displacements at rest on the floor, lower end at the floor.
     pub fn rest(&self) -> Vec<f64> {
-        let mass = self.mass();
+        self.rest_with(&self.mass())
+    }
+
+    /// The same for a bar whose dofs weigh as these masses.
+    pub fn rest_with(&self, mass: &[f64]) -> Vec<f64> {
         let stiffness = self.young / self.element_size();
         let mut u = vec![-self.height];
         let mut above: f64 = mass.iter().sum();

@@ -1,19 +1,20 @@
-//! The scenes, and what is measured in them.
+//! Bars that collide or bounce and a disc that falls, run by a combination, and what is measured of them over the phases
+//! of the impact within a step.
 
+use crate::Bars;
 use crate::combinations::Combination;
+use crate::disc::SoftDisc;
+use crate::measure::{Record, figures, impact, try_record_run};
+use crate::wall_bar::WallBar;
 use contact_dynamics::{Result, Simulation};
-use contact_dynamics_scenes::Bars;
-use contact_dynamics_scenes::disc::SoftDisc;
-use contact_dynamics_scenes::measure::{Record, figures, impact, try_record_run};
-use contact_dynamics_scenes::wall_bar::WallBar;
 use std::time::Instant;
 
 /// A number that was measured, and what it should be.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Figure {
-    pub(crate) name: &'static str,
-    value: f64,
-    exact: f64,
+pub struct Figure {
+    pub name: &'static str,
+    pub value: f64,
+    pub exact: f64,
 }
 
 const fn figure(name: &'static str, value: f64, exact: f64) -> Figure {
@@ -22,14 +23,14 @@ const fn figure(name: &'static str, value: f64, exact: f64) -> Figure {
 
 /// A number over the phases of the impact: its mean, and the one farthest from what it should be.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Swept {
-    pub(crate) name: &'static str,
-    pub(crate) mean: f64,
-    pub(crate) worst: f64,
+pub struct Swept {
+    pub name: &'static str,
+    pub mean: f64,
+    pub worst: f64,
 }
 
 /// Runs a scene for all phases.
-pub(crate) fn sweep(phases: &[f64], run: impl Fn(f64) -> Result<Vec<Figure>>) -> Result<Vec<Swept>> {
+pub fn sweep(phases: &[f64], run: impl Fn(f64) -> Result<Vec<Figure>>) -> Result<Vec<Swept>> {
     let runs: Vec<Vec<Figure>> = phases.iter().map(|&phase| run(phase)).collect::<Result<_>>()?;
     let of = |k: usize| {
         let values = || runs.iter().map(|figures| figures[k]);
@@ -47,35 +48,36 @@ pub(crate) fn sweep(phases: &[f64], run: impl Fn(f64) -> Result<Vec<Figure>>) ->
 
 /// Two bars with a step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Collision {
-    pub(crate) bars: Bars,
-    pub(crate) h: f64,
-    pub(crate) until: f64,
+pub struct Collision {
+    pub bars: Bars,
+    pub h: f64,
+    pub until: f64,
 }
 
 impl Collision {
     /// The paper's bars of `elements` elements each.
-    pub(crate) fn paper(elements: usize, h: f64) -> Self {
+    pub fn paper(elements: usize, h: f64) -> Self {
         Self { bars: Bars::paper(elements), h, until: 0.4 }
     }
 
     /// Bars of different stiffness: two plateaus of the force.
-    pub(crate) fn dissimilar(elements: usize, h: f64) -> Self {
+    pub fn dissimilar(elements: usize, h: f64) -> Self {
         Self { bars: Bars::dissimilar(elements), h, until: 0.5 }
     }
 
     /// Bars of different lengths: after the first plateau they touch without force.
-    pub(crate) fn unequal(elements: usize, h: f64) -> Self {
+    pub fn unequal(elements: usize, h: f64) -> Self {
         Self { bars: Bars::unequal(elements), h, until: 0.7 }
     }
 
-    /// With the step that a row can take, and the impact within it.
-    fn prepared(self, combination: &Combination, phase: f64) -> Result<Self> {
+    /// With the step that a combination can take, and the impact within it.
+    pub fn prepared(self, combination: &Combination, phase: f64) -> Result<Self> {
         let h = combination.step(&self.bars.body(), self.h)?;
         Ok(Self { bars: self.bars.delayed(phase, h), h, ..self })
     }
 
-    fn simulation(&self, combination: &Combination) -> Result<Simulation<'static, f64>> {
+    /// A run of it, ready to begin.
+    pub fn simulation(&self, combination: &Combination) -> Result<Simulation<'static, f64>> {
         let Self { bars, h, .. } = self;
         let transit = |bar: usize| bars.element_size(bar) / (bars.young[bar] / bars.density[bar]).sqrt();
         Simulation::builder(bars.system_with(combination.mass(&bars.body(), *h)?), combination.integrator()?, *h)
@@ -85,7 +87,8 @@ impl Collision {
             .build()
     }
 
-    fn record(&self, combination: &Combination) -> Result<(Record, f64)> {
+    /// What such a run leaves behind, and its solves a step.
+    pub fn record(&self, combination: &Combination) -> Result<(Record, f64)> {
         let mut run = self.simulation(combination)?;
         let record = try_record_run(&self.bars, &mut run, self.until)?;
         let statistics = run.statistics();
@@ -93,7 +96,7 @@ impl Collision {
     }
 
     /// Equal bars.
-    pub(crate) fn measure(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
+    pub fn measure(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
         sweep(phases, |phase| {
             let scene = self.prepared(combination, phase)?;
             let (record, solves) = scene.record(combination)?;
@@ -120,7 +123,7 @@ impl Collision {
     }
 
     /// Dissimilar bars: the two plateaus, the release, the speeds after it.
-    pub(crate) fn measure_plateaus(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
+    pub fn measure_plateaus(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
         sweep(phases, |phase| {
             let scene = self.prepared(combination, phase)?;
             let (record, _) = scene.record(combination)?;
@@ -148,7 +151,7 @@ impl Collision {
     }
 
     /// Unequal bars: what happens while they touch without force, and the rebound.
-    pub(crate) fn measure_touching(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
+    pub fn measure_touching(self, combination: &Combination, phases: &[f64]) -> Result<Vec<Swept>> {
         sweep(phases, |phase| {
             let scene = self.prepared(combination, phase)?;
             let (record, _) = scene.record(combination)?;
@@ -175,7 +178,7 @@ impl Collision {
     }
 
     /// Seconds for a time h: the fastest of several runs that nobody observes.
-    pub(crate) fn time_per_step(self, combination: &Combination, repetitions: usize) -> Result<f64> {
+    pub fn time_per_step(self, combination: &Combination, repetitions: usize) -> Result<f64> {
         let scene = self.prepared(combination, 0.45)?;
         let mut fastest = f64::INFINITY;
         for _ in 0..repetitions {
@@ -192,11 +195,11 @@ fn energy_loss(record: &Record) -> f64 {
     1.0 - record.energy(record.t.len() - 1) / record.start_energy
 }
 
-/// The bar that bounces for six periods, at Courant number ½.
-pub(crate) fn bounces(combination: &Combination, elements: usize) -> Result<Vec<Swept>> {
+/// The bar that bounces for six periods.
+pub fn bounces(combination: &Combination, elements: usize, courant: f64) -> Result<Vec<Swept>> {
     let bar = WallBar::bouncing(elements);
     let transit = bar.element_size() / bar.wave_speed();
-    let h = combination.step(&bar.body(), 0.5 * transit)?;
+    let h = combination.step(&bar.body(), courant * transit)?;
     let mass = combination.mass(&bar.body(), h)?;
     let masses = mass.row_sums();
     let mut run = Simulation::builder(bar.system_with(mass), combination.integrator()?, h)
@@ -227,7 +230,7 @@ pub(crate) fn bounces(combination: &Combination, elements: usize) -> Result<Vec<
 }
 
 /// The soft disc.
-pub(crate) fn disc(combination: &Combination, disc: &SoftDisc, until: f64) -> Result<Vec<Swept>> {
+pub fn disc(combination: &Combination, disc: &SoftDisc, until: f64) -> Result<Vec<Swept>> {
     let body = disc.body();
     let h = combination.step(&body, 0.05)?;
     let mass = combination.mass(&body, h)?;
