@@ -215,6 +215,28 @@ pub enum Error {
         /// The highest circular frequency of M⁻¹ K that was found.
         frequency: f64,
     },
+    /// A step has become too long: a compliant contact that presses, or a system that stiffens, has a frequency beyond
+    /// the stability limit of the scheme.
+    #[error(
+        "step from t = {t:e} with h = {h:e}: {} than {integrator} takes: the highest frequency is now {frequency:e} \
+         (1/time) or more, and h may be about {largest:e}; take smaller steps (`StepControl` does), a softer contact \
+         law, or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)",
+        .contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer"))
+    )]
+    Stiffened {
+        /// Name of the integrator.
+        integrator: String,
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// The stiffest contact; none where the system itself has stiffened.
+        contact: Option<ContactId>,
+        /// An estimate of the largest step size that is stable.
+        largest: f64,
+        /// The highest circular frequency that was found, of M⁻¹ (K + Gᵀ k G).
+        frequency: f64,
+    },
     /// A matrix that must be positive definite is not.
     #[error(
         "the {matrix} is not positive definite: pivot of dof {dof} is not positive; look for a body without mass or \
@@ -631,6 +653,7 @@ impl Error {
                 | Self::Jammed { .. }
                 | Self::ContactLost { .. }
                 | Self::PassedThrough { .. }
+                | Self::Stiffened { .. }
                 | Self::NewtonNotConverged { .. }
                 | Self::LinearNotConverged { .. }
                 | Self::IndefiniteTangent { .. }

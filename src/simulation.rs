@@ -54,6 +54,7 @@ mod stage_vectors;
 mod start;
 mod start_problem;
 mod step;
+mod stiffening;
 mod supports;
 mod tangent;
 mod workspace;

@@ -362,6 +362,21 @@ impl ContactLaw {
         }
     }
 
+    /// The stiffness of a spring that presses with a force.
+    pub(crate) fn tangent(&self, force: f64) -> f64 {
+        match *self {
+            Self::Penalty { stiffness }
+            | Self::Bipenalty { stiffness, .. }
+            | Self::StabilizedBipenalty { stiffness }
+            | Self::AugmentedLagrangian { stiffness, .. } => stiffness,
+            // λ = k δ^p: dλ/dδ = p λ/δ.
+            Self::PowerLaw { stiffness, exponent } => exponent * force / (force / stiffness).powf(exponent.recip()),
+            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
+                0.0
+            }
+        }
+    }
+
     /// The law linearized as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
     ///
     /// `depth` is where a power law is linearized (positive), `augmented` the multiplier λ̂ of an augmented Lagrangian.
@@ -407,6 +422,7 @@ mod tests {
             assert!((-depth + c * force + s).abs() < 1e-15 * depth.max(1.0));
             let slope = (law.force(-depth * (1.0 + 1e-6)) - force) / (depth * 1e-6);
             assert!((slope * c - 1.0).abs() < 1e-5);
+            assert!((law.tangent(force) * c - 1.0).abs() < 1e-14);
         }
         let law = ContactLaw::AugmentedLagrangian { stiffness: 4.0, augmentations: 1 };
         let (c, s) = law.linearized(0.0, 2.0_f64);

@@ -19,6 +19,7 @@ use super::run::Simulation;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
 use super::start::{self, Begun, InitialOverclosure, Start, Violation};
+use super::stiffening::Stiffening;
 use super::supports::put_initial_supports;
 use super::tangent::At;
 use super::workspace::{ContactSize, Workspace};
@@ -297,10 +298,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// admitted: waves along a uniform bar are exact there, though the shortest grows linearly in time once it is
     /// excited.
     ///
-    /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`); it may
-    /// stiffen later. Damping counts if the scheme takes its forces from before the step. It is then assumed that the
+    /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`). What comes
+    /// later, a system that stiffens or compliant contacts that press, is looked at in each step, which ends with
+    /// [`Error::Stiffened`] if its frequency is beyond the limit. Damping counts if the scheme takes its forces from before the step. It is then assumed that the
     /// highest mode has the strongest damping, which is exact for Rayleigh damping and otherwise may refuse a stable
-    /// step. The stiffness of compliant contact laws does not count. Of a K that is not symmetric only Gershgorin's
+    /// step. Of a K that is not symmetric only Gershgorin's
     /// circles count.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
@@ -415,6 +417,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.keep_massless(massless);
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
+        if self.stability == Stability::Checked && together.is_alone() {
+            work.stiffening = Stiffening::of(&*system, &scheme, constraints.may_press());
+        }
         let is_balanced = self.balance == EnergyBalance::On;
         let ledger =
             is_balanced.then(|| Ledger::new(&mut *system, together, &state, (&constraints, &g))).transpose()?;

@@ -47,6 +47,9 @@ impl<T: Real> Simulation<'_, T> {
             (Err(error), Some((state, history))) => {
                 let (h, tried) = (history.clock.h, self.history.clock.h);
                 (self.state, self.history) = (state, history);
+                if self.history.known == self.scheme.depth {
+                    self.startup = None;
+                }
                 let compiled = self.compile_for(tried, h);
                 self.together.finish(compiled)?;
                 Err(error)

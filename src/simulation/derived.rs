@@ -5,7 +5,7 @@ use crate::analysis::{self, Order, ZeroStability};
 use crate::integrator::{Newmark, TimeIntegrator};
 use crate::tableau::Tableau;
 use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Numbers derived from a tableau.
 #[derive(Debug)]
@@ -17,6 +17,7 @@ pub(super) struct Derived {
     pub(super) starter: Tableau,
     /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
     pub(super) covectors: Vec<Vec<[f64; 3]>>,
+    critical: OnceLock<Option<f64>>,
 }
 
 impl Derived {
@@ -43,7 +44,13 @@ impl Derived {
             radius_at_infinity: analysis::radius_at_infinity(tableau),
             covectors: tableau.momentum().during_start(&starter.stages[0]),
             starter,
+            critical: OnceLock::new(),
         }
+    }
+
+    /// The critical Ω of the tableau without damping, found when it is first asked for.
+    pub(super) fn critical(&self, tableau: &Tableau) -> Option<f64> {
+        *self.critical.get_or_init(|| analysis::critical_omega(tableau, 0.0))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::past::taylor;
-use super::program::Compiler;
+use super::program::{Compiler, Program};
 use super::responses::Unit;
 use super::run::Simulation;
 use super::scheme::Scheme;
@@ -16,6 +16,11 @@ use crate::error::{Result, step_size};
 use crate::ranks::check_alike;
 use crate::real::Real;
 use crate::state::{History, Motion, Pace, State, Trail};
+use crate::system::Linearity;
+
+/// The past is not extrapolated farther than to so many times its age: polynomials grow beyond it. (Not at all where a
+/// scheme reads accelerations of the past: those of stiff motions are the larger the faster they are.)
+const FARTHEST: f64 = 3.0;
 
 impl<T: Real> Simulation<'_, T> {
     /// Size of the next step.
@@ -29,10 +34,15 @@ impl<T: Real> Simulation<'_, T> {
     /// then extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the
     /// closed contacts.
     ///
-    /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`);
-    /// larger factors extrapolate the past beyond what is kept of it. Total momentum is conserved;
-    /// the impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of
-    /// the scheme.
+    /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`).
+    /// A step so much larger that the past would be extrapolated to more than three times its age (beyond its age, where
+    /// the scheme reads accelerations of it) makes it anew instead, by steps of the trapezoidal rule, as at the start of
+    /// a run, so that fast motions gain no energy to speak of. The velocity of the state becomes that of the scheme's
+    /// momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that goes back and
+    /// forth by such factors all the time is of order 1.
+    ///
+    /// Total momentum is conserved; the impulse of one contact agrees with the change of a body's momentum across a
+    /// change of h only to the order of the scheme.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -80,13 +90,24 @@ impl<T: Real> Simulation<'_, T> {
         step_size::<T>(h)?;
         let clock = self.history.clock.with_step_size(h);
         clock.check()?;
+        // (Steps of a system that may stiffen are looked at as they are taken: they grow back to the nominal size
+        // whatever was found of them where the run was built, or resumed.)
+        let grows_back = self.system.linearity() == Linearity::Nonlinear && h <= self.history.pace.nominal;
         if let StepLimit::Cleared(cleared) = self.limit
             && h > cleared
+            && !grows_back
         {
             self.limit =
                 stability::check_step((&mut *self.system, &self.together), &self.scheme, &self.state.motion, h)?;
         }
-        let past = self.resampled(h)?;
+        let anew = self.is_beyond_past(h);
+        let (past, velocity, starter) = match anew {
+            true => {
+                let starter = self.startup.is_none().then(|| self.compiled_starter(h)).transpose()?;
+                (Vec::new(), Some(self.velocity_of_momentum()?), starter)
+            }
+            false => (self.resampled(h)?, None, None),
+        };
         let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
         let at = At::state(&state.motion);
         program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
@@ -96,6 +117,9 @@ impl<T: Real> Simulation<'_, T> {
             program.set_step_size(&scheme.tableau.stages, &mut **system, h, old, at)?;
             return Err(error);
         }
+        if starter.is_some() {
+            *startup = starter;
+        }
         let programs = std::iter::once(&*program).chain(&*startup);
         let constant = programs.flat_map(|program| &program.operators).filter(|operator| !operator.varies());
         statistics.factorizations += constant.count() as u64;
@@ -104,8 +128,60 @@ impl<T: Real> Simulation<'_, T> {
         for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
             *slot = resampled;
         }
+        if let Some(velocity) = velocity {
+            state.motion.v = velocity;
+            history.known = 1;
+        }
         history.clock = clock;
         Ok(())
+    }
+
+    /// Whether the past that the scheme reads with steps of this size would be extrapolated farther than is stable:
+    /// beyond [`FARTHEST`] times what was computed of it. It is then made anew, by steps of the one-step scheme that
+    /// also begins a run.
+    fn is_beyond_past(&self, h: f64) -> bool {
+        let Self { state, history, scheme, .. } = self;
+        let reads = scheme.tableau.reads_after(scheme.tableau.stages.len() - 1);
+        let farthest = if reads.iter().skip(1).any(|reads| reads[2]) { 1.0 } else { FARTHEST };
+        let needed = (history.known - 1) as f64 * h;
+        let computed = computed(state, history).last().map_or(0.0, |oldest| oldest.age);
+        // (Behind an impact nothing is known but the newest state: what counts then is the step that made it.)
+        needed > farthest * (1.0 + 1e-9) * computed.max((history.known - 1) as f64 * history.made_with)
+    }
+
+    /// The velocity with which the newest state has the momentum of the scheme alone, without its past: the stored one
+    /// errs by O(h²), which does not matter as long as the scheme does not go on from it. Closed contacts keep their
+    /// gap rates.
+    fn velocity_of_momentum(&mut self) -> Result<Vec<T>> {
+        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
+        let h = history.clock.h;
+        let newest = &state.motion;
+        let psi = scheme.derived.covectors.get(history.known - 1).filter(|psi| !reads_accelerations_alone(psi));
+        let Some(psi) = psi else { return Ok(newest.v.clone()) };
+        let mut velocity = scheme.momentum(newest, &history.slots[1..history.known], h);
+        T::axpy(T::of(-lead(psi) * h), &newest.a, &mut velocity);
+        for &dof in system.prescribed().iter().chain(&work.massless) {
+            velocity[dof] = newest.v[dof];
+        }
+        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
+        let rigid: Vec<usize> =
+            closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate()).collect();
+        if !rigid.is_empty() {
+            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
+            projection.close_rows(g, &rigid, |row| no_response(newest.t, constraints.ids[row]))?;
+            let targets: Vec<T> = rigid.iter().map(|&row| g.product(row, &newest.v)).collect();
+            projection.remove_jump(g, &targets, &mut velocity, &mut vec![T::zero(); rigid.len()])?;
+        }
+        Ok(velocity)
+    }
+
+    /// The scheme of the first steps, for another step size.
+    fn compiled_starter(&mut self, h: f64) -> Result<Program<T>> {
+        let Self { system, constraints, linear_solver, scheme, state, .. } = self;
+        let (interface, unit) = (constraints.interface(), Unit::of(constraints));
+        let at = At::state(&state.motion);
+        let mut compiler = Compiler { system: &mut **system, solver: &**linear_solver, h, at, interface, unit };
+        compiler.start(&scheme.derived.starter, &scheme.tableau)
     }
 
     /// Past states 1, 2, … known − 1 at the spacing h.
@@ -264,6 +340,8 @@ fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut Hist
 fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
+    // (A line that is prolonged far is no estimate: what was stored stays, as at the start.)
+    let moved = if h <= FARTHEST * (1.0 + 1e-9) * *made_with { h - *made_with } else { 0.0 };
     for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
         if shift == 0.0 {
             continue;
@@ -273,7 +351,7 @@ fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mu
             unmoved.clone_from(stored);
         }
         let distance = *made_with + shift * (*made_with - previous_h);
-        let fraction = T::of(shift * (h - *made_with) / distance);
+        let fraction = T::of(shift * moved / distance);
         stored.copy_from_slice(unmoved);
         T::axpy_difference(fraction, unmoved, previous.field(field), stored);
     }
@@ -299,6 +377,23 @@ fn interpolate<T: Real>(newer: &Node<'_, T>, older: &Node<'_, T>, age: f64, out:
     T::axpy_difference(T::of(s), &older.a, &newer.a, &mut out.a);
 }
 
+/// p of ψ = v + p h a + O(h²), the momentum functional of a scheme in smooth motion.
+fn lead(psi: &[[f64; 3]]) -> f64 {
+    let terms = psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k)));
+    terms.map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum()
+}
+
+/// The change of ψ by a shift of the past displacements by −k h, and by a unit shift of the past velocities.
+fn shifted(psi: &[[f64; 3]]) -> [f64; 2] {
+    let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
+    [older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum()]
+}
+
+/// A ψ that reads only accelerations of the past (Adams formulas) needs no shift: these enter with h a.
+fn reads_accelerations_alone(psi: &[[f64; 3]]) -> bool {
+    shifted(psi).into_iter().all(|by| by.abs() < 1e-6)
+}
+
 /// Shifts the resampled past so that the scheme's momentum is that before the change.
 ///
 /// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h makes it p (h' − h) a more.
@@ -312,12 +407,9 @@ fn conserve_momentum<T: Real>(
     past: &mut [Motion<T>],
 ) {
     let Some(psi) = scheme.derived.covectors.get(past.len()) else { return };
-    let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
-    let p = psi[0][2] + older().map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum::<f64>();
-    // The change of ψ by a shift of the past displacements by −k h, and by a unit shift of the past velocities.
-    let (by_u, by_v): (f64, f64) = (older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum());
-    // A ψ that reads only accelerations of the past (Adams formulas) needs no shift: these enter with h a.
-    if by_u.abs().max(by_v.abs()) < 1e-6 {
+    let p = lead(psi);
+    let [by_u, by_v] = shifted(psi);
+    if reads_accelerations_alone(psi) {
         return;
     }
     let newest = &state.motion;

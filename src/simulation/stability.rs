@@ -54,6 +54,42 @@ pub(super) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
     }
 }
 
+/// Ω up to which a scheme is stable without damping; none if it is whatever the frequency.
+pub(super) fn critical(scheme: &Scheme<'_>) -> Option<f64> {
+    let stable_at_infinity = || scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + 1e-6);
+    if scheme.tableau.stages.iter().all(|stage| stage.balance.u.z != 0.0) && stable_at_infinity() {
+        return None;
+    }
+    scheme.derived.critical(&scheme.tableau)
+}
+
+/// Steps beyond the limit by this factor are not told from the limit.
+pub(super) fn allowance<T: Real>() -> f64 {
+    1.0 + SLIVER.max(64.0 * T::epsilon().value())
+}
+
+/// Bounds of the square of the highest frequency of a system whose force is that of another part as well, whose
+/// product with a vector `add` adds; known well enough to compare it with `enough`. The first is one from below, the
+/// second is the estimate with its residual. None if there is no K, or one that is not symmetric.
+pub(super) fn highest_square<T: Real>(
+    system: &mut dyn System<T>,
+    motion: &Motion<T>,
+    enough: f64,
+    mut add: impl FnMut(&[T], &mut [T]),
+) -> Result<Option<[f64; 2]>> {
+    let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed(), &[])?, system.dofs());
+    let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(None) };
+    if !stiffness.is_symmetric() {
+        return Ok(None);
+    }
+    let highest = lanczos.highest(system, enough, |system, x, y| {
+        stiffness.product(system, x, y)?;
+        add(x, y);
+        Ok(())
+    })?;
+    Ok(Some([highest.at_least, highest.at_most]))
+}
+
 /// Refuses a step beyond the limit of the scheme, as far as that is known; says up to which step it is.
 ///
 /// Gershgorin's circles bound the highest frequency from above: a step that this bound admits is stable. Otherwise
@@ -67,14 +103,10 @@ pub(super) fn check_step<T: Real>(
     h: f64,
 ) -> Result<StepLimit> {
     let tableau = &scheme.tableau;
-    let stable_at_infinity = || scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + 1e-6);
-    if tableau.stages.iter().all(|stage| stage.balance.u.z != 0.0) && stable_at_infinity() {
-        return Ok(StepLimit::Cleared(f64::INFINITY));
-    }
-    let Some(mut critical) = analysis::critical_omega(tableau, 0.0) else {
+    let Some(mut critical) = critical(scheme) else {
         return Ok(StepLimit::Cleared(f64::INFINITY));
     };
-    let allowance = 1.0 + SLIVER.max(64.0 * T::epsilon().value());
+    let allowance = allowance::<T>();
     let lags = lags(tableau, system);
     if !together.is_alone() {
         let limit = critical / frequency_over_ranks(system, together, motion, lags)?;
@@ -130,7 +162,6 @@ pub(super) fn check_step<T: Real>(
     Ok(StepLimit::Cleared(h.max(step(highest.at_most))))
 }
 
-/// Whether the system is damped, and the scheme takes damping forces from before the stage.
 /// The highest frequency of bodies over ranks: what the host knows, or the bound by Gershgorin's circles, of which each
 /// rank has those of its own dofs. Lanczos' iteration would take products with rows of all ranks.
 fn frequency_over_ranks<T: Real>(
@@ -160,6 +191,7 @@ fn frequency_over_ranks<T: Real>(
     }
 }
 
+/// Whether the system is damped, and the scheme takes damping forces from before the stage.
 fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
     tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0) && system.damping_force().is_some()
 }

@@ -11,6 +11,7 @@ use super::program::CompiledStage;
 use super::run::Simulation;
 use super::stage::StageSolve;
 use super::stage_vectors::predict;
+use super::stiffening::Taken;
 use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::Result;
 use crate::mass::Mass;
@@ -45,7 +46,11 @@ impl<T: Real> Simulation<'_, T> {
         work.correction.energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         work.backup.underway = true;
-        let result = self.stages().and_then(|()| self.inspect()).and_then(|()| self.accept());
+        let result = self
+            .stages()
+            .and_then(|()| self.check_stability())
+            .and_then(|()| self.inspect())
+            .and_then(|()| self.accept());
         let clock = self.history.clock;
         let result = result.map_err(|error| error.in_step(clock.at(0.0), clock.h));
         if matches!(result, Ok(Verdict::Accepted)) {
@@ -63,6 +68,23 @@ impl<T: Real> Simulation<'_, T> {
         // Rows may have followed the failed step: back to the state. An error of this search is not lost, for the next
         // step begins with the same search.
         constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
+    }
+
+    /// Refuses a step that has become too long for what presses, or for a system that has stiffened.
+    fn check_stability(&mut self) -> Result<()> {
+        let Self { system, constraints, g, history, work, scheme, limit, .. } = self;
+        let (Some(stiffening), [new, past @ ..]) = (&mut work.stiffening, &history.slots[..]) else { return Ok(()) };
+        stiffening.check(Taken {
+            system: &mut **system,
+            scheme,
+            limit: *limit,
+            clock: history.clock,
+            constraints,
+            g,
+            contact: &work.contact,
+            start: &past[work.backup.rotations - 1],
+            new,
+        })
     }
 
     /// Lets the constraints inspect the motion in slot 0 of the history. When a contact has closed, and every so many

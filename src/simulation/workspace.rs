@@ -10,6 +10,7 @@ use super::newton::NewtonWork;
 use super::program::Program;
 use super::rate_check::RateCheck;
 use super::stage_vectors::StageVectors;
+use super::stiffening::Stiffening;
 use super::supports::Supports;
 use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
@@ -29,6 +30,8 @@ pub(super) struct Workspace<T: Real> {
     pub(super) block: Option<MasslessBlock<T>>,
     pub(super) correction: CorrectionWork<T>,
     pub(super) rate_check: RateCheck<T>,
+    /// For schemes that are stable up to some frequency, which may be met in the run.
+    pub(super) stiffening: Option<Stiffening<T>>,
     /// The number of contacts that there is memory for.
     pub(super) rows: usize,
     /// v and a at the time of the new state, where the scheme stores those of another time.
@@ -113,6 +116,7 @@ impl<T: Real> Workspace<T> {
                 energy: T::zero(),
             },
             rate_check: RateCheck::new(rows),
+            stiffening: None,
             rows,
             shown: [Vec::new(), Vec::new()],
             backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),

@@ -130,3 +130,26 @@ fn release_does_not_depend_on_a_velocity_common_to_all() {
         }
     }
 }
+
+/// Two masses that have met move on together, without any force between them: whichever way their gap is rounded, what
+/// the impact took is not given back.
+#[test]
+fn bodies_that_stay_together_without_force_are_not_driven_apart() {
+    for (make, _) in schemes() {
+        for i in 0..60 {
+            let (mass, common, gap) = (0.3 + 0.17 * f64::from(i), f64::from(i % 7) * 1.3, 0.01 + 0.0137 * f64::from(i));
+            let system = LinearSystem::lumped(vec![1.0, mass], matrix(2, [(0, 0, 0.0), (1, 1, 0.0)])).unwrap();
+            let pair = LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], gap);
+            let builder = Simulation::builder(system, make(), 0.01).velocity(vec![common + 1.0, common - 0.7]);
+            let mut run = corrected(builder.constraint(pair), With::Release).build().unwrap();
+            run.run_until(2.0, &mut ()).unwrap();
+            let v = run.state().velocity();
+            let met = (common + 1.0 + mass * (common - 0.7)) / (1.0 + mass);
+            assert!(
+                (v[0] - met).abs() < 1e-9 && (v[1] - met).abs() < 1e-9,
+                "{}, mass {mass}: {v:?} instead of {met}",
+                make().name()
+            );
+        }
+    }
+}

@@ -17,4 +17,5 @@ mod stability;
 mod start;
 mod step_control;
 mod step_size;
+mod stiffening;
 mod supports;

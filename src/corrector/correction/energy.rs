@@ -28,4 +28,18 @@ impl<T: Real> Correction<'_, T> {
         self.apply(&[row], &[impulse])?;
         Ok(impulse)
     }
+
+    /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
+    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative.
+    pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
+        let (s, rate) = (self.compliance(row)?, self.rate(row)?);
+        let bound = T::of(T::epsilon().value().powf(2.0 / 3.0)) * (T::of(2.0) * s * energy).sqrt();
+        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let gap = self.contacts.gap[row];
+        let gap_noise = T::of(16.0) * rounding(self.g.magnitude(row, &self.new.u));
+        let h = T::of(self.h);
+        Ok(rate <= bound + noise
+            && gap <= h * (bound + noise) + gap_noise
+            && h * s * self.previous_force(row) <= bound + noise)
+    }
 }

@@ -202,8 +202,6 @@ pub(super) fn law(k: f64, h: f64, scheme: &Listed, random: &mut Congruential) ->
         2 => ContactLaw::RateCondition,
         3 => ContactLaw::PersistencySwitch,
         4 => ContactLaw::Penalty { stiffness },
-        // (The stiffness of a power law grows with the depth.)
-        5 if scheme.critical.is_some() => ContactLaw::Penalty { stiffness },
         5 => ContactLaw::PowerLaw { stiffness, exponent: pick(&[1.5, 2.0, 1.1], random) },
         6 => ContactLaw::Bipenalty { stiffness, mass: stiffness * h * h * random.within(0.1, 0.5) },
         7 => ContactLaw::StabilizedBipenalty { stiffness },

@@ -46,9 +46,9 @@ impl Recipe {
         let softest = bodies.mass.iter().fold(f64::INFINITY, |least, m| least.min(*m)) / (h * h);
         let stiffest = bodies.elements.iter().flat_map(|e| &e.stiffness).fold(0.0_f64, |most, k| most.max(k.abs()));
         let heaviest = bodies.mass.iter().fold(0.0_f64, |most, m| most.max(*m));
-        // Explicit steps take springs that are far softer than the lightest mass.
+        // (Of springs that stop the lightest mass explicit steps take some, and refuse others.)
         let unit = if listed.critical.is_some() {
-            1e-4 * softest
+            1e-2 * softest
         } else if stiffest > 0.0 {
             stiffest
         } else {
@@ -69,7 +69,7 @@ impl Recipe {
             "block" if !free && pick(&[true, true, false], random) => setting.floor(&bodies, random),
             _ => setting.rows(&bodies, random),
         };
-        extras(kind, listed.critical.is_none(), way, &mut bodies, random);
+        extras(kind, way, &mut bodies, random);
         let damping = match pick(&[0, 0, 0, 1, 2], random) {
             0 => [0.0; 2],
             1 => [decades(-3.0, 0.0, random) / h, 0.0],
@@ -126,7 +126,8 @@ impl Recipe {
             twin: Twin::Repeated,
         };
         if pick(&[true, false, false], random) {
-            let factors: &[f64] = if listed.critical.is_some() { &[0.5, 0.25, 0.9] } else { &[0.5, 2.0, 0.1, 1.7] };
+            let factors: &[f64] =
+                if listed.critical.is_some() { &[0.5, 0.25, 0.9, 0.02] } else { &[0.5, 2.0, 0.1, 1.7, 0.01, 20.0] };
             let count = pick(&[1, 2, 5], random);
             recipe.changes = (0..count).map(|_| ((random.unit() * 20.0) as usize, pick(factors, random))).collect();
             recipe.changes.sort_by_key(|change| change.0);
@@ -152,15 +153,14 @@ fn step(bodies: &Bodies, listed: &Listed, random: &mut Congruential) -> f64 {
 }
 
 /// Shared and missing masses, springs that harden.
-fn extras(kind: &str, implicit: bool, way: f64, bodies: &mut Bodies, random: &mut Congruential) {
+fn extras(kind: &str, way: f64, bodies: &mut Bodies, random: &mut Congruential) {
     if pick(&[true, false, false], random) {
         let least = bodies.mass.iter().fold(f64::INFINITY, |least, m| least.min(*m));
         for element in bodies.elements.iter_mut().filter(|element| element.dofs.len() == 2) {
             element.shared_mass = least * random.within(0.02, 0.3);
         }
     }
-    // (Of explicit runs the frequency at the start is known alone.)
-    if kind == "hardening bars" && implicit {
+    if kind == "hardening bars" {
         for element in bodies.elements.iter_mut().filter(|element| element.dofs.len() == 2) {
             element.hardening = element.stiffness[0] * decades(-2.0, 1.0, random) / (way * way);
         }
@@ -257,8 +257,7 @@ fn twin(recipe: &Recipe, random: &mut Congruential) -> Twin {
     let is_unique = (recipe.rows.len() == 1 || count(|row| row.friction.is_some()) == 0)
         && count(|row| row.law == ContactLaw::Equality) <= 1
         && count(|row| row.law != ContactLaw::Equality && row.gap == 0.0) == 0;
-    // (Release acts where a contact opens: by the sign of rounding where bodies stay together without force.)
-    if !is_direct || !is_unique || recipe.correction == Correction::Release {
+    if !is_direct || !is_unique {
         return pick(&[Twin::Repeated, Twin::Resumed, Twin::PowersOfTwo(two)], random);
     }
     let choices = [

@@ -12,8 +12,13 @@ const ROUNDING: f64 = 10.0;
 /// Momentum is conserved up to this share of the largest Σ m (|v| + |u|/h + h |a|): steps of a thousand periods magnify rounding.
 const MOMENTUM: f64 = 1e-6;
 
+/// Explicit runs on springs alone may gain by impacts that last two steps, but do not grow beyond this.
+const GAIN: f64 = 1e6;
+
 pub(super) struct Watch<'a> {
     recipe: &'a Recipe,
+    /// The scheme is explicit, and all rows are springs.
+    explicit_on_springs: bool,
     /// Contact is imposed on displacements of the state.
     on_positions: bool,
     is_free: bool,
@@ -32,8 +37,13 @@ impl<'a> Watch<'a> {
         let listed = &schemes::all()[recipe.scheme];
         let is_free = recipe.is_free();
         let rests = recipe.rows.iter().all(|row| row.amplitude == 0.0) && recipe.supports.is_empty();
+        let is_spring = |row: &Row| {
+            use ContactLaw::{AugmentedLagrangian, Penalty, PowerLaw};
+            matches!(row.law, Penalty { .. } | PowerLaw { .. } | AugmentedLagrangian { .. }) && row.friction.is_none()
+        };
         let mut watch = Self {
             recipe,
+            explicit_on_springs: listed.critical.is_some() && recipe.rows.iter().all(is_spring),
             on_positions: listed.takes_corrections(),
             is_free,
             conserves: rests && recipe.load.constant.is_empty(),
@@ -84,6 +94,9 @@ impl<'a> Watch<'a> {
         if self.conserves {
             let gain = if self.start > 0.0 { total / self.start } else { 0.0 };
             verdict.gain = verdict.gain.max(gain);
+            if self.explicit_on_springs && gain > GAIN {
+                return find("energy grows", format!("to {gain:e} of that at the start"));
+            }
         }
         if self.is_free {
             let now = self.momenta(&run.run);
