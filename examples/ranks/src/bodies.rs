@@ -153,15 +153,12 @@ impl Blocks {
         let is_last = share.world.rank + 1 == share.world.size;
         let fault = fault.filter(|fault| is_last || fault.is_of_all());
         let (ranks, clock) = (share.clone(), share.clock.clone());
-        let builder = match scene {
-            Scene::LargeStrains => {
-                let body = HyperelasticPart::new(cut, ranks, Law::NeoHookean);
-                self.builder(scene, Timed { part: with_fault(body, fault), clock })
-            }
-            _ => {
-                let body = Self::matrices(scene, &cut.solid)?.over_ranks(ranks);
-                self.builder(scene, Timed { part: with_fault(body, fault), clock })
-            }
+        let builder = if scene == Scene::LargeStrains {
+            let body = HyperelasticPart::new(cut, ranks, Law::NeoHookean);
+            self.builder(scene, Timed { part: with_fault(body, fault), clock })
+        } else {
+            let body = Self::matrices(scene, &cut.solid)?.over_ranks(ranks);
+            self.builder(scene, Timed { part: with_fault(body, fault), clock })
         };
         let local = |node: usize| cut.local(node).expect("all ranks know the contact nodes");
         let builder = builder.velocity(share.of(&self.velocity())).constraints(self.contact(local)?);
