@@ -183,6 +183,11 @@ pub trait Condensation<T: Real> {
     fn solve(&mut self, forces: &mut [T]) -> Result<()>;
 }
 
+/// Which of `count` parts each dof of a pattern belongs to. Nothing if the pattern is not symmetric, or too large.
+pub(crate) fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, count: usize) -> Option<Vec<usize>> {
+    quotient::Quotient::new(pattern, &[]).map(|quotient| dissection::parts(&quotient, count))
+}
+
 /// Checks what is to be analyzed, and returns the number of dofs.
 fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
     let (dofs, what) = (sparse::check_effective_pattern(pattern)?, "the list of contact dofs");

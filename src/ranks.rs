@@ -2,8 +2,11 @@
 
 mod agreement;
 mod check;
+mod parts;
 mod solver;
 mod system;
+
+pub use parts::parts;
 
 pub(crate) use agreement::Together;
 pub(crate) use check::{check_alike, check_interface, check_owned};

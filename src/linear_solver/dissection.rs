@@ -4,6 +4,7 @@
 mod coordinates;
 mod leaf;
 mod multilevel;
+mod parts;
 mod separator;
 
 use super::graph::{Graph, NONE, number};
@@ -28,6 +29,17 @@ pub(super) fn by_graph(quotient: &Quotient) -> Result<Vec<u32>> {
 pub(super) fn by_coordinates(quotient: &Quotient, places: &[[f64; 3]]) -> Result<Vec<u32>> {
     let place = |&vertex: &u32| places[quotient.dofs(vertex)[0]];
     dissect(quotient, false, |part, names| coordinates::bisect(part, &names.iter().map(place).collect::<Vec<_>>()))
+}
+
+/// The part of each dof, of so many parts alike in size (one at least); dofs with the same neighbors are together.
+pub(super) fn parts(quotient: &Quotient, count: usize) -> Vec<usize> {
+    let graph = &quotient.graph;
+    let of_vertices = parts::parts(graph, count);
+    let mut parts = vec![0; quotient.size()];
+    for (vertex, part) in (0..).zip(of_vertices) {
+        quotient.dofs(vertex).iter().for_each(|&dof| parts[dof] = part);
+    }
+    parts
 }
 
 /// `bisect` gets connected parts of the graph with the names of their vertices; `weigh` says whether it reads weights

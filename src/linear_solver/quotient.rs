@@ -63,6 +63,11 @@ impl Quotient {
         Some(Self { graph, dofs, starts, last })
     }
 
+    /// Number of dofs.
+    pub(super) fn size(&self) -> usize {
+        self.dofs.len()
+    }
+
     pub(super) fn dofs(&self, vertex: u32) -> &[usize] {
         &self.dofs[self.starts[vertex as usize]..self.starts[vertex as usize + 1]]
     }

@@ -1,17 +1,17 @@
-//! The scenes: blocks of hexahedra thrown at a floor and at one another, cut into slabs of ranks.
+//! The scenes: blocks of hexahedra thrown at a floor and at one another.
 
+use crate::clock::Timed;
+use crate::engine::Engine;
 use crate::faults::{Fault, with_fault};
-use crate::share::Share;
-use crate::solver::{Direct, Way};
+use crate::partition::Part;
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{
     CentralDifference, Composite, ContactConstraint, ContactLaw, LinearRows, LinearSystem, NodesOnObstacle, Result,
     Simulation, SimulationBuilder, System,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
-use contact_dynamics_scenes::ranks::{Cut, HyperelasticPart};
+use contact_dynamics_scenes::ranks::HyperelasticPart;
 use contact_dynamics_scenes::solids::{Material, Solid};
-use std::sync::Arc;
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.25, density: 1.0 };
 const FRICTION: f64 = 0.3;
@@ -42,7 +42,7 @@ impl Scene {
     }
 }
 
-/// Two blocks of one height, the upper one a gap above the lower one.
+/// Two blocks of one height, the upper one a gap above the lower one; or one alone.
 pub struct Blocks {
     pub solid: Solid<3>,
     bottom: Vec<usize>,
@@ -65,6 +65,18 @@ impl Blocks {
         let (bottom, top) = (at(0.0), at(1.0));
         let pairs = top.into_iter().zip(&bottom).map(|(top, &under)| [top, first + under]).collect();
         Self { solid: lower.with(upper), bottom, pairs, gaps, size: 1.0 / cells as f64 }
+    }
+
+    /// A single block of so many elements, cubes of one size, that stands on a patch in the middle of its lower face:
+    /// a body that grows while its contact does not.
+    pub fn tower(cells: [usize; 3]) -> Self {
+        let size = 1.0 / cells[0] as f64;
+        let edges = cells.map(|count| size * count as f64);
+        let solid = Solid::block(edges, cells, MATERIAL);
+        let is_near = |node: &[f64; 3]| (0..2).all(|axis| (node[axis] - 0.5 * edges[axis]).abs() < 2.5 * size);
+        let bottom = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] < 1e-9 && is_near(&solid.nodes[node]));
+        let bottom = bottom.collect();
+        Self { bottom, solid, pairs: Vec::new(), gaps: [0.2 * size, 0.0], size }
     }
 
     /// The nodes that contact may act on.
@@ -125,36 +137,34 @@ impl Blocks {
     }
 
     /// The part of a rank.
-    pub fn on_rank(
-        &self,
-        scene: Scene,
-        part: (&Cut<3>, &Arc<Share>),
-        way: Way,
-    ) -> Result<SimulationBuilder<'static, f64>> {
-        self.on_rank_with(scene, part, way, None)
+    pub fn on_rank(&self, scene: Scene, part: &Part, engine: Engine) -> Result<SimulationBuilder<'static, f64>> {
+        self.on_rank_with(scene, part, engine, None)
     }
 
-    /// The same with a fault, on the last rank.
+    /// The same with a fault, on the last rank or on all, as it is.
     pub fn on_rank_with(
         &self,
         scene: Scene,
-        (cut, share): (&Cut<3>, &Arc<Share>),
-        way: Way,
+        part: &Part,
+        engine: Engine,
         fault: Option<Fault>,
     ) -> Result<SimulationBuilder<'static, f64>> {
-        let (ranks, is_last) = (share.clone(), share.world.rank + 1 == share.world.size);
-        let builder = match scene {
-            Scene::LargeStrains => {
-                let body = HyperelasticPart::new(cut, ranks, Law::NeoHookean);
-                self.builder(scene, with_fault(body, fault, is_last))
-            }
-            _ => self.builder(scene, Self::matrices(scene, &cut.solid)?.over_ranks(ranks)),
+        let Part { cut, share } = part;
+        let is_last = share.world.rank + 1 == share.world.size;
+        let fault = fault.filter(|fault| is_last || fault.is_of_all());
+        let (ranks, clock) = (share.clone(), share.clock.clone());
+        let builder = if scene == Scene::LargeStrains {
+            let body = HyperelasticPart::new(cut, ranks, Law::NeoHookean);
+            self.builder(scene, Timed { part: with_fault(body, fault), clock })
+        } else {
+            let body = Self::matrices(scene, &cut.solid)?.over_ranks(ranks);
+            self.builder(scene, Timed { part: with_fault(body, fault), clock })
         };
         let local = |node: usize| cut.local(node).expect("all ranks know the contact nodes");
         let builder = builder.velocity(share.of(&self.velocity())).constraints(self.contact(local)?);
         Ok(match scene {
             Scene::Explicit => builder,
-            _ => builder.linear_solver(Direct { share: share.clone(), way, fault: fault.filter(|_| is_last) }),
+            _ => builder.linear_solver(engine.solver(cut, share, fault)),
         })
     }
 }

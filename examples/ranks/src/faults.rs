@@ -1,12 +1,10 @@
-//! Ranks that fail: `ranks fault force|solve|memory|kill`. The last rank fails, and all have to hear of it.
+//! Ranks that fail: `ranks fault force|solve|memory|iterations|kill`. The last rank fails, and all have to hear of it.
 
 use crate::bodies::{Blocks, Scene};
-use crate::share::Share;
-use crate::solver::Way;
+use crate::engine::Engine;
+use crate::partition::Part;
 use contact_dynamics::{Error, Result, System};
 use contact_dynamics_scenes::hosts::Hooked;
-use contact_dynamics_scenes::ranks::Cut;
-use std::sync::Arc;
 
 /// What happens on the last rank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +15,8 @@ pub enum Fault {
     Solve,
     /// MUMPS is not given the memory that it needs.
     Memory,
+    /// Iterations end before they have converged, on all ranks.
+    Iterations,
     /// The process dies.
     Kill,
 }
@@ -27,25 +27,27 @@ impl Fault {
             "force" => Some(Self::Force),
             "solve" => Some(Self::Solve),
             "memory" => Some(Self::Memory),
+            "iterations" => Some(Self::Iterations),
             "kill" => Some(Self::Kill),
             _ => None,
         }
     }
+
+    /// Whether all ranks have it, not the last one alone.
+    pub fn is_of_all(self) -> bool {
+        self == Self::Iterations
+    }
 }
 
-/// The call in which the force of the last rank fails or kills, long after the start.
-const CALL: usize = 30;
+/// The call in which the force of the last rank fails or kills, some steps after the start.
+const CALL: usize = 12;
 
-/// A system whose force does what the fault says, on the last rank.
-pub fn with_fault(
-    system: impl System<f64> + 'static,
-    fault: Option<Fault>,
-    is_last: bool,
-) -> impl System<f64> + 'static {
+/// A system whose force does what the fault says.
+pub fn with_fault(system: impl System<f64> + 'static, fault: Option<Fault>) -> impl System<f64> + 'static {
     let mut calls = 0;
     Hooked::new(system, move |method, t, _: &mut [f64]| {
         calls += usize::from(method == "force");
-        if !is_last || method != "force" || calls != CALL {
+        if method != "force" || calls != CALL {
             return Ok(());
         }
         match fault {
@@ -60,11 +62,12 @@ pub fn with_fault(
 }
 
 /// Runs until the fault. Whether every rank has heard of it as it should.
-pub fn run(fault: Fault, blocks: &Blocks, (cut, share): (&Cut<3>, &Arc<Share>)) -> Result<bool> {
-    let world = share.world;
+pub fn run(fault: Fault, blocks: &Blocks, part: &Part, engine: Engine) -> Result<bool> {
+    let world = part.share.world;
     let is_last = world.rank + 1 == world.size;
-    let way = Way { input: crate::ffi::Input::Distributed, condenses: true };
-    let built = blocks.on_rank_with(Scene::LargeStrains, (cut, share), way, Some(fault))?.build();
+    // (Iterations solve for each pressed row: at large strains that would be a thousand times before the fault.)
+    let scene = if engine == Engine::CONDENSING { Scene::LargeStrains } else { Scene::Linear };
+    let built = blocks.on_rank_with(scene, part, engine, Some(fault))?.build();
     let (result, steps) = match built {
         Err(error) => (Err(error), 0),
         Ok(mut run) => {
@@ -89,6 +92,7 @@ pub fn run(fault: Fault, blocks: &Blocks, (cut, share): (&Cut<3>, &Arc<Share>)) 
         Fault::Force | Fault::Solve => matches!(error, Error::OtherRank { rank, .. } if rank == last),
         // (MUMPS tells all ranks.)
         Fault::Memory => matches!(error, Error::OutOfMemory { .. } | Error::OtherRank { .. }),
+        Fault::Iterations => matches!(error, Error::LinearNotConverged { .. }),
         Fault::Kill => false,
     })
 }

@@ -1,13 +1,20 @@
-//! All that is unsafe here: calls of the C side, each behind a safe function.
+//! All that is unsafe here and in the modules below: calls of the C side, each behind a safe function.
 //!
 //! MPI is initialized with `MPI_THREAD_FUNNELED`: only the thread that has initialized it may call it, and every function
 //! asserts that. So handles may be moved and shared between threads: nothing but a panic comes of their use elsewhere.
-//! MUMPS keeps pointers to the entries of its matrix; they are held here, behind the handle, as long as it lives.
 #![allow(unsafe_code)]
 // (A `World` is the proof that MPI has been initialized.)
 #![allow(clippy::unused_self)]
 
-use std::ffi::{c_int, c_long, c_void};
+mod mumps;
+#[cfg(feature = "petsc")]
+mod petsc;
+
+pub use mumps::{Input, Mumps};
+#[cfg(feature = "petsc")]
+pub use petsc::{Multigrid, Reason};
+
+use std::ffi::c_int;
 use std::sync::OnceLock;
 use std::thread::{ThreadId, current};
 
@@ -48,36 +55,9 @@ unsafe extern "C" {
         receive: *mut f64,
     ) -> c_int;
     fn shim_time() -> f64;
-    fn shim_mumps_new(handle: *mut *mut c_void) -> c_int;
-    fn shim_mumps_free(handle: *mut c_void);
-    fn shim_mumps_analyze(
-        handle: *mut c_void,
-        dofs: c_int,
-        entries: c_long,
-        rows: *mut c_int,
-        columns: *mut c_int,
-        distributed: c_int,
-        last: *mut c_int,
-        last_count: c_int,
-    ) -> c_int;
-    fn shim_mumps_factorize(handle: *mut c_void, values: *mut f64, distributed: c_int) -> c_int;
-    fn shim_mumps_stored(handle: *mut c_void, factorized: c_int) -> c_int;
-    fn shim_mumps_negative_pivots(handle: *mut c_void) -> c_int;
-    fn shim_mumps_detail(handle: *mut c_void) -> c_int;
-    fn shim_mumps_schur(handle: *mut c_void, out: *mut f64);
-    fn shim_mumps_limit(handle: *mut c_void, megabytes: c_int);
-    fn shim_mumps_solve(
-        handle: *mut c_void,
-        rhs: *mut f64,
-        dofs: c_int,
-        columns: c_int,
-        part: c_int,
-        reduced: *mut f64,
-        last_count: c_int,
-    ) -> c_int;
 }
 
-/// An error of MPI or MUMPS by its number.
+/// An error of MPI, MUMPS or PETSc by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Failed(pub c_int, pub c_int);
 
@@ -124,12 +104,16 @@ impl World {
         // SAFETY: both pointers are to places of this frame.
         let code = unsafe { shim_init(&raw mut rank, &raw mut size) };
         assert_eq!(code, 0, "MPI does not start");
+        #[cfg(feature = "petsc")]
+        petsc::initialize();
         Self { rank: rank as usize, size: size as usize }
     }
 
     /// Ends MPI; all ranks call it, after everything else.
     pub fn finalize(self) {
         assert_thread();
+        #[cfg(feature = "petsc")]
+        petsc::finalize();
         // SAFETY: MPI is initialized; later calls fail with errors of MPI.
         unsafe { shim_finalize() };
     }
@@ -205,7 +189,7 @@ impl World {
         })
     }
 
-    /// Sends to and receives from other ranks, in their order.
+    /// Sends to and receives from ranks, in their order.
     pub fn exchange(self, peers: &Peers, send: &[f64], receive: &mut [f64]) -> Result<(), Failed> {
         assert_thread();
         let total = |counts: &[c_int]| counts.iter().map(|&count| i64::from(count)).sum::<i64>();
@@ -267,166 +251,16 @@ impl Peers {
         self.sent.push(int(sent));
         self.received.push(int(received));
     }
-}
 
-/// Where the entries of a matrix are when MUMPS gets them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Input {
-    /// All on rank 0.
-    Root,
-    /// Each rank has its own.
-    Distributed,
-}
-
-/// A symmetric matrix in MUMPS.
-#[derive(Debug)]
-pub struct Mumps {
-    handle: *mut c_void,
-    input: Input,
-    is_root: bool,
-    dofs: usize,
-    entries: usize,
-    last: Vec<c_int>,
-    // MUMPS points to these.
-    rows: Vec<c_int>,
-    columns: Vec<c_int>,
-    values: Vec<f64>,
-}
-
-// SAFETY: every use is asserted to be by the thread of MPI.
-unsafe impl Send for Mumps {}
-
-impl Drop for Mumps {
-    fn drop(&mut self) {
-        if THREAD.get() == Some(&current().id()) {
-            // SAFETY: the handle is not used again. (Elsewhere it leaks.)
-            unsafe { shim_mumps_free(self.handle) };
-        }
-    }
-}
-
-impl Mumps {
-    /// Analyzes a pattern; all ranks call it. Rows and columns from 0, one triangle; `last` are the dofs of the Schur
-    /// complement, or none.
-    pub fn analyze(
-        world: World,
-        dofs: usize,
-        entries: impl Iterator<Item = (usize, usize)>,
-        input: Input,
-        last: &[usize],
-    ) -> Result<Self, Failed> {
-        assert_thread();
-        let (rows, columns): (Vec<_>, Vec<_>) = entries.map(|(row, column)| (int(row + 1), int(column + 1))).unzip();
-        let last = last.iter().map(|&dof| int(dof + 1)).collect();
-        let mut handle = std::ptr::null_mut();
-        // SAFETY: the pointer is to a place of this frame.
-        let code = unsafe { shim_mumps_new(&raw mut handle) };
-        if handle.is_null() {
-            return Err(Failed(code, 0));
-        }
-        let entries = rows.len();
-        let mut mumps = Self {
-            handle,
-            input,
-            is_root: world.rank == 0,
-            dofs,
-            entries,
-            last,
-            rows,
-            columns,
-            values: vec![0.0; entries],
-        };
-        mumps.checked(code)?;
-        // SAFETY: the lists are as long as told, have indices from 1 to the number of dofs, and live with the handle.
-        let code = unsafe {
-            shim_mumps_analyze(
-                handle,
-                int(dofs),
-                entries.try_into().expect("a count of 63 bits"),
-                mumps.rows.as_mut_ptr(),
-                mumps.columns.as_mut_ptr(),
-                c_int::from(input == Input::Distributed),
-                mumps.last.as_mut_ptr(),
-                int(mumps.last.len()),
-            )
-        };
-        mumps.checked(code)?;
-        Ok(mumps)
+    /// The same with so many numbers in place of each.
+    pub fn times(&self, columns: usize) -> Self {
+        let times = |counts: &[c_int]| counts.iter().map(|&count| count * int(columns)).collect();
+        Self { ranks: self.ranks.clone(), sent: times(&self.sent), received: times(&self.received) }
     }
 
-    fn checked(&self, code: c_int) -> Result<(), Failed> {
-        // SAFETY: the handle lives.
-        if code == 0 { Ok(()) } else { Err(Failed(code, unsafe { shim_mumps_detail(self.handle) })) }
-    }
-
-    /// Factorizes; the values are those of the entries of the analysis, in their order. The number of negative pivots.
-    pub fn factorize(&mut self, values: impl Iterator<Item = f64>) -> Result<i32, Failed> {
-        assert_thread();
-        self.values.clear();
-        self.values.extend(values);
-        assert_eq!(self.values.len(), self.entries);
-        let distributed = c_int::from(self.input == Input::Distributed);
-        // SAFETY: as many values as entries, which live with the handle.
-        let code = unsafe { shim_mumps_factorize(self.handle, self.values.as_mut_ptr(), distributed) };
-        self.checked(code)?;
-        // SAFETY: the handle lives.
-        Ok(unsafe { shim_mumps_negative_pivots(self.handle) })
-    }
-
-    /// The number of entries that a factorization takes from this rank.
-    pub fn entries(&self) -> usize {
-        self.entries
-    }
-
-    /// Entries of the factors; as estimated before there are any.
-    pub fn stored(&self, factorized: bool) -> usize {
-        assert_thread();
-        // SAFETY: the handle lives.
-        let stored = unsafe { shim_mumps_stored(self.handle, c_int::from(factorized)) };
-        let size = stored.unsigned_abs() as usize;
-        if stored < 0 { size * 1_000_000 } else { size }
-    }
-
-    /// Gives this rank no more memory than so many megabytes.
-    pub fn limit_memory(&mut self, megabytes: i32) {
-        assert_thread();
-        // SAFETY: the handle lives.
-        unsafe { shim_mumps_limit(self.handle, megabytes) };
-    }
-
-    /// The lower triangle of the Schur complement by rows, on rank 0, after a factorization.
-    pub fn schur(&self, out: &mut [f64]) {
-        assert_thread();
-        assert!(self.is_root && out.len() == self.last.len() * self.last.len());
-        // SAFETY: the asserted length is that of the complement.
-        unsafe { shim_mumps_schur(self.handle, out.as_mut_ptr()) };
-    }
-
-    /// Solves for whole right-hand sides on rank 0 (elsewhere the slices are empty).
-    pub fn solve(&mut self, rhs: &mut [f64], columns: usize) -> Result<(), Failed> {
-        self.solve_part(rhs, columns, 0, &mut [])
-    }
-
-    /// Eliminates the interior; what is left on the interface, on rank 0.
-    pub fn reduce(&mut self, rhs: &mut [f64], reduced: &mut [f64]) -> Result<(), Failed> {
-        self.solve_part(rhs, 1, 1, reduced)
-    }
-
-    /// Completes the solution of the last reduction from that on the interface.
-    pub fn complete(&mut self, interface: &mut [f64], solution: &mut [f64]) -> Result<(), Failed> {
-        self.solve_part(solution, 1, 2, interface)
-    }
-
-    fn solve_part(&mut self, rhs: &mut [f64], columns: usize, part: i32, reduced: &mut [f64]) -> Result<(), Failed> {
-        assert_thread();
-        assert!(!self.is_root || rhs.len() == columns * self.dofs);
-        assert!(!self.is_root || part == 0 || reduced.len() == self.last.len());
-        let last = int(self.last.len());
-        // SAFETY: the asserted lengths where MUMPS reads them, which is rank 0.
-        let code = unsafe {
-            let (rhs, reduced) = (rhs.as_mut_ptr(), reduced.as_mut_ptr());
-            shim_mumps_solve(self.handle, rhs, int(self.dofs), int(columns), part, reduced, last)
-        };
-        self.checked(code)
+    /// Each of them with the numbers that it is sent and that it sends.
+    #[allow(clippy::cast_sign_loss)]
+    pub fn counts(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.sent.iter().zip(&self.received).map(|(&sent, &received)| [sent as usize, received as usize])
     }
 }

@@ -8,15 +8,15 @@
 //! as rows join or leave, by blocks of rows.
 
 use crate::bodies::{Blocks, Scene};
+use crate::engine::Engine;
 use crate::ffi::Input;
-use crate::share::{Share, host};
+use crate::partition::Part;
+use crate::share::host;
 use crate::solver::{Direct, Way};
 use contact_dynamics::faer::linalg::solvers::Llt;
 use contact_dynamics::faer::{Mat, Side};
 use contact_dynamics::ranks::Ranks;
 use contact_dynamics::{LinearSolver, Result};
-use contact_dynamics_scenes::ranks::Cut;
-use std::sync::Arc;
 
 /// What the machine does, and what a step asks of it.
 struct Constants {
@@ -47,8 +47,9 @@ fn least(world: crate::ffi::World, mut call: impl FnMut() -> Result<()>) -> Resu
     Ok(slowest[0])
 }
 
-fn measure(blocks: &Blocks, (cut, share): (&Cut<3>, &Arc<Share>)) -> Result<Constants> {
+fn measure(blocks: &Blocks, part: &Part) -> Result<Constants> {
     const ROWS: usize = 1000;
+    let Part { cut, share } = part;
     let world = share.world;
     // The constants of the factor: the matrix of a linear scene.
     let way = Way { input: Input::Distributed, condenses: false };
@@ -75,12 +76,11 @@ fn measure(blocks: &Blocks, (cut, share): (&Cut<3>, &Arc<Share>)) -> Result<Cons
     })?;
     assert!(keep > 0.0);
     // What a step asks of the ranks.
-    let way = Way { input: Input::Distributed, condenses: true };
-    let mut run = blocks.on_rank(Scene::Linear, (cut, share), way)?.build()?;
-    share.cost.take();
+    let mut run = blocks.on_rank(Scene::Linear, part, Engine::CONDENSING)?.build()?;
+    share.clock.take();
     let steps = 20;
     (0..steps).try_for_each(|_| run.step())?;
-    let calls = share.cost.take()[1] / f64::from(steps);
+    let calls = share.clock.take().calls / f64::from(steps);
     let n = share.dofs as f64;
     let fill = stored[0] / n.powf(4.0 / 3.0);
     Ok(Constants {
@@ -127,13 +127,13 @@ fn cost(constants: &Constants, n: f64, ranks: f64) -> [f64; 5] {
 }
 
 /// Prints the constants and the curves.
-pub fn print(blocks: &Blocks, part: (&Cut<3>, &Arc<Share>)) -> Result<bool> {
+pub fn print(blocks: &Blocks, part: &Part) -> Result<bool> {
     let constants = measure(blocks, part)?;
-    let world = part.1.world;
+    let world = part.share.world;
     if world.rank > 0 {
         return Ok(true);
     }
-    println!("Measured over {} ranks, {} dofs:\n", world.size, part.1.dofs);
+    println!("Measured over {} ranks, {} dofs:\n", world.size, part.share.dofs);
     println!("| constant | value |");
     println!("| --- | --- |");
     println!("| entries of the factor over n^4/3 | {:.1} |", constants.fill);

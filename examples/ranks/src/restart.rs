@@ -2,12 +2,12 @@
 //! over any number of ranks, goes on, and compares with a run in one piece that never stopped.
 
 use crate::bodies::{Blocks, Scene};
-use crate::share::{Share, host};
-use crate::solver::Way;
+use crate::compare::{difference, end, run_alone};
+use crate::engine::Engine;
+use crate::partition::Part;
+use crate::share::host;
 use contact_dynamics::{Checkpoint, Error, Result};
-use contact_dynamics_scenes::ranks::Cut;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 const SCENE: Scene = Scene::LargeStrains;
 
@@ -20,9 +20,9 @@ fn file(folder: &Path, rank: usize) -> PathBuf {
 }
 
 /// Runs half of the steps, and writes.
-pub fn save(folder: &Path, blocks: &Blocks, part: (&Cut<3>, &Arc<Share>), way: Way, steps: usize) -> Result<()> {
-    let share = part.1;
-    let mut run = blocks.on_rank(SCENE, part, way)?.build()?;
+pub fn save(folder: &Path, blocks: &Blocks, part: &Part, engine: Engine, steps: usize) -> Result<()> {
+    let share = &part.share;
+    let mut run = blocks.on_rank(SCENE, part, engine)?.build()?;
     (0..steps / 2).try_for_each(|_| run.step())?;
     std::fs::create_dir_all(folder).map_err(file_error)?;
     // (A file of more ranks than now would be taken for a part.)
@@ -35,24 +35,20 @@ pub fn save(folder: &Path, blocks: &Blocks, part: (&Cut<3>, &Arc<Share>), way: W
 }
 
 /// Reads what any number of ranks has written, and runs the other half: how far from a run that never stopped.
-pub fn resume(folder: &Path, blocks: &Blocks, part: (&Cut<3>, &Arc<Share>), way: Way, steps: usize) -> Result<f64> {
-    let share = part.1;
+pub fn resume(folder: &Path, blocks: &Blocks, part: &Part, engine: Engine, steps: usize) -> Result<f64> {
+    let share = &part.share;
     let mut parts = Vec::new();
     while let Ok(bytes) = std::fs::read(file(folder, parts.len())) {
         let (known, checkpoint): (Vec<usize>, Checkpoint<f64>) = postcard::from_bytes(&bytes).map_err(file_error)?;
         parts.push((checkpoint, known));
     }
     let whole = Checkpoint::joined(&parts, share.dofs)?;
-    let mut run = blocks.on_rank(SCENE, part, way)?.resume_from(whole.part(&share.known)?).build()?;
+    let mut run = blocks.on_rank(SCENE, part, engine)?.resume_from(whole.part(&share.known)?).build()?;
     (0..steps - steps / 2).try_for_each(|_| run.step())?;
-    let end = crate::end(&mut run, |values| {
-        let mut whole = Vec::new();
-        share.gather(values, &mut whole).expect("rank 0 is there");
-        whole
-    });
+    let end = end(&mut run, share)?;
     let mut apart = [0.0];
     if share.world.rank == 0 {
-        apart[0] = crate::difference(&crate::run_alone(blocks, SCENE, steps)?.0, &end);
+        apart[0] = difference(&run_alone(blocks, SCENE, steps)?.0, &end);
         println!("read from {} ranks by {}: {:.0e} apart", parts.len(), share.world.size, apart[0]);
     }
     share.world.broadcast(&mut apart).map_err(|failed| host("broadcast", failed))?;

@@ -1,11 +1,12 @@
-//! The ranks of a body: sums over all of them, values from owners, whole vectors on rank 0, and what that costs.
+//! The ranks of a body: sums over all of them, values from owners, whole vectors on rank 0, and values that come to
+//! their owners from where they were computed.
 
+use crate::clock::Clock;
 use crate::ffi::{Counts, Failed, Peers, World};
 use contact_dynamics::ranks::Ranks;
 use contact_dynamics::{Error, Result};
 use std::ops::Range;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// What one rank has of the dofs of a body.
 #[derive(Debug)]
@@ -20,11 +21,13 @@ pub struct Share {
     /// Dofs of this rank that go to the peers, and that come from them.
     sent: Vec<usize>,
     received: Vec<usize>,
-    /// How many dofs each rank owns; on rank 0, which.
+    /// How many dofs each rank owns, and which, those of rank 0 first.
     counts: Counts,
     owners: Vec<usize>,
+    /// The rank that owns each dof of the whole body.
+    owner: Vec<usize>,
     buffers: Mutex<Buffers>,
-    pub cost: Cost,
+    pub clock: Arc<Clock>,
 }
 
 #[derive(Debug, Default)]
@@ -33,30 +36,6 @@ struct Buffers {
     received: Vec<f64>,
     own: Vec<f64>,
     all: Vec<f64>,
-}
-
-/// Bytes that this rank has sent, and time that it has spent in it, waiting included.
-#[derive(Debug, Default)]
-pub struct Cost {
-    bytes: AtomicU64,
-    messages: AtomicU64,
-    nanoseconds: AtomicU64,
-}
-
-impl Cost {
-    /// Adds a call that began at `start`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn add(&self, world: World, start: f64, numbers: usize) {
-        self.bytes.fetch_add(8 * numbers as u64, Ordering::Relaxed);
-        self.messages.fetch_add(1, Ordering::Relaxed);
-        self.nanoseconds.fetch_add(((world.time() - start) * 1e9) as u64, Ordering::Relaxed);
-    }
-
-    /// Bytes, calls and seconds, from the last time on.
-    pub fn take(&self) -> [f64; 3] {
-        let take = |counter: &AtomicU64| counter.swap(0, Ordering::Relaxed) as f64;
-        [take(&self.bytes), take(&self.messages), 1e-9 * take(&self.nanoseconds)]
-    }
 }
 
 /// An error of MPI as the crate carries it.
@@ -89,8 +68,8 @@ impl Share {
         let mut owners: Vec<usize> = (0..owner.len()).collect();
         owners.sort_by_key(|&dof| owner[dof]);
         let counts = Counts::new((0..world.size).map(|rank| owner.iter().filter(|&&other| other == rank).count()));
-        let (dofs, buffers, cost) = (owner.len(), Mutex::default(), Cost::default());
-        Ok(Self { world, owned, known, dofs, peers, sent, received, counts, owners, buffers, cost })
+        let (dofs, owner, buffers, clock) = (owner.len(), owner.to_vec(), Mutex::default(), Arc::new(Clock::new()));
+        Ok(Self { world, owned, known, dofs, peers, sent, received, counts, owners, owner, buffers, clock })
     }
 
     /// The columns that this rank owns, in its own numbers.
@@ -98,54 +77,112 @@ impl Share {
         self.owned.iter().cloned().flatten()
     }
 
+    /// The rows that this rank owns: their number, if those of each rank follow those of the ranks before it, for each
+    /// dof that it knows.
+    pub fn consecutive(&self) -> Vec<usize> {
+        let mut place = vec![0; self.dofs];
+        self.owners.iter().enumerate().for_each(|(at, &dof)| place[dof] = at);
+        self.of(&place)
+    }
+
     /// Brings what all ranks own to rank 0, as a vector of the whole body; elsewhere `whole` is left empty.
     pub fn gather(&self, values: &[f64], whole: &mut Vec<f64>) -> Result<()> {
-        let start = self.world.time();
         let mut buffers = self.buffers.lock().unwrap();
         let Buffers { own, all, .. } = &mut *buffers;
         own.clear();
         own.extend(self.own_dofs().map(|dof| values[dof]));
         let is_root = self.world.rank == 0;
         all.resize(if is_root { self.dofs } else { 0 }, 0.0);
-        let result = self.world.gather(own, &self.counts, all);
+        let result = self.clock.sending(own.len(), || self.world.gather(own, &self.counts, all));
         whole.resize(all.len(), 0.0);
         if is_root {
             for (&dof, &value) in self.owners.iter().zip(all.iter()) {
                 whole[dof] = value;
             }
         }
-        self.cost.add(self.world, start, own.len());
         result.map_err(|failed| host("gather", failed))
     }
 
     /// The way back: gives each rank what it owns.
     pub fn scatter(&self, whole: &[f64], values: &mut [f64]) -> Result<()> {
-        let start = self.world.time();
         let mut buffers = self.buffers.lock().unwrap();
         let Buffers { own, all, .. } = &mut *buffers;
         all.clear();
         all.extend(self.owners.iter().take(whole.len()).map(|&dof| whole[dof]));
         own.resize(self.own_dofs().count(), 0.0);
-        let result = self.world.scatter(all, &self.counts, own);
+        let result = self.clock.sending(all.len(), || self.world.scatter(all, &self.counts, own));
         for (dof, &value) in self.own_dofs().zip(own.iter()) {
             values[dof] = value;
         }
-        self.cost.add(self.world, start, all.len());
         result.map_err(|failed| host("scatter", failed))
     }
 
     /// Gives all ranks the values of rank 0.
     pub fn broadcast(&self, values: &mut [f64]) -> Result<()> {
-        let start = self.world.time();
-        let result = self.world.broadcast(values);
-        self.cost.add(self.world, start, if self.world.rank == 0 { values.len() } else { 0 });
+        let sent = if self.world.rank == 0 { values.len() } else { 0 };
+        let result = self.clock.sending(sent, || self.world.broadcast(values));
         result.map_err(|failed| host("broadcast", failed))
     }
 
     /// What this rank knows of a vector of the whole body.
-    pub fn of(&self, whole: &[f64]) -> Vec<f64> {
+    pub fn of<V: Copy>(&self, whole: &[V]) -> Vec<V> {
         self.known.iter().map(|&dof| whole[dof]).collect()
     }
+
+    /// The way to their owners of values that are elsewhere: `held` are the dofs whose values this rank has, in numbers
+    /// of the whole body; each is held by one rank. All ranks call it.
+    pub fn route(&self, held: &[usize]) -> Result<Route> {
+        let world = self.world;
+        let all = self.clock.sending(held.len(), || world.gather_indices(held));
+        let mut route = Route::default();
+        for (other, others) in all.map_err(|failed| host("route", failed))?.iter().enumerate() {
+            let to: Vec<_> = (0..held.len()).filter(|&at| self.owner[held[at]] == other).collect();
+            let from = others.iter().filter(|dof| self.owner[**dof] == world.rank);
+            let from: Vec<_> = from.map(|dof| self.known.binary_search(dof).expect("an owned dof is known")).collect();
+            if !to.is_empty() || !from.is_empty() {
+                route.peers.push(other, to.len(), from.len());
+                route.sent.extend(to);
+                route.received.extend(from);
+            }
+        }
+        Ok(route)
+    }
+
+    /// Takes a route: from columns of values that this rank holds to columns of a rank's vector.
+    pub fn deliver(&self, route: &Route, held: &[f64], columns: usize, values: &mut [f64]) -> Result<()> {
+        let [given, known] = [held.len(), values.len()].map(|size| size / columns.max(1));
+        let mut buffers = self.buffers.lock().unwrap();
+        let Buffers { sent, received, .. } = &mut *buffers;
+        sent.clear();
+        let mut from = 0;
+        for [count, _] in route.peers.counts() {
+            let places = &route.sent[from..from + count];
+            sent.extend((0..columns).flat_map(|k| places.iter().map(move |&at| held[k * given + at])));
+            from += count;
+        }
+        received.resize(columns * route.received.len(), 0.0);
+        let peers = route.peers.times(columns);
+        let result = self.clock.sending(sent.len(), || self.world.exchange(&peers, sent, received));
+        let (mut to, mut got) = (0, received.iter());
+        for [_, count] in route.peers.counts() {
+            let dofs = &route.received[to..to + count];
+            for k in 0..columns {
+                dofs.iter().zip(&mut got).for_each(|(&dof, &value)| values[k * known + dof] = value);
+            }
+            to += count;
+        }
+        result.map_err(|failed| host("deliver", failed))
+    }
+}
+
+/// What goes to whom of values that are not where their dofs are owned.
+#[derive(Debug, Default)]
+pub struct Route {
+    peers: Peers,
+    /// Places among the values held, for each rank in turn.
+    sent: Vec<usize>,
+    /// Dofs of this rank, by the rank that they come from.
+    received: Vec<usize>,
 }
 
 impl Ranks<f64> for Share {
@@ -158,31 +195,25 @@ impl Ranks<f64> for Share {
     }
 
     fn sum(&self, values: &mut [f64]) -> Result<()> {
-        let start = self.world.time();
-        let result = self.world.sum(values);
-        self.cost.add(self.world, start, values.len());
+        let result = self.clock.sending(values.len(), || self.world.sum(values));
         result.map_err(|failed| host("sum", failed))
     }
 
     fn max(&self, values: &mut [f64]) -> Result<()> {
-        let start = self.world.time();
-        let result = self.world.max(values);
-        self.cost.add(self.world, start, values.len());
+        let result = self.clock.sending(values.len(), || self.world.max(values));
         result.map_err(|failed| host("max", failed))
     }
 
     fn share(&self, values: &mut [f64]) -> Result<()> {
-        let start = self.world.time();
         let mut buffers = self.buffers.lock().unwrap();
         let Buffers { sent, received, .. } = &mut *buffers;
         sent.clear();
         sent.extend(self.sent.iter().map(|&dof| values[dof]));
         received.resize(self.received.len(), 0.0);
-        let result = self.world.exchange(&self.peers, sent, received);
+        let result = self.clock.sending(sent.len(), || self.world.exchange(&self.peers, sent, received));
         for (&dof, &value) in self.received.iter().zip(received.iter()) {
             values[dof] = value;
         }
-        self.cost.add(self.world, start, sent.len());
         result.map_err(|failed| host("share", failed))
     }
 }

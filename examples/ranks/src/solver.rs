@@ -1,13 +1,15 @@
 //! MUMPS as the linear solver of a run: the matrix on rank 0 or on all ranks, with the Schur complement of the contact
-//! dofs or without.
+//! dofs or without. Where the matrix is on all ranks so are right-hand sides and solutions: what passes through rank 0 is
+//! the interface alone.
 
 use crate::faults::Fault;
 use crate::ffi::{Counts, Failed, Input, Mumps};
-use crate::share::Share;
+use crate::share::{Route, Share};
 use contact_dynamics::faer::linalg::solvers::{Llt, Solve};
 use contact_dynamics::faer::mat::MatMut;
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::faer::{Mat, Side};
+use contact_dynamics::ranks::Ranks;
 use contact_dynamics::{Condensation, Error, Factorization, LinearSolver, Result};
 use std::sync::Arc;
 
@@ -37,6 +39,12 @@ struct Factor {
     last: Vec<usize>,
     /// A vector of the whole body, on rank 0.
     whole: Vec<f64>,
+    /// Right-hand sides of the rows of this rank, and solutions of the pivots that it has eliminated.
+    own: Vec<f64>,
+    solved: Vec<f64>,
+    /// The dofs of these pivots and the way from them to their owners; whether it is that of this factorization.
+    route: (Vec<usize>, Route),
+    routed: bool,
     /// The entries of all ranks, on rank 0, if the matrix is there: how many of each.
     counts: Option<Counts>,
     entries: Vec<f64>,
@@ -91,6 +99,7 @@ impl LinearSolver<f64> for Direct {
         if *fault == Some(Fault::Memory) {
             mumps.limit_memory(1);
         }
+        mumps.give(share.own_dofs().map(|dof| share.known[dof]));
         let whole = vec![0.0; if share.world.rank == 0 { share.dofs } else { 0 }];
         Ok(Box::new(Factor {
             share: share.clone(),
@@ -98,6 +107,10 @@ impl LinearSolver<f64> for Direct {
             mumps,
             last: last.to_vec(),
             whole,
+            own: Vec::new(),
+            solved: Vec::new(),
+            route: Default::default(),
+            routed: false,
             counts,
             entries: Vec::new(),
             complement: None,
@@ -114,6 +127,7 @@ impl LinearSolver<f64> for Direct {
 impl Factorization<f64> for Factor {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, f64>) -> Result<()> {
         let share = self.share.clone();
+        self.routed = false;
         let own: Vec<f64> = share
             .own_dofs()
             .flat_map(|j| {
@@ -149,8 +163,15 @@ impl Factorization<f64> for Factor {
     }
 
     fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
+        let known = self.share.known.len();
+        if self.way.input == Input::Distributed {
+            self.take_own(rhs);
+            let columns = rhs.len() / known;
+            self.mumps.solve_distributed(&mut self.own, columns, &mut self.solved).map_err(failed("solve"))?;
+            return self.deliver(columns, rhs);
+        }
         let Self { share, whole, mumps, .. } = self;
-        for column in rhs.chunks_exact_mut(share.known.len()) {
+        for column in rhs.chunks_exact_mut(known) {
             share.gather(column, whole)?;
             mumps.solve(whole, 1).map_err(failed("solve"))?;
             share.scatter(whole, column)?;
@@ -169,8 +190,17 @@ impl Factorization<f64> for Factor {
 
 impl Condensation<f64> for Factor {
     fn condense(&mut self, rhs: &[f64], interface: &mut [f64]) -> Result<()> {
-        self.share.gather(rhs, &mut self.whole)?;
-        self.mumps.reduce(&mut self.whole, interface).map_err(failed("condense"))?;
+        let reduced = match self.way.input {
+            Input::Distributed => {
+                self.take_own(rhs);
+                self.mumps.reduce_distributed(&mut self.own, interface)
+            }
+            Input::Root => {
+                self.share.gather(rhs, &mut self.whole)?;
+                self.mumps.reduce(&mut self.whole, interface)
+            }
+        };
+        reduced.map_err(failed("condense"))?;
         self.share.broadcast(interface)?;
         self.solves += 1;
         if self.fault == Some(Fault::Solve) && self.solves == 20 {
@@ -180,11 +210,16 @@ impl Condensation<f64> for Factor {
     }
 
     fn expand(&mut self, interface: &[f64], solution: &mut [f64]) -> Result<()> {
-        let Self { share, whole, mumps, last, .. } = self;
         let mut given = interface.to_vec();
-        mumps.complete(&mut given, whole).map_err(failed("expand"))?;
-        share.scatter(whole, solution)?;
-        for (&dof, &value) in last.iter().zip(interface) {
+        if self.way.input == Input::Distributed {
+            self.mumps.complete_distributed(&mut given, &mut self.whole, &mut self.solved).map_err(failed("expand"))?;
+            self.deliver(1, solution)?;
+        } else {
+            let Self { share, whole, mumps, .. } = self;
+            mumps.complete(&mut given, whole).map_err(failed("expand"))?;
+            share.scatter(whole, solution)?;
+        }
+        for (&dof, &value) in self.last.iter().zip(interface) {
             solution[dof] = value;
         }
         Ok(())
@@ -196,6 +231,30 @@ impl Condensation<f64> for Factor {
 }
 
 impl Factor {
+    /// The rows that this rank owns of columns of vectors.
+    fn take_own(&mut self, columns: &[f64]) {
+        let Self { share, own, .. } = self;
+        own.clear();
+        let columns = columns.chunks_exact(share.known.len());
+        own.extend(columns.flat_map(|column| share.own_dofs().map(|dof| column[dof])));
+    }
+
+    /// Brings columns of solutions from where they were computed to the owners of their rows.
+    fn deliver(&mut self, columns: usize, solution: &mut [f64]) -> Result<()> {
+        let Self { share, mumps, solved, route, .. } = self;
+        if !self.routed {
+            // Another factorization has other pivots on a rank only where some were delayed.
+            let mut moved = [f64::from(u8::from(!mumps.solved().eq(route.0.iter().copied())))];
+            share.max(&mut moved)?;
+            if moved[0] > 0.0 {
+                let held: Vec<_> = mumps.solved().collect();
+                *route = (held.clone(), share.route(&held)?);
+            }
+            self.routed = true;
+        }
+        share.deliver(&route.1, solved, columns, solution)
+    }
+
     /// `f ← S⁻¹ f` for columns of forces on the interface, on every rank alike.
     fn solve_complement(&self, forces: &mut [f64]) -> Result<()> {
         let n = self.last.len();

@@ -181,8 +181,7 @@ pub fn on_ranks<R: Send>(count: usize, run: impl Fn(usize, &Arc<Meeting>) -> R +
     })
 }
 
-/// What one rank has of a solid that is cut into slabs of consecutive nodes: the elements that touch its nodes, over
-/// all nodes that it knows.
+/// What one rank has of a solid: the elements that touch its nodes, over all nodes that it knows.
 #[derive(Clone, Debug)]
 pub struct Cut<const D: usize> {
     pub solid: Solid<D>,
@@ -195,10 +194,18 @@ pub struct Cut<const D: usize> {
 }
 
 impl<const D: usize> Cut<D> {
-    /// The part of a rank; `contact` are the nodes that contact may act on, which all ranks know.
+    /// The part of a rank of a solid cut into slabs of consecutive nodes; `contact` are the nodes that contact may act
+    /// on, which all ranks know.
     pub fn new(whole: &Solid<D>, contact: &[usize], rank: usize, size: usize) -> Self {
         let count = whole.nodes.len();
-        let owner = |node: usize| (node * size) / count;
+        let owners: Vec<usize> = (0..count).map(|node| (node * size) / count).collect();
+        Self::by_owners(whole, contact, rank, &owners)
+    }
+
+    /// The part of a rank of a solid whose nodes belong to these ranks.
+    pub fn by_owners(whole: &Solid<D>, contact: &[usize], rank: usize, owners: &[usize]) -> Self {
+        let count = whole.nodes.len();
+        let owner = |node: usize| owners[node];
         let touches = |element: &&Vec<usize>| element.iter().any(|&node| owner(node) == rank);
         let elements: Vec<_> = whole.elements.iter().filter(touches).collect();
         let mut nodes: Vec<usize> = elements.iter().flat_map(|element| element.iter()).copied().collect();
