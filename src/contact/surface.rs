@@ -1,5 +1,6 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
+mod behind;
 mod closed;
 mod dent;
 mod facet;
@@ -16,6 +17,7 @@ mod second_order;
 mod shape;
 mod sharp;
 
+pub(crate) use behind::{Behind, Side, is_far_side};
 pub use facet::Facet;
 pub(crate) use kin::Kin;
 pub(crate) use nodes::{Nodes, points};

@@ -32,6 +32,11 @@ impl Ramp {
         Ok(Self { times, factors })
     }
 
+    /// When it begins and ends, between whose factors all others are.
+    pub(super) fn ends(&self) -> [f64; 2] {
+        self.times
+    }
+
     /// How far from the beginning to the end t is, from 0 to 1.
     fn place(&self, t: f64) -> f64 {
         ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0)

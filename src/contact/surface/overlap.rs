@@ -110,10 +110,21 @@ impl Base {
         [dot(r, self.axes[0]), dot(r, self.axes[1])]
     }
 
+    /// The heights of a facet's corners above the first corner of this one, along its normal.
+    fn heights<'a>(&'a self, facet: &'a Facet, positions: &'a [Point]) -> impl Iterator<Item = f64> + 'a {
+        facet.nodes().iter().map(|&node| dot(self.normal, sub(positions[node], self.shape.corner(0))))
+    }
+
     /// Whether a facet with this normal looks toward this one, and is not behind it by more than `depth`.
     pub(crate) fn may_meet(&self, normal: Point, facet: &Facet, positions: &[Point], depth: f64) -> bool {
-        let height = |&node: &usize| dot(self.normal, sub(positions[node], self.shape.corner(0)));
-        dot(normal, self.normal) < -FACING && facet.nodes().iter().map(height).any(|height| height > -depth)
+        dot(normal, self.normal) < -FACING && self.heights(facet, positions).any(|height| height > -depth)
+    }
+
+    /// How low a facet is at least, below all corners of this one.
+    pub(crate) fn lowest(&self, facet: &Facet, positions: &[Point]) -> f64 {
+        let corner = |x: &Point| dot(self.normal, sub(*x, self.shape.corner(0)));
+        let highest = self.shape.corners().iter().map(corner).fold(0.0, f64::max);
+        self.heights(facet, positions).fold(f64::INFINITY, f64::min) - highest
     }
 
     /// Calls `act` with the points of what a master facet covers.
