@@ -79,9 +79,9 @@ const BEYOND: f64 = 0.25;
 /// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and are thrown out
 ///   later. [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
-/// - On quadrilaterals that are no parallelograms shape functions are integrated by quadrature: the pressure of the
-///   patch test is then not exact to rounding (`docs/contact.md`). So it is on facets of second order
-///   whose nodes are not in the middle, or that are curved: their areas are those of the parts.
+/// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
+///   not exact to rounding (`docs/contact.md`): their areas are those of the parts. On quadrilaterals that are no
+///   parallelograms up to 3e-9 may be left.
 /// - Gaps are measured along the normals of facets, of second order along those of their parts.
 ///
 /// # Identity

@@ -3,6 +3,7 @@
 mod behind;
 mod closed;
 mod dent;
+mod exact;
 mod facet;
 mod kin;
 mod nodes;
