@@ -6,6 +6,7 @@ pub mod boxes;
 pub mod by_chance;
 pub mod combinations;
 pub mod curved;
+pub mod curved_patch;
 pub mod damped_contact;
 pub mod decks;
 pub mod disc;
