@@ -10,7 +10,7 @@ mod rates;
 mod rows;
 mod second_order;
 
-use super::surface::{Bounds, Facet, Nodes, Point, Ramp, Reach, Surface, Thickness, sub};
+use super::surface::{Behind, Bounds, Facet, Nodes, Point, Ramp, Reach, Surface, Thickness, sub};
 use super::{
     BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
 };
@@ -69,14 +69,17 @@ const BEYOND: f64 = 0.25;
 /// into or through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a
 /// smaller step mends). Geometry is computed in `f64` in every run.
 ///
+/// Facets that look toward each other through the material of both bodies do not meet, so that bodies beside each other
+/// may be thinner than the [reach](Self::reach): give the whole surfaces of thin bodies.
+///
 /// # Known failure
 ///
 /// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and are thrown out
 ///   later. [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
-/// - On quadrilaterals that are no parallelograms shape functions are integrated by quadrature: the pressure of the
-///   patch test is then not exact to rounding (`docs/contact.md`). So it is on facets of second order
-///   whose nodes are not in the middle, or that are curved: their areas are those of the parts.
+/// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
+///   not exact to rounding (`docs/contact.md`): their areas are those of the parts. On quadrilaterals that are no
+///   parallelograms up to 3e-9 may be left.
 /// - Gaps are measured along the normals of facets, of second order along those of their parts.
 ///
 /// # Identity
@@ -113,6 +116,8 @@ pub struct Mortar<T: Real> {
     bonds: Option<Bonds<T>>,
     multiplier: Multiplier,
     pairs: Pairs,
+    /// The material behind the facets of both surfaces, once it was asked for.
+    behind: Option<[Behind; 2]>,
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
     integrals: Integrals,
@@ -158,6 +163,7 @@ impl<T: Real> Mortar<T> {
             bonds: None,
             multiplier: Multiplier::default(),
             pairs: Pairs::default(),
+            behind: None,
             searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
             rows: Rows::new(),
@@ -267,6 +273,7 @@ impl<T: Real> Mortar<T> {
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         self.thickness.set(offsets, self.nodes.coordinates.len())?;
         self.reach.forget();
+        self.behind = None;
         self.with_fitting_bonds()
     }
 
@@ -283,6 +290,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.thickness.ramp = Ramp::new(times, factors)?;
+        self.behind = None;
         Ok(self)
     }
 
@@ -343,6 +351,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
         self.reach.set_least(reach)?;
+        self.behind = None;
         Ok(self)
     }
 
@@ -387,15 +396,31 @@ impl<T: Real> Mortar<T> {
         self.reach.least() - self.thickest(t)[0]
     }
 
+    /// Finds the material behind facets, if that was not done before: as far as surfaces that meet are in each other.
+    fn find_behind(&mut self) {
+        if self.behind.is_none() {
+            let surfaces = [&self.slave, &self.master];
+            let positions = &self.nodes.coordinates;
+            let facets = surfaces.into_iter().flat_map(Surface::facets);
+            let largest = facets.map(|facet| facet.shape(positions).size()).fold(0.0, f64::max);
+            let deepest = self.reach.least() + self.thickness.overlap(self.nodes.bodies());
+            // (Of what meets one corner is no deeper than that.)
+            self.behind = Some(surfaces.map(|surface| Behind::new(surface, positions, deepest + largest)));
+        }
+    }
+
     /// Pairs of facets within `range`, of those that the surfaces make now, at t.
     fn find_pairs(&mut self, t: f64, range: f64) {
         let depth = self.depth(t);
+        self.find_behind();
         let surfaces = [&self.slave, &self.master];
         let motions = self.reach.motions(&self.nodes);
         if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
             self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
-        self.pairs.take_near(surfaces, &self.nodes.positions, range, depth);
+        if let Some(behind) = &self.behind {
+            self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth));
+        }
     }
 
     fn integrate(&mut self, t: f64) {

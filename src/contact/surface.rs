@@ -1,7 +1,9 @@
 //! A surface of facets: which facet borders on which, where the surface ends, and normals at sides and vertices.
 
+mod behind;
 mod closed;
 mod dent;
+mod exact;
 mod facet;
 mod kin;
 mod nodes;
@@ -19,6 +21,7 @@ mod shape;
 mod sharp;
 mod slide;
 
+pub(crate) use behind::{Behind, Side, is_far_side};
 pub use facet::Facet;
 pub(crate) use kin::Kin;
 pub(crate) use nodes::{Nodes, points};

@@ -7,6 +7,7 @@ mod bonds;
 mod by_chance;
 mod constraints;
 mod curved;
+mod curved_patch;
 mod dual;
 mod edges;
 mod gap_function;

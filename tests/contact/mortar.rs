@@ -61,6 +61,24 @@ fn the_patch_test_in_three_dimensions() {
     check_patches_of_blocks(&[[[3, 3, 1], [2, 2, 1]], [[2, 3, 1], [4, 1, 1]]], mortar);
 }
 
+/// The same on blocks whose facets are no parallelograms.
+fn check_patches_of_skewed_blocks(contact: fn(&Stack<3>, bool) -> Mortar<f64>) {
+    for ([lower, upper], slope) in [([[3, 3, 1], [2, 2, 1]], 0.0), ([[2, 3, 1], [4, 1, 1]], 0.25)] {
+        let skewed = |[x, y, z]: [f64; 3]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y + 0.2 * x * y * (1.0 - y), z];
+        let slanted = |[x, y, z]: [f64; 3]| [x, y, z + slope * (x + 0.5 * y) * (2.0 - z) * z];
+        let stack = Stack::new(blocks(lower, upper), 0.0, |x| slanted(skewed(x)));
+        for from_above in [true, false] {
+            let error = stack.patch(contact(&stack, from_above)).unwrap();
+            assert!(error < 1e-10, "{lower:?} on {upper:?}, slope {slope}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn the_patch_test_on_skewed_quadrilaterals() {
+    check_patches_of_skewed_blocks(mortar);
+}
+
 /// All displacements of a constraint, at random within `size`.
 pub(crate) fn shaken(dofs: usize, size: f64, seed: u64) -> Vec<f64> {
     let mut random = xorshift(seed);
@@ -149,6 +167,117 @@ fn impacts_of_blocks_keep_momentum_and_gain_no_energy() {
     for (lower, upper, friction) in [(coarse, fine, 0.0), (fine, coarse, 0.0), (coarse, fine, 0.3)] {
         let stack = Stack::new(blocks(lower, upper), 0.003, |x| x);
         check_impact(&stack, mortar(&stack, true).friction(friction), &format!("{lower:?}, {upper:?}, {friction}"));
+    }
+}
+
+/// Gaps by node.
+fn gaps<const D: usize>(stack: &Stack<D>, upper: bool, reach: f64) -> Vec<(usize, f64)> {
+    let mut contact = stack.mortar(upper).unwrap().reach(reach).unwrap();
+    let still = vec![0.0; contact.dofs().len()];
+    contact.search(0.0, &still, &still, 0.0).unwrap();
+    let contacts = Contacts::of(&contact);
+    let mut gaps = vec![0.0; contacts.len()];
+    contact.gaps(0.0, &still, &mut gaps).unwrap();
+    gaps.iter().enumerate().map(|(row, &gap)| (contacts.name(row).0, gap)).collect()
+}
+
+/// A body turned about the origin by three angles.
+fn turned(body: Solid<3>, angles: [f64; 3]) -> Solid<3> {
+    (0..3).fold(body, |body, axis| {
+        let ((s, c), (j, k)) = (angles[axis].sin_cos(), ((axis + 1) % 3, (axis + 2) % 3));
+        body.mapped(|x| {
+            let mut y = x;
+            (y[j], y[k]) = (c * x[j] - s * x[k], s * x[j] + c * x[k]);
+            y
+        })
+    })
+}
+
+/// Two bodies as they are, but that the second is moved along a direction until a plane across it is between them with
+/// so much room.
+fn apart<const D: usize>(one: Solid<D>, other: Solid<D>, direction: [f64; D], room: f64) -> Stack<D> {
+    let height = |x: &[f64; D]| -> f64 { x.iter().zip(direction).map(|(x, d)| x * d).sum() };
+    let top = one.nodes.iter().map(height).fold(f64::NEG_INFINITY, f64::max);
+    let bottom = other.nodes.iter().map(height).fold(f64::INFINITY, f64::min);
+    let other = other.mapped(|x| std::array::from_fn(|i| x[i] + (top + room - bottom) * direction[i]));
+    Stack::of_whole_surfaces([one, other])
+}
+
+#[test]
+fn bodies_apart_are_not_inside_of_each_other() {
+    let mut random = xorshift(41);
+    let mut found = 0;
+    for number in 0..600 {
+        let mut signed = |size: f64| size * (2.0 * random() - 1.0);
+        let mut direction: [f64; 3] = std::array::from_fn(|_| signed(1.0));
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        direction = direction.map(|x| x / length);
+        let aside = std::array::from_fn(|_| signed(0.6));
+        let angles = [0, 1].map(|_| std::array::from_fn(|_| signed(3.2)));
+        let (reach, room) = (0.2 + signed(0.1) + 0.3 * (number % 4) as f64, 1e-9 + 0.05 + signed(0.05));
+        // Blocks, plates and wedges.
+        let bodies = [number % 3, number / 3 % 3].map(|kind| {
+            let block = Solid::block([1.0; 3], [[1; 3], [2; 3], [3; 3]][number / 9 % 3], MATERIAL).moved([-0.5; 3]);
+            match kind {
+                0 => block,
+                1 => block.mapped(|[x, y, z]| [x, y, 0.05 * z]),
+                _ => block.mapped(|[x, y, z]| [x, y, z * (0.25 + 0.45 * x)]),
+            }
+        });
+        let [one, other] = bodies;
+        let stack = apart(turned(one, angles[0]), turned(other, angles[1]).moved(aside), direction, room);
+        for upper in [true, false] {
+            let gaps = gaps(&stack, upper, reach);
+            assert!(gaps.iter().all(|(_, gap)| *gap > 0.0), "{number}, {upper}: {gaps:?}");
+            found += gaps.len();
+        }
+        // In the plane the same.
+        let flat = [0, 1].map(|_| Solid::rectangle([1.0, 0.1 + random()], [3, 2], MATERIAL).moved([-0.5; 2]));
+        let [one, other] = flat.map(|body| body.rotated(7.0 * random()));
+        let (s, c) = (7.0 * random()).sin_cos();
+        let stack = apart(one, other.moved([random() - 0.5, random() - 0.5]), [c, s], room);
+        for upper in [true, false] {
+            let gaps = gaps(&stack, upper, reach);
+            assert!(gaps.iter().all(|(_, gap)| *gap > 0.0), "{number}, {upper}: {gaps:?}");
+            found += gaps.len();
+        }
+    }
+    // (Sides that face each other have rows.)
+    assert!(found > 1000, "{found}");
+}
+
+#[test]
+fn bodies_in_each_other_keep_their_rows() {
+    let plate = |thickness: f64, cells: usize| {
+        Solid::block([1.0, 1.0, thickness], [cells, cells, 1], MATERIAL).moved([0.0, 0.0, 1.0])
+    };
+    let wedge = Solid::block([1.0; 3], [4; 3], MATERIAL).mapped(|[x, y, z]| [x, y, 1.0 + z * (0.02 + 0.4 * x)]);
+    let block = Solid::block([1.0; 3], [3, 3, 2], MATERIAL);
+    let thin = block.clone().mapped(|[x, y, z]| [x, y, 1.0 - 0.03 * (1.0 - z)]);
+    for (lower, upper) in [(&block, plate(0.02, 4)), (&thin, plate(0.02, 4)), (&block, wedge.clone()), (&thin, wedge)] {
+        for depth in [0.0, 1e-6, 0.005, 0.02] {
+            let whole = Stack::of_whole_surfaces([lower.clone(), upper.clone().moved([0.1, 0.15, -depth])]);
+            // The sides that face each other alone: nothing is known to be behind them.
+            let mut facing = Stack { solid: whole.solid.clone(), split: whole.split, facets: whole.facets.clone() };
+            for (facets, height) in facing.facets.iter_mut().zip([1.0, 1.0 - depth]) {
+                let is_there = |&node: &usize| (whole.solid.nodes[node][2] - height).abs() < 1e-12;
+                facets.retain(|facet| facet.iter().all(is_there));
+            }
+            for reach in [0.05, 0.3, 1.0] {
+                for from_above in [true, false] {
+                    let (all, expected) = (gaps(&whole, from_above, reach), gaps(&facing, from_above, reach));
+                    assert!(expected.len() >= 9);
+                    for (node, gap) in expected {
+                        assert!((gap + depth).abs() < 1e-12, "{node}: {gap} {depth}");
+                        let found = all.iter().find(|(other, _)| *other == node);
+                        assert!(
+                            found.is_some_and(|(_, found)| (found - gap).abs() < 1e-12),
+                            "{depth}, {reach}, {from_above}, {node}: {gap} {found:?}"
+                        );
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which facets of two surfaces may meet: lists kept over many steps, and those of them that are near now.
 
-use crate::contact::surface::{Base, Bounds, Neighborhood, Point, Surface};
+use crate::contact::surface::{Base, Behind, Bounds, Neighborhood, Point, Side, Surface, is_far_side};
 
 /// For each slave facet the master facets near it.
 #[derive(Debug, Default)]
@@ -24,10 +24,15 @@ impl Pairs {
         self.lists.build(slave.boxes(positions), master.boxes(positions), range);
     }
 
-    /// Takes from the lists the pairs that face each other within `range`, and are not in each other by more than
-    /// `depth`. (The result does not depend on the age of the lists.)
-    pub(super) fn take_near(&mut self, surfaces: [&Surface; 2], positions: &[Point], range: f64, depth: f64) {
-        let [slave, master] = surfaces;
+    /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
+    /// and are no far sides of both bodies. (The result does not depend on the age of the lists.)
+    pub(super) fn take_near(
+        &mut self,
+        [slave, master]: [&Surface; 2],
+        behind: &[Behind; 2],
+        positions: &[Point],
+        (range, depth): (f64, f64),
+    ) {
         self.clear();
         self.starts.push(0);
         let Self { lists, masters, starts, near } = self;
@@ -38,11 +43,12 @@ impl Pairs {
             let listed = lists.of(index);
             if let Some(base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
                 let around = Bounds::of_corners(&base.shape).inflated(range);
+                let own = Side { surface: slave, behind: &behind[0], facet: index };
                 near.extend(listed.iter().copied().filter(|&partner| {
                     let (bounds, normal) = &masters[partner];
-                    around.intersects(bounds)
-                        && normal
-                            .is_some_and(|normal| base.may_meet(normal, &master.facets()[partner], positions, depth))
+                    let other = Side { surface: master, behind: &behind[1], facet: partner };
+                    let meets = |normal| base.may_meet(normal, &master.facets()[partner], positions, depth);
+                    around.intersects(bounds) && normal.is_some_and(meets) && !is_far_side(own, other, &base, positions)
                 }));
             }
             starts.push(near.len());

@@ -4,6 +4,7 @@
 //! stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004,
 //! section 4); in two dimensions it is a part of a line.
 
+use super::exact::{RulePoint, RulePoints};
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 use super::{Facet, Surface};
 
@@ -110,10 +111,21 @@ impl Base {
         [dot(r, self.axes[0]), dot(r, self.axes[1])]
     }
 
+    /// The heights of a facet's corners above the first corner of this one, along its normal.
+    fn heights<'a>(&'a self, facet: &'a Facet, positions: &'a [Point]) -> impl Iterator<Item = f64> + 'a {
+        facet.nodes().iter().map(|&node| dot(self.normal, sub(positions[node], self.shape.corner(0))))
+    }
+
     /// Whether a facet with this normal looks toward this one, and is not behind it by more than `depth`.
     pub(crate) fn may_meet(&self, normal: Point, facet: &Facet, positions: &[Point], depth: f64) -> bool {
-        let height = |&node: &usize| dot(self.normal, sub(positions[node], self.shape.corner(0)));
-        dot(normal, self.normal) < -FACING && facet.nodes().iter().map(height).any(|height| height > -depth)
+        dot(normal, self.normal) < -FACING && self.heights(facet, positions).any(|height| height > -depth)
+    }
+
+    /// How low a facet is at least, below all corners of this one.
+    pub(crate) fn lowest(&self, facet: &Facet, positions: &[Point]) -> f64 {
+        let corner = |x: &Point| dot(self.normal, sub(*x, self.shape.corner(0)));
+        let highest = self.shape.corners().iter().map(corner).fold(0.0, f64::max);
+        self.heights(facet, positions).fold(f64::INFINITY, f64::min) - highest
     }
 
     /// Calls `act` with the points of what a master facet covers.
@@ -128,13 +140,24 @@ impl Base {
         let Some(common) = own.common(&master, SLIVER * self.size * self.size) else { return };
         let linear = self.count == 3 && count == 3 && !self.curved && facet.whole.is_none();
         let rule: &[[f64; 4]] = if linear { &THREE } else { &SIX };
+        let mut skewed = (own.is_skewed() || master.is_skewed()).then(RulePoints::new);
         let [first, rest @ ..] = common.corners() else { return };
         for pair in rest.windows(2) {
             let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
             let area = 0.5 * (a[0] * b[1] - a[1] * b[0]);
             for &[weight, _, s, t] in rule {
-                let p = [first[0] + s * a[0] + t * b[0], first[1] + s * a[1] + t * b[1]];
-                self.sample(weight * area, own.weights_at(p), &shape, master.weights_at(p), act);
+                let at = [first[0] + s * a[0] + t * b[0], first[1] + s * a[1] + t * b[1]];
+                let (slave, master) = (own.weights_at(at), master.weights_at(at));
+                match &mut skewed {
+                    Some(points) => points.push(RulePoint { weight: weight * area, at, slave, master }),
+                    None => self.sample(weight * area, slave, &shape, master, act),
+                }
+            }
+        }
+        if let Some(points) = &mut skewed {
+            points.correct([&own, &master], common.corners());
+            for point in points.as_slice() {
+                self.sample(point.weight, point.slave, &shape, point.master, act);
             }
         }
     }
@@ -304,14 +327,14 @@ fn derivatives(count: usize, weights: &[f64; 4]) -> [[f64; 4]; 2] {
 
 /// A triangle or a quadrilateral in a plane.
 #[derive(Clone, Copy, Debug)]
-struct Flat {
-    corners: [[f64; 2]; 4],
-    count: usize,
+pub(super) struct Flat {
+    pub(super) corners: [[f64; 2]; 4],
+    pub(super) count: usize,
 }
 
 impl Flat {
     /// The shape functions at a point: of a quadrilateral by Newton's method, which ends at once on parallelograms.
-    fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
+    pub(super) fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
         let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
         let r = [p[0] - self.corners[0][0], p[1] - self.corners[0][1]];

@@ -7,6 +7,7 @@ pub mod by_chance;
 pub mod collisions;
 pub mod combinations;
 pub mod curved;
+pub mod curved_patch;
 pub mod damped_contact;
 pub mod decks;
 pub mod disc;

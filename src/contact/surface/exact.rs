@@ -1,0 +1,161 @@
+//! Quadrature over parts of quadrilaterals that are no parallelograms, exact where parts make up the whole.
+//!
+//! Positions in such a quadrilateral are x = x₀ + s a + t b + s t c, so that its shape functions are combinations of 1,
+//! x and s t: a rule for polynomials lacks ∫ s t dA alone, for s t is no polynomial of x. By Green's theorem that is
+//! ∮ Q dt around a part, ∂Q/∂s = s t J with J the area for the coordinates, which is linear in s and t. Along the sides
+//! of the quadrilateral Q dt is a polynomial, which Gauss' rule has exactly. Along a cut it is not, but what is wrong
+//! there the part on the other side has with the other sign: sums over all parts are exact, and so are the nodal forces
+//! of a constant pressure. Weights of the rule are changed for that by the least that leaves ∫ dA and ∫ x dA as they
+//! are.
+
+use super::overlap::Flat;
+
+/// The most points of a rule: six triangles of an octagon, six points each.
+const MOST: usize = 36;
+
+/// Share of the sides of a quadrilateral by which its corners may be off a parallelogram and quadrature not know.
+const SKEWED: f64 = 1e-4;
+
+/// Share of a function (squared) that is left of it besides another one, below which both are one.
+const ALIKE: f64 = 1e-12;
+
+/// The most that a weight changes by, in shares of it: more is asked for by rounding alone.
+const MOST_CHANGE: f64 = 0.5;
+
+/// Gauss' rule of six points on a line of length one (degree 11): weight, and place from the middle, to both sides.
+/// (Slivers at a cut get what is wrong along it: with fewer points that is more than their weights can change by.)
+const LINE: [(f64, f64); 3] = [
+    (0.085_662_246_189_585_2, 0.466_234_757_101_576_05),
+    (0.180_380_786_524_069_3, 0.330_604_693_233_132_25),
+    (0.233_956_967_286_345_5, 0.119_309_593_041_598_45),
+];
+
+/// A point of a rule: its weight, place, and the shape functions of both facets.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RulePoint {
+    pub(super) weight: f64,
+    pub(super) at: [f64; 2],
+    pub(super) slave: [f64; 4],
+    pub(super) master: [f64; 4],
+}
+
+/// The points of a rule on a polygon.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RulePoints {
+    points: [RulePoint; MOST],
+    count: usize,
+}
+
+impl RulePoints {
+    pub(super) fn new() -> Self {
+        Self { points: [RulePoint::default(); MOST], count: 0 }
+    }
+
+    pub(super) fn push(&mut self, point: RulePoint) {
+        // (There is room for all that a polygon of eight corners has.)
+        if let Some(place) = self.points.get_mut(self.count) {
+            *place = point;
+            self.count += 1;
+        }
+    }
+
+    pub(super) fn as_slice(&self) -> &[RulePoint] {
+        &self.points[..self.count]
+    }
+
+    /// Changes weights until ∫ s t dA of both facets is what it is around the polygon.
+    pub(super) fn correct(&mut self, [slave, master]: [&Flat; 2], polygon: &[[f64; 2]]) {
+        let points = &self.points[..self.count];
+        let Some(first) = points.first().map(|point| point.at) else { return };
+        let sum = |f: &Function, g: &Function| -> f64 {
+            points.iter().zip(f.iter().zip(g)).map(|(point, (f, g))| point.weight * f * g).sum()
+        };
+        let of = |value: &dyn Fn(&RulePoint) -> f64| -> Function {
+            std::array::from_fn(|k| points.get(k).map_or(0.0, value))
+        };
+        // What must stay, orthogonal to each other; then what is missing.
+        let one = of(&|_| 1.0);
+        let mut kept = [one, of(&|point| point.at[0] - first[0]), of(&|point| point.at[1] - first[1])];
+        let mut squares = [0.0; 3];
+        for k in 0..3 {
+            let (before, this) = kept.split_at_mut(k);
+            before.iter().zip(squares).for_each(|(other, square)| leave_out(&mut this[0], other, square, &sum));
+            squares[k] = sum(&this[0], &this[0]);
+        }
+        let mut factors: Function = [1.0; MOST];
+        let mut before: Option<(Function, f64, f64)> = None;
+        for (flat, product) in [(slave, of(&|point| point.slave[2])), (master, of(&|point| point.master[2]))] {
+            if !flat.is_skewed() {
+                continue;
+            }
+            let mut missing = flat.integral_of_product(polygon) - sum(&product, &one);
+            let mut rest = product;
+            kept.iter().zip(squares).for_each(|(other, square)| leave_out(&mut rest, other, square, &sum));
+            let whole = sum(&rest, &rest);
+            if let Some((other, square, of_other)) = &before {
+                missing -= sum(&rest, other) / square * of_other;
+                leave_out(&mut rest, other, *square, &sum);
+            }
+            let square = sum(&rest, &rest);
+            if square > ALIKE * whole {
+                factors.iter_mut().zip(&rest).for_each(|(factor, rest)| *factor += missing / square * rest);
+                before = Some((rest, square, missing));
+            }
+        }
+        if factors[..self.count].iter().all(|factor| (factor - 1.0).abs() < MOST_CHANGE) {
+            self.points.iter_mut().zip(factors).for_each(|(point, factor)| point.weight *= factor);
+        }
+    }
+}
+
+/// Values at the points of a rule.
+type Function = [f64; MOST];
+
+/// Makes a function orthogonal to another one, whose square has this sum.
+fn leave_out(function: &mut Function, other: &Function, square: f64, sum: &impl Fn(&Function, &Function) -> f64) {
+    if square > 0.0 {
+        let share = sum(function, other) / square;
+        function.iter_mut().zip(other).for_each(|(x, other)| *x -= share * other);
+    }
+}
+
+fn cross([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
+    a * d - b * c
+}
+
+impl Flat {
+    /// Whether it is a quadrilateral, and no parallelogram.
+    pub(super) fn is_skewed(&self) -> bool {
+        let [a, b, c] = self.sides();
+        let size = |x: [f64; 2]| x[0].hypot(x[1]);
+        self.count == 4 && size(c) > SKEWED * size(a).max(size(b))
+    }
+
+    /// a, b and c of a quadrilateral.
+    fn sides(&self) -> [[f64; 2]; 3] {
+        let from = |k: usize| -> [f64; 2] { std::array::from_fn(|i| self.corners[k][i] - self.corners[0][i]) };
+        let (a, b) = (from(1), from(3));
+        [a, b, std::array::from_fn(|i| from(2)[i] - a[i] - b[i])]
+    }
+
+    /// ∫ s t dA over a polygon, counterclockwise, but for what the parts beyond its sides have with the other sign.
+    fn integral_of_product(&self, polygon: &[[f64; 2]]) -> f64 {
+        let [a, b, c] = self.sides();
+        let (constant, by_s, by_t) = (cross(a, b), cross(a, c), cross(c, b));
+        let mut sum = 0.0;
+        for (k, from) in polygon.iter().enumerate() {
+            let to = polygon[(k + 1) % polygon.len()];
+            let way = [to[0] - from[0], to[1] - from[1]];
+            for (weight, place) in LINE.into_iter().flat_map(|(weight, off)| [(weight, 0.5 - off), (weight, 0.5 + off)])
+            {
+                let [_, w1, w2, w3] = self.weights_at([from[0] + place * way[0], from[1] + place * way[1]]);
+                let (s, t) = (w1 + w2, w2 + w3);
+                let along = [a[0] + t * c[0], a[1] + t * c[1]];
+                let area = constant + s * by_s + t * by_t;
+                let antiderivative = t * s * s * (constant / 2.0 + s * by_s / 3.0 + t * by_t / 2.0);
+                sum += weight * antiderivative * cross(along, way) / area;
+            }
+        }
+        sum
+    }
+}
