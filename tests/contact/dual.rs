@@ -203,11 +203,11 @@ fn rows_are_the_derivatives_of_gaps() {
             let error = verify::gap_jacobian(&mut triangles(&stack).dual().unwrap(), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-8, "{shift}: {error:?}");
             // (Warped facets, and shape functions that are no polynomials in the plane: quadrature. Dual functions add
-            // up what it leaves of shape functions: 9 times it at a corner, and a little for the blend.)
+            // up what it leaves of shape functions: 9 times it at a corner, over areas of a third of theirs at least.)
             let error = verify::gap_jacobian(&mut dual(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
             let other = verify::gap_jacobian(&mut standard(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows == other.rows && error.rows_lost == 0, "{shift}: {error:?}");
-            assert!(error.jacobian < 12.0 * other.jacobian && other.jacobian < 1e-3, "{shift}: {error:?} {other:?}");
+            assert!(error.jacobian < 27.0 * other.jacobian && other.jacobian < 1e-3, "{shift}: {error:?} {other:?}");
         }
     }
 }

@@ -79,6 +79,7 @@ impl Share {
 
     /// The rows that this rank owns: their number, if those of each rank follow those of the ranks before it, for each
     /// dof that it knows.
+    #[cfg(feature = "petsc")]
     pub fn consecutive(&self) -> Vec<usize> {
         let mut place = vec![0; self.dofs];
         self.owners.iter().enumerate().for_each(|(at, &dof)| place[dof] = at);
