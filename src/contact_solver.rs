@@ -7,6 +7,7 @@ mod blocks;
 mod cone;
 mod cone_newton;
 mod equations;
+mod extents;
 mod failure;
 mod gauss_seidel;
 mod lemke;

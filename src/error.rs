@@ -425,8 +425,8 @@ pub enum Error {
     },
     /// Dofs without mass were not brought into static balance at the start.
     #[error(
-        "dofs without mass ({dof} and others) not in static balance after {iterations} iterations from the initial \
-         displacements; start nearer to it, or give them a mass"
+        "dof {dof} and others are not in static balance after {iterations} iterations from the initial displacements; \
+         start nearer to it, or give dofs without mass some"
     )]
     StartNotBalanced {
         /// Iterations spent.

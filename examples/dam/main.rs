@@ -27,19 +27,20 @@ use valley::{Dam, Loading, Plan};
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("dam")?;
     let plan = if output.quick { Plan::QUICK } else { Plan::FULL };
-    let loading = Loading { ramp: plan.seconds(plan.ramp), ground: earthquake(&output, plan.seconds(plan.shaking))? };
+    let loading = Loading { ground: earthquake(&output, "ground", plan.duration())? };
     let dam = Dam::new(&plan);
     let records = records(&dam, &loading, &plan)?;
-    let page = [scene(&dam, &plan, &records[0])?, costs(&records)?, joints(&records)?].join("\n");
+    let rubbing = rubbing(if output.quick { 10 } else { 60 }, &output)?;
+    let page = [scene(&dam, &records[0])?, costs(&records)?, joints(&records)?, friction(&rubbing)?].join("\n");
     println!("{page}");
     output.write("dam.md", &page)
 }
 
 /// The ground motion across the valley, downstream and upward: made, written, and read again.
-fn earthquake(output: &Output, duration: f64) -> Result<[Ground; 3], Box<dyn Error>> {
+fn earthquake(output: &Output, file: &str, duration: f64) -> Result<[Ground; 3], Box<dyn Error>> {
     let mut read = Vec::new();
     for (name, seed, peak) in [("across", 11, 3.5), ("downstream", 12, 3.5), ("upward", 13, 2.0)] {
-        let file = format!("ground_{name}.txt");
+        let file = format!("{file}_{name}.txt");
         let made = Ground::kanai_tajimi(seed, peak, duration);
         output.write(&file, &made.to_text(&format!("Kanai-Tajimi noise, seed {seed}, {name}")))?;
         read.push(Ground::from_text(&std::fs::read_to_string(output.directory.join(&file))?)?);
@@ -68,28 +69,45 @@ fn records(dam: &Dam, loading: &Loading, plan: &Plan) -> Result<Vec<Record>, Box
     Ok(records)
 }
 
+/// A coarse dam whose joints do not rub, and those that take friction with it.
+fn rubbing(steps: usize, output: &Output) -> Result<Vec<Record>, Box<dyn Error>> {
+    let [smooth, rough] = [0.0, 0.6].map(|friction| Plan::rubbing(friction, steps));
+    let loading = Loading { ground: earthquake(output, "short_ground", smooth.duration())? };
+    let dam = Dam::new(&smooth);
+    let cholesky = || Box::new(Cholesky::default());
+    let by_body = || Box::new(ByBody::new(Automatic));
+    let mut records = vec![
+        threads::in_pool(1, || whole::meshes("one factor, no friction", &dam, &loading, &smooth, cholesky()))?,
+        threads::in_pool(1, || whole::meshes("one factor", &dam, &loading, &rough, cholesky()))?,
+        threads::in_pool(1, || whole::meshes("by bodies", &dam, &loading, &rough, by_body()))?,
+    ];
+    for &way in rough.reduced {
+        records.push(threads::in_pool(1, || whole::reduced(&dam, &loading, &rough, way))?);
+    }
+    Ok(records)
+}
+
 /// What is computed, and what the dam does.
-fn scene(dam: &Dam, plan: &Plan, record: &Record) -> Result<String, Box<dyn Error>> {
+fn scene(dam: &Dam, record: &Record) -> Result<String, Box<dyn Error>> {
     let mut table = String::from(
         "The dam, and what its joints do (one factor)\n\n\
          | blocks | dofs | contacts | steps | closed at most | at least | openings and closings | largest force of a \
-         joint, MN | of them before the earthquake | largest opening, mm |\n\
+         joint, MN | at the start | largest opening, mm |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
-    let before = plan.ramp;
-    let closed = |pick: fn(usize, usize) -> usize| record.closed[before..].iter().copied().reduce(pick).unwrap_or(0);
+    let closed = |pick: fn(usize, usize) -> usize| record.closed.iter().copied().reduce(pick).unwrap_or(0);
     writeln!(
         table,
         "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
         dam.blocks.len(),
         dam.dofs(),
         dam.contacts.len(),
-        record.forces.len(),
+        record.forces.len() - 1,
         closed(usize::max),
         closed(usize::min),
         record.changes,
         decimal(1e-6 * record::largest(&record.forces), 1),
-        decimal(1e-6 * record::largest(&record.forces[..before]), 1),
+        decimal(1e-6 * record::largest(&record.forces[..1]), 1),
         decimal(1e3 * record::largest(&record.openings), 2)
     )?;
     Ok(table)
@@ -118,7 +136,7 @@ fn costs(records: &[Record]) -> Result<String, Box<dyn Error>> {
             differences[0],
             differences[1],
             decimal(record.build, 2),
-            decimal(1e3 * record.stepping / record.forces.len() as f64, 1),
+            decimal(record.step(), 1),
             mega(record.factor),
             record.held.map_or("–".into(), mega)
         )?;
@@ -141,6 +159,36 @@ fn joints(records: &[Record]) -> Result<String, Box<dyn Error>> {
             format!(" {} | {} |", decimal(force, 1), decimal(opening, 2))
         };
         writeln!(table, "| {} |{}", joint + 1, shown.iter().map(cell).collect::<String>())?;
+    }
+    Ok(table)
+}
+
+/// What friction does, and which variants agree on it.
+fn friction(records: &[Record]) -> Result<String, Box<dyn Error>> {
+    let mut table = String::from(
+        "Joints that rub, on a coarse mesh; differences from the second row\n\n\
+         | variant | unknowns | largest force of a joint, MN | largest opening, mm | largest slip, mm | forces | \
+         openings | step, ms |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for (place, record) in records.iter().enumerate() {
+        let differences = [
+            record::difference(&record.forces, &records[1].forces),
+            record::difference(&record.openings, &records[1].openings),
+        ]
+        .map(|difference| if place == 1 { "–".into() } else { format!("{difference:.0e}") });
+        writeln!(
+            table,
+            "| {} | {} | {} | {} | {} | {} | {} | {} |",
+            record.name,
+            record.unknowns,
+            decimal(1e-6 * record::largest(&record.forces), 1),
+            decimal(1e3 * record::largest(&record.openings), 2),
+            decimal(1e3 * record.slip, 2),
+            differences[0],
+            differences[1],
+            decimal(record.step(), 1)
+        )?;
     }
     Ok(table)
 }

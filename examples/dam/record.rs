@@ -16,10 +16,12 @@ pub(crate) struct Record {
     /// Bytes of the factors; all that is held at the end, where one thread did everything.
     pub(crate) factor: usize,
     pub(crate) held: Option<usize>,
-    /// For each step: the force of each joint, its largest opening; how many contacts are closed.
+    /// For the start and each step: the force of each joint, its largest opening; how many contacts are closed.
     pub(crate) forces: Vec<Vec<f64>>,
     pub(crate) openings: Vec<Vec<f64>>,
     pub(crate) closed: Vec<usize>,
+    /// The farthest that two nodes of a contact have slipped, open or closed.
+    pub(crate) slip: f64,
     /// Contacts that opened or closed.
     pub(crate) changes: u64,
 }
@@ -30,6 +32,8 @@ pub(crate) trait Steps {
     /// Forces and gaps of all contacts, and which are closed.
     fn contacts(&self) -> [&[f64]; 2];
     fn is_closed(&self, contact: usize) -> bool;
+    /// How far two nodes of a contact are apart along the joint, at most.
+    fn slip(&self) -> f64;
     fn changes(&self) -> u64;
     /// Values stored by all factors.
     fn factor(&self) -> usize;
@@ -37,6 +41,11 @@ pub(crate) trait Steps {
 }
 
 impl Record {
+    /// Milliseconds of a step.
+    pub(crate) fn step(&self) -> f64 {
+        1e3 * self.stepping / (self.forces.len() - 1).max(1) as f64
+    }
+
     /// Builds a run and takes so many steps.
     pub(crate) fn of<S: Steps>(
         name: &str,
@@ -51,6 +60,7 @@ impl Record {
                 let start = Instant::now();
                 let mut run = build()?;
                 record.build = start.elapsed().as_secs_f64();
+                record.look(dam, &run);
                 for _ in 0..steps {
                     let start = Instant::now();
                     run.step()?;
@@ -75,6 +85,7 @@ impl Record {
         self.forces.push(joints().map(|joint| forces[joint].iter().sum()).collect());
         self.openings.push(joints().map(|joint| gaps[joint].iter().copied().fold(0.0, f64::max)).collect());
         self.closed.push((0..forces.len()).filter(|&contact| run.is_closed(contact)).count());
+        self.slip = self.slip.max(run.slip());
     }
 }
 

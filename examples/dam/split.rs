@@ -24,21 +24,30 @@ struct Body<'a> {
     rhs: Vec<f64>,
 }
 
+/// A factor of m M + k K of a block, its contact dofs last, and what unit forces on these do to them.
+fn factorized(block: &Block, [m, k]: [f64; 2], scale: f64) -> Result<(Box<dyn Factorization<f64>>, Vec<f64>)> {
+    let inertia = block.mass.iter().enumerate().map(|(dof, mass)| (dof, dof, m * mass));
+    let elastic = entries(&block.stiffness).into_iter().map(|(i, j, x)| (i, j, k * x));
+    let contact = block.contact(0.0);
+    let effective = matrix(block.mass.len(), inertia.chain(elastic));
+    let mut factor = Automatic.analyze(effective.symbolic(), &contact)?;
+    factor.factorize(effective.as_ref())?;
+    let size = contact.len();
+    let mut flexibility = vec![0.0; size * size];
+    flexibility.iter_mut().step_by(size + 1).for_each(|x| *x = scale);
+    condensed(&mut *factor)?.solve(&mut flexibility)?;
+    Ok((factor, flexibility))
+}
+
 impl<'a> Body<'a> {
-    /// With its flexibility: what unit forces on the contact dofs do to their displacements at the end of a step.
+    /// At u = 0, with its flexibility: what unit forces on the contact dofs do to their displacements at the end of a
+    /// step.
     fn new(block: &'a Block, step: f64) -> Result<(Self, Vec<f64>)> {
         let [of_mass, of_stiffness] = RAYLEIGH;
-        let [m, k] = [1.0 + 0.5 * step * of_mass, 0.25 * step * step + 0.5 * step * of_stiffness];
-        let inertia = block.mass.iter().enumerate().map(|(dof, mass)| (dof, dof, m * mass));
-        let elastic = entries(&block.stiffness).into_iter().map(|(i, j, x)| (i, j, k * x));
-        let (n, contact) = (block.mass.len(), block.contact());
-        let effective = matrix(n, inertia.chain(elastic));
-        let mut factor = Automatic.analyze(effective.symbolic(), &contact)?;
-        factor.factorize(effective.as_ref())?;
-        let size = contact.len();
-        let mut flexibility = vec![0.0; size * size];
-        flexibility.iter_mut().step_by(size + 1).for_each(|x| *x = 0.25 * step * step);
-        condensed(&mut *factor)?.solve(&mut flexibility)?;
+        let weights = [1.0 + 0.5 * step * of_mass, 0.25 * step * step + 0.5 * step * of_stiffness];
+        let (factor, flexibility) = factorized(block, weights, 0.25 * step * step)?;
+        let contact = block.contact(0.0);
+        let (n, size) = (block.mass.len(), contact.len());
         let zero = || vec![0.0; n];
         let (u, v, a, scratch, rhs) = (zero(), zero(), zero(), zero(), zero());
         let (interface, free) = (vec![0.0; size], vec![0.0; size]);
@@ -55,8 +64,7 @@ impl<'a> Body<'a> {
             *x = -(*u + of_stiffness * *v);
         }
         *rhs = product(block.stiffness.as_ref(), scratch);
-        for (dof, rhs) in rhs.iter_mut().enumerate() {
-            let load: f64 = block.loads.iter().zip(loads).map(|(load, scale)| scale * load[dof]).sum();
+        for (dof, (rhs, load)) in rhs.iter_mut().zip(block.load(loads)).enumerate() {
             *rhs += load - of_mass * block.mass[dof] * v[dof];
         }
         condensed(&mut **factor)?.condense(rhs, interface)?;
@@ -139,7 +147,35 @@ impl<'a> Split<'a> {
         let frame = Assembly::new(&flexibilities, &rows)?;
         let zero = || vec![0.0; rows.len()];
         let (still, forces, gaps, raw, closed) = (zero(), zero(), zero(), zero(), vec![true; rows.len()]);
-        Ok(Self { dam, loading, bodies, frame, step, steps: 0, still, forces, gaps, closed, raw, changes: 0 })
+        let mut split =
+            Self { dam, loading, bodies, frame, step, steps: 0, still, forces, gaps, closed, raw, changes: 0 };
+        split.rest(&rows)?;
+        Ok(split)
+    }
+
+    /// The start: K u = f + Gᵀ λ, in the way of a step. Bodies move without contact, a frame finds the forces, bodies
+    /// take them up.
+    fn rest(&mut self, rows: &[Coupling<f64>]) -> Result<()> {
+        let loads = self.loading.at(0.0);
+        let mut parts = Vec::new();
+        for body in &self.bodies {
+            let (mut factor, flexibility) = factorized(body.block, [0.0, 1.0], 1.0)?;
+            let mut free = vec![0.0; body.contact.len()];
+            condensed(&mut *factor)?.condense(&body.block.load(loads), &mut free)?;
+            parts.push((factor, flexibility, free));
+        }
+        let flexibilities: Vec<&[f64]> = parts.iter().map(|(_, flexibility, _)| &flexibility[..]).collect();
+        let free: Vec<&[f64]> = parts.iter().map(|(.., free)| &free[..]).collect();
+        let mut frame = Assembly::new(&flexibilities, rows)?;
+        let found = frame.solve(&free, &self.still)?;
+        self.raw.copy_from_slice(found.multipliers());
+        self.forces.copy_from_slice(found.multipliers());
+        self.gaps.copy_from_slice(found.gaps());
+        self.closed.copy_from_slice(found.closed());
+        for (number, (body, (factor, ..))) in self.bodies.iter_mut().zip(&mut parts).enumerate() {
+            condensed(&mut **factor)?.expand(found.values(number), &mut body.u)?;
+        }
+        Ok(())
     }
 
     /// Takes away the rates with which closed contacts approach or, under pressure, part. Masses are lumped, and no two
@@ -199,6 +235,13 @@ impl Steps for Split<'_> {
         self.closed[contact]
     }
 
+    fn slip(&self) -> f64 {
+        let of = |&[left, right]: &[(usize, usize); 2]| {
+            [1, 2].map(|k| self.bodies[right.0].u[right.1 + k] - self.bodies[left.0].u[left.1 + k])
+        };
+        self.dam.contacts.iter().map(of).fold(0.0, |most, [downstream, upward]| most.max(downstream.hypot(upward)))
+    }
+
     fn changes(&self) -> u64 {
         self.changes
     }
@@ -214,5 +257,5 @@ impl Steps for Split<'_> {
 
 /// Runs it.
 pub(crate) fn run(name: &str, dam: &Dam, loading: &Loading, plan: &Plan) -> Result<Record> {
-    Record::of(name, dam, plan.steps(), || Split::new(dam, loading, plan.step))
+    Record::of(name, dam, plan.steps, || Split::new(dam, loading, plan.step))
 }

@@ -36,11 +36,12 @@ pub(crate) struct Plan {
     /// Elements of a block along the arc, downstream and upward.
     pub(crate) cells: [usize; 3],
     pub(crate) step: f64,
-    /// Steps in which water and weight grow, then of the earthquake.
-    pub(crate) ramp: usize,
-    pub(crate) shaking: usize,
+    /// Steps of the earthquake.
+    pub(crate) steps: usize,
     /// How blocks are reduced, to how many modes.
     pub(crate) reduced: &'static [(Boundary, usize)],
+    /// Friction in the joints.
+    pub(crate) friction: f64,
 }
 
 impl Plan {
@@ -48,42 +49,40 @@ impl Plan {
         blocks: 20,
         cells: [1, 2, 4],
         step: 0.02,
-        ramp: 20,
-        shaking: 80,
+        steps: 80,
         reduced: &[(Tapered, 10), (Untapered, 10), (CraigBampton, 10)],
+        friction: 0.0,
     };
     pub(crate) const FULL: Self = Self {
-        blocks: 20,
-        cells: [2, 4, 11],
+        cells: [2, 7, 20],
         step: 0.0125,
-        ramp: 16,
-        shaking: 144,
+        steps: 240,
         reduced: &[(Tapered, 100), (Untapered, 100), (CraigBampton, 30)],
+        ..Self::QUICK
     };
 
-    pub(crate) fn steps(&self) -> usize {
-        self.ramp + self.shaking
+    /// A coarse mesh, for joints that rub: a contact has three rows then.
+    pub(crate) fn rubbing(friction: f64, steps: usize) -> Self {
+        Self { cells: [2, 2, 4], friction, steps, reduced: &[(CraigBampton, 10)], ..Self::QUICK }
     }
 
-    /// How long so many steps are.
-    pub(crate) fn seconds(&self, steps: usize) -> f64 {
-        self.step * steps as f64
+    /// How long all steps are.
+    pub(crate) fn duration(&self) -> f64 {
+        self.step * self.steps as f64
     }
 }
 
-/// What acts on the dam: water and weight grow, then the ground moves.
+/// What acts on the dam beside water and weight: the motion of the ground.
 #[derive(Debug)]
 pub(crate) struct Loading {
-    pub(crate) ramp: f64,
     pub(crate) ground: [Ground; 3],
 }
 
 impl Loading {
     /// The share of water and weight, and the accelerations of the ground.
     pub(crate) fn at(&self, t: f64) -> [f64; 4] {
-        let share = if t < self.ramp { 0.5 - 0.5 * (PI * t / self.ramp).cos() } else { 1.0 };
-        let [across, downstream, upward] = [0, 1, 2].map(|k: usize| self.ground[k].at(t - self.ramp));
-        [share, across, downstream, upward]
+        let [across, downstream, upward] = [0, 1, 2].map(|k: usize| self.ground[k].at(t));
+        [1.0, across, downstream, upward]
     }
 }
 
@@ -99,11 +98,19 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// All contact dofs, ascending.
-    pub(crate) fn contact(&self) -> Vec<usize> {
-        let mut dofs = self.faces.concat();
+    /// All contact dofs, ascending: those across the joints, and where these rub the others of their nodes.
+    pub(crate) fn contact(&self, friction: f64) -> Vec<usize> {
+        let components = if friction > 0.0 { 3 } else { 1 };
+        let mut dofs: Vec<usize> =
+            self.faces.iter().flatten().flat_map(|&across| across..across + components).collect();
         dofs.sort_unstable();
         dofs
+    }
+
+    /// Its loads, scaled, added up.
+    pub(crate) fn load(&self, scales: [f64; 4]) -> Vec<f64> {
+        let at = |dof: usize| self.loads.iter().zip(scales).map(|(load, scale)| scale * load[dof]).sum();
+        (0..self.mass.len()).map(at).collect()
     }
 }
 

@@ -1,17 +1,19 @@
 //! The dam as one system: of meshes, or of reduced blocks.
 
 use crate::record::{Record, Steps};
-use crate::valley::{Block, Dam, Loading, Plan, RAYLEIGH};
+use crate::valley::{Dam, Loading, Plan, RAYLEIGH};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::reduction::{Blocks, Boundary, Reduction};
 use contact_dynamics::{LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection, Result, Simulation};
 use contact_dynamics_scenes::reduced::Model;
 use contact_dynamics_scenes::sparse::diagonal;
 
-/// A run, and the contacts closed in its last step.
+/// A run.
 struct Whole<'a> {
     run: Simulation<'a, f64>,
     unknowns: usize,
+    /// The first dof of each contact on the left and on the right; none if the others of the nodes are no unknowns.
+    places: Vec<[usize; 2]>,
 }
 
 impl Steps for Whole<'_> {
@@ -26,6 +28,12 @@ impl Steps for Whole<'_> {
 
     fn is_closed(&self, contact: usize) -> bool {
         self.run.state().contacts().closed()[contact]
+    }
+
+    fn slip(&self) -> f64 {
+        let u = self.run.state().displacement();
+        let of = |&[left, right]: &[usize; 2]| [1, 2].map(|k| u[right + k] - u[left + k]);
+        self.places.iter().map(of).fold(0.0, |most, [downstream, upward]| most.max(downstream.hypot(upward)))
     }
 
     fn changes(&self) -> u64 {
@@ -50,10 +58,17 @@ fn under<'a>(system: LinearSystem<'a, f64>, loading: &'a Loading, loads: [Vec<f6
     })
 }
 
-/// Rows of all contacts, from the place of the contact dofs of each block.
-fn rows(dam: &Dam, place: impl Fn((usize, usize)) -> usize) -> LinearRows<'static, f64> {
-    dam.contacts.iter().fold(LinearRows::new(), |rows, &[left, right]| {
-        rows.unilateral(&[(place(left), -1.0), (place(right), 1.0)], 0.0)
+/// The first dof of each contact on both sides, from the place of the contact dofs of each block.
+fn places(dam: &Dam, place: impl Fn((usize, usize)) -> usize) -> Vec<[usize; 2]> {
+    dam.contacts.iter().map(|sides| sides.map(&place)).collect()
+}
+
+/// Rows of all contacts. Where they rub the dofs behind the first one are those along the joint.
+fn rows(places: &[[usize; 2]], friction: f64) -> LinearRows<'static, f64> {
+    places.iter().fold(LinearRows::new(), |rows, &[left, right]| {
+        let along = |k: usize| [(left + k, -1.0), (right + k, 1.0)];
+        let rows = rows.unilateral(&along(0), 0.0);
+        if friction > 0.0 { rows.friction(friction, &[&along(1), &along(2)]) } else { rows }
     })
 }
 
@@ -65,7 +80,7 @@ pub(crate) fn meshes(
     plan: &Plan,
     solver: Box<dyn LinearSolver<f64> + Send>,
 ) -> Result<Record> {
-    Record::of(name, dam, plan.steps(), || {
+    Record::of(name, dam, plan.steps, || {
         let (mut blocks, mut firsts) = (Blocks::new(), Vec::new());
         for block in &dam.blocks {
             let mass: SparseColMat<usize, f64> = diagonal(&block.mass);
@@ -74,12 +89,14 @@ pub(crate) fn meshes(
         let loads = [0, 1, 2, 3].map(|k| dam.blocks.iter().flat_map(|block| block.loads[k].clone()).collect());
         let [of_mass, of_stiffness] = RAYLEIGH;
         let system = under(blocks.system()?.rayleigh(of_mass, of_stiffness)?, loading, loads);
+        let places = places(dam, |(block, dof)| firsts[block] + dof);
         let run = Simulation::builder(system, Newmark::trapezoidal(), plan.step)
-            .constraint(rows(dam, |(block, dof)| firsts[block] + dof))
+            .constraint(rows(&places, plan.friction))
             .corrector(PersistencyCorrection::new())
             .linear_solver(solver)
+            .start_at_rest()
             .build()?;
-        Ok(Whole { run, unknowns: dam.dofs() })
+        Ok(Whole { run, unknowns: dam.dofs(), places })
     })
 }
 
@@ -91,12 +108,12 @@ pub(crate) fn reduced(
     (boundary, modes): (Boundary, usize),
 ) -> Result<Record> {
     let name = format!("{}, {modes} modes a block", Model::Reduced(boundary).name());
-    let mut record = Record::of(&name, dam, plan.steps(), || {
+    let mut record = Record::of(&name, dam, plan.steps, || {
         let (mut blocks, mut firsts, mut loads) = (Blocks::new(), Vec::new(), [const { Vec::new() }; 4]);
         for block in &dam.blocks {
             let mass: SparseColMat<usize, f64> = diagonal(&block.mass);
             let [of_mass, of_stiffness] = RAYLEIGH;
-            let body = Reduction::new(mass.as_ref(), block.stiffness.as_ref(), &block.contact())
+            let body = Reduction::new(mass.as_ref(), block.stiffness.as_ref(), &block.contact(plan.friction))
                 .boundary(boundary)
                 .rayleigh(of_mass, of_stiffness)
                 .modes(modes)?;
@@ -105,17 +122,20 @@ pub(crate) fn reduced(
                 all.extend(body.load(own)?);
             }
         }
-        let contact: Vec<Vec<usize>> = dam.blocks.iter().map(Block::contact).collect();
+        let contact: Vec<Vec<usize>> = dam.blocks.iter().map(|block| block.contact(plan.friction)).collect();
         let place = |(block, dof): (usize, usize)| firsts[block] + contact[block].partition_point(|&own| own < dof);
+        let places = places(dam, place);
         let builder = Simulation::builder(under(blocks.system()?, loading, loads), Newmark::trapezoidal(), plan.step)
-            .constraint(rows(dam, place));
+            .constraint(rows(&places, plan.friction))
+            .start_at_rest();
         // Contact dofs without mass leave nothing to correct.
         let run = match boundary {
             Boundary::CraigBampton => builder.corrector(PersistencyCorrection::new()),
             _ => builder.uncorrected(),
         }
         .build()?;
-        Ok(Whole { run, unknowns: blocks.dofs() })
+        let places = if plan.friction > 0.0 { places } else { Vec::new() };
+        Ok(Whole { run, unknowns: blocks.dofs(), places })
     })?;
     record.is_reduced = true;
     Ok(record)

@@ -4,6 +4,7 @@ use super::acceptance::{Acceptance, Settings};
 use super::applied::{AppliedProblem, AppliedSet};
 use super::cone_newton::ConeNewton;
 use super::equations::{Equations, Solved, Symmetry};
+use super::extents::Extents;
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
 
@@ -46,6 +47,8 @@ pub struct ActiveSet<T = f64> {
     applied: AppliedSet<T>,
     /// Whether W, whose entries are then finite, is symmetric, and the version of which that is known.
     symmetry: (u64, Symmetry),
+    /// Where the rows of W are not zero.
+    extents: Extents,
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
@@ -91,10 +94,10 @@ enum Form {
 }
 
 /// y of all rows for the multipliers `solution` of the active `rows`, and what is rounding in a row's own sum; `column`
-/// gives those of W.
+/// gives those of W, from the row on where they begin.
 fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     problem: &ContactProblem<'_, T>,
-    column: impl Fn(usize) -> C,
+    column: impl Fn(usize) -> (usize, C),
     (offset, shift, form): (&[T], &[T], Form),
     (rows, solution): (&[usize], &[T]),
     y: &mut Vec<T>,
@@ -106,7 +109,8 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     own.clear();
     own.extend(offset.iter().map(|q| q.abs()));
     for (&j, &lambda) in rows.iter().zip(solution) {
-        for ((&w, y), own) in column(j).zip(y.iter_mut()).zip(own.iter_mut()) {
+        let (first, column) = column(j);
+        for ((&w, y), own) in column.zip(&mut y[first..]).zip(&mut own[first..]) {
             *y += w * lambda;
             *own += (w * lambda).abs();
         }
@@ -148,7 +152,7 @@ impl<T: Real> ActiveSet<T> {
         acceptance: &mut Acceptance<'_, T>,
     ) -> Result<Exchanges, ContactFailure<T>> {
         let size = problem.size();
-        let Self { equations, symmetry, active, rows, violating, solution, y, own, shift, offset, .. } = self;
+        let Self { equations, symmetry, extents, active, rows, violating, solution, y, own, shift, offset, .. } = self;
         let (_, symmetry) = *symmetry;
         active.clear();
         active.extend(multipliers.iter().zip(problem.sets).map(|(&l, &b)| b == AdmissibleSet::Free || l > T::zero()));
@@ -162,7 +166,7 @@ impl<T: Real> ActiveSet<T> {
             rows.extend((0..size).filter(|&i| active[i]));
             solution.clear();
             solution.extend(rows.iter().map(|&i| -offset[i]));
-            let solved = equations.solve(problem, (rows, symmetry), proximal.then_some(shift), solution);
+            let solved = equations.solve((problem, extents), (rows, symmetry), proximal.then_some(shift), solution);
             let not_finite = |row| ContactFailure::NotConverged { iterations: iteration, row, residual: T::nan() };
             let singular = match solved.map_err(not_finite)? {
                 Solved::Once => false,
@@ -179,9 +183,13 @@ impl<T: Real> ActiveSet<T> {
             let (given, solved, size) = ((offset, &shift[..], form), (&rows[..], &solution[..]), size.max(1));
             match symmetry {
                 // Rows lie side by side.
-                Symmetry::Symmetric => judge(problem, |j| problem.row(j).iter(), given, solved, y, own),
+                Symmetry::Symmetric => {
+                    let column = |j| (extents.of(j).start, problem.row(j)[extents.of(j)].iter());
+                    judge(problem, column, given, solved, y, own);
+                }
                 Symmetry::General => {
-                    judge(problem, |j| problem.delassus[j..].iter().step_by(size), given, solved, y, own);
+                    let column = |j: usize| (0, problem.delassus[j..].iter().step_by(size));
+                    judge(problem, column, given, solved, y, own);
                 }
             }
             // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
@@ -333,6 +341,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
             equations: Equations::with_capacity(size),
             applied: AppliedSet::default(),
             symmetry: (0, Symmetry::Symmetric),
+            extents: Extents::with_capacity(size),
             active: Vec::with_capacity(size),
             rows: Vec::with_capacity(size),
             violating: Vec::with_capacity(size),
@@ -370,6 +379,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
                 Some(_) => Symmetry::General,
             };
             self.symmetry = (problem.version, symmetry);
+            self.extents.find(problem);
         }
         match self.exchange(problem, multipliers, Form::Given, &mut acceptance)? {
             Exchanges::Solved(iterations) => Ok(iterations),

@@ -1,6 +1,7 @@
 //! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or of many rows by iteration. What is computed from
 //! W serves again while W and the rows stay.
 
+use super::extents::Extents;
 use super::many_rows::ManyRows;
 use super::{ContactProblem, FORESEEN, MANY};
 use crate::dense::DenseCholesky;
@@ -56,7 +57,7 @@ impl<T: Real> Equations<T> {
     /// computed serves once. `Err(row)` names a row of the problem whose W is not finite, or not semidefinite.
     pub(super) fn solve(
         &mut self,
-        problem: &ContactProblem<'_, T>,
+        (problem, extents): (&ContactProblem<'_, T>, &Extents),
         (rows, symmetry): (&[usize], Symmetry),
         shift: Option<&[T]>,
         x: &mut [T],
@@ -65,13 +66,13 @@ impl<T: Real> Equations<T> {
         if !known {
             self.version = 0;
             let iterates = rows.len() >= MANY && symmetry == Symmetry::Symmetric && shift.is_none();
-            match iterates && self.many.prepare(problem, rows) {
+            match iterates && self.many.prepare(problem, extents, rows) {
                 true => self.method = Method::Iteration,
                 false => self.factorize(problem, (rows, symmetry), shift)?,
             }
         }
         let mut solved = Solved::Once;
-        if !(self.method == Method::Iteration && self.many.solve(problem, rows, x).is_some()) {
+        if !(self.method == Method::Iteration && self.many.solve(problem, extents, rows, x).is_some()) {
             if self.method == Method::Iteration {
                 self.factorize(problem, (rows, symmetry), shift)?;
             }

@@ -7,6 +7,7 @@
 //! the number of rows.
 
 use super::ContactProblem;
+use super::extents::Extents;
 use crate::dense::dot;
 use crate::real::Real;
 
@@ -48,7 +49,7 @@ pub(super) struct ManyRows<T> {
 impl<T: Real> ManyRows<T> {
     /// Forms the approximate inverse for the active `rows` (ascending). Says whether there is one: not if some row
     /// depends on its neighbors.
-    pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize]) -> bool {
+    pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) -> bool {
         let Self { starts, places, values, scale, near, block, .. } = self;
         starts.clear();
         places.clear();
@@ -64,7 +65,9 @@ impl<T: Real> ManyRows<T> {
             }
             scale.push(own[row].sqrt().recip());
             near.clear();
-            near.extend(rows[..k].iter().zip(scale.iter()).enumerate().map(|(j, (&i, &s))| ((own[i] * s).abs(), j)));
+            let first = rows[..k].partition_point(|&i| i < extents.of(row).start);
+            let before = rows[first..k].iter().zip(&scale[first..]).zip(first..);
+            near.extend(before.map(|((&i, &s), j)| ((own[i] * s).abs(), j)));
             if near.len() >= WIDTH {
                 // The nearest; of two at the same distance the first.
                 let order = |a: &(T, usize), b: &(T, usize)| b.0.value().total_cmp(&a.0.value()).then(a.1.cmp(&b.1));
@@ -102,7 +105,13 @@ impl<T: Real> ManyRows<T> {
 
     /// Solves for `x`, which holds b on entry, to rounding. Returns the iterations, or nothing where they do not end; x
     /// is then b still.
-    pub(super) fn solve(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize], x: &mut [T]) -> Option<usize> {
+    pub(super) fn solve(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        extents: &Extents,
+        rows: &[usize],
+        x: &mut [T],
+    ) -> Option<usize> {
         let (count, size) = (rows.len(), problem.size());
         for vector in [&mut self.residual, &mut self.pushed, &mut self.inner] {
             vector.clear();
@@ -126,11 +135,11 @@ impl<T: Real> ManyRows<T> {
             }
             // As far as the recurrence can tell.
             let goal = T::epsilon() * T::of(0.25) * start;
-            match self.iterate(problem, rows, x, goal, ITERATIONS - iterations) {
+            match self.iterate((problem, extents), rows, x, goal, ITERATIONS - iterations) {
                 Some(spent) => iterations += spent,
                 None => break,
             }
-            solved = self.refresh(problem, rows, &b, x);
+            solved = self.refresh((problem, extents), rows, &b, x);
         }
         if !solved {
             x.copy_from_slice(&b);
@@ -147,7 +156,7 @@ impl<T: Real> ManyRows<T> {
     /// Adds to x until the residual is at most `goal`.
     fn iterate(
         &mut self,
-        problem: &ContactProblem<'_, T>,
+        (problem, extents): (&ContactProblem<'_, T>, &Extents),
         rows: &[usize],
         x: &mut [T],
         goal: T,
@@ -165,7 +174,7 @@ impl<T: Real> ManyRows<T> {
             for (&row, &z) in rows.iter().zip(&self.pushed) {
                 self.direction[row] = z + share * self.direction[row];
             }
-            self.multiply(problem, rows);
+            self.multiply(problem, extents, rows);
             let curvature = rows.iter().map(|&row| self.direction[row] * self.product[row]).sum::<T>();
             // W is not definite along the direction, or nothing is a number.
             let sound = curvature > T::zero() && now > T::zero();
@@ -198,19 +207,26 @@ impl<T: Real> ManyRows<T> {
     }
 
     /// The product of W with the direction, in the active rows. Of W the lower triangle is read alone.
-    fn multiply(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize]) {
+    fn multiply(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) {
         let Self { direction, product, .. } = self;
         product.fill(T::zero());
         for &row in rows {
-            let (left, p) = (&problem.row(row)[..=row], direction[row]);
-            let sum = dot(left, &direction[..=row]);
-            T::axpy(p, &left[..row], &mut product[..row]);
+            let (first, p) = (extents.of(row).start, direction[row]);
+            let left = &problem.row(row)[first..=row];
+            let sum = dot(left, &direction[first..=row]);
+            T::axpy(p, &left[..row - first], &mut product[first..row]);
             product[row] += sum;
         }
     }
 
     /// The residual as it is; says whether every equation is met to the rounding of its terms.
-    fn refresh(&mut self, problem: &ContactProblem<'_, T>, rows: &[usize], b: &[T], x: &[T]) -> bool {
+    fn refresh(
+        &mut self,
+        (problem, extents): (&ContactProblem<'_, T>, &Extents),
+        rows: &[usize],
+        b: &[T],
+        x: &[T],
+    ) -> bool {
         let Self { direction, residual, .. } = self;
         direction.fill(T::zero());
         for (&row, &x) in rows.iter().zip(x) {
@@ -218,9 +234,10 @@ impl<T: Real> ManyRows<T> {
         }
         let mut met = true;
         for ((&row, &b), r) in rows.iter().zip(b).zip(residual.iter_mut()) {
-            let own = problem.row(row);
+            let range = extents.of(row);
+            let (own, direction) = (&problem.row(row)[range.clone()], &direction[range]);
             *r = b - dot(own, direction);
-            let terms = b.abs() + own.iter().zip(direction.iter()).map(|(w, x)| (*w * *x).abs()).sum::<T>();
+            let terms = b.abs() + own.iter().zip(direction).map(|(w, x)| (*w * *x).abs()).sum::<T>();
             met &= r.abs() <= T::of(ROUNDINGS) * T::epsilon() * terms;
         }
         direction.fill(T::zero());
@@ -284,9 +301,11 @@ mod tests {
                 let problem = problem(&w, &b, &sets);
                 let rows: Vec<usize> = (0..n).filter(|i| i % 7 != 3).collect();
                 let mut many = ManyRows::default();
-                assert!(many.prepare(&problem, &rows));
+                let mut extents = Extents::default();
+                extents.find(&problem);
+                assert!(many.prepare(&problem, &extents, &rows));
                 let mut x: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
-                *most = many.solve(&problem, &rows, &mut x).unwrap();
+                *most = many.solve(&problem, &extents, &rows, &mut x).unwrap();
                 let mut factor = DenseCholesky::with_capacity(n);
                 factor.factorize(rows.len(), |i, j| w[rows[i] * n + rows[j]]).unwrap();
                 let mut direct: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
@@ -312,8 +331,13 @@ mod tests {
             w[j * n + 20] = w[j * n + 19];
         }
         let (q, sets, rows) = (vec![0.0; n], vec![AdmissibleSet::Free; n], (0..n).collect::<Vec<_>>());
-        assert!(!ManyRows::default().prepare(&problem(&w, &q, &sets), &rows));
+        let prepares = |w: &[f64]| {
+            let (problem, mut extents) = (problem(w, &q, &sets), Extents::default());
+            extents.find(&problem);
+            ManyRows::default().prepare(&problem, &extents, &rows)
+        };
+        assert!(!prepares(&w));
         w[5 * n + 5] = 0.0;
-        assert!(!ManyRows::default().prepare(&problem(&w, &q, &sets), &rows));
+        assert!(!prepares(&w));
     }
 }

@@ -8,6 +8,7 @@ use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::kernels::dense::{add_product, transposed_product};
 use crate::real::Real;
+use crate::sparse;
 use faer::sparse::SparseColMatRef;
 
 /// What stands between the modes and the contact dofs.
@@ -46,6 +47,22 @@ pub struct Accuracy {
     /// The first circular frequency that is not in the modes (1/time). A contact that lasts T has its force resolved to
     /// times of about 1/ω: mean errors were found to be about 2/(ω T) where bodies touch at a point.
     pub cutoff: f64,
+    /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω: with longer ones the overshoot of
+    /// the force behind a front was found to grow, and its error is that of the step, not of the modes. Infinite for a
+    /// body that is rigid.
+    pub longest_step: f64,
+}
+
+/// ω h up to which steps resolve a mode.
+const RESOLVED: f64 = 2.5;
+
+/// The softening that has the least error behind a front.
+const SOFTENING: f64 = 2.0;
+
+/// The longest step for modes with this cutoff.
+fn longest_step(modes: &Modes) -> f64 {
+    let highest = modes.frequencies.last().copied().unwrap_or(0.0);
+    RESOLVED / if modes.next_frequency().is_finite() { modes.next_frequency() } else { highest }
 }
 
 enum Damping<'a> {
@@ -109,7 +126,8 @@ pub struct Reduction<'a, T: Real> {
     fixed: Vec<usize>,
     boundary: Boundary,
     exponent: f64,
-    softening: f64,
+    /// None until chosen.
+    softening: Option<f64>,
     damping: Damping<'a>,
     load: Option<Vec<T>>,
 }
@@ -148,7 +166,7 @@ impl<'a, T: Real> Reduction<'a, T> {
             fixed: Vec::new(),
             boundary: Boundary::default(),
             exponent: 3.0,
-            softening: 2.0,
+            softening: None,
             damping: Damping::None,
             load: None,
         }
@@ -176,9 +194,12 @@ impl<'a, T: Real> Reduction<'a, T> {
     /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2, which
     /// has the least error behind a front. With 0 statics are exact, as small contacts that grow slowly need it, and
     /// behind a front the force overshoots by half of it (`docs/reduction.md`).
+    ///
+    /// Where contact dofs of the parent have no mass nothing rings there, R is the flexibility of a layer of elements,
+    /// and the default is in the way: the build refuses a tapered body then, unless a softening has been chosen.
     #[must_use]
     pub fn softening(self, times: f64) -> Self {
-        Self { softening: times, ..self }
+        Self { softening: Some(times), ..self }
     }
 
     /// Damping of the modes by a share of the critical one, given for each circular frequency; replaces damping given
@@ -208,7 +229,8 @@ impl<'a, T: Real> Reduction<'a, T> {
     ///
     /// Those of [`Modes::lowest`]; for the contact dofs [`Error::Empty`], [`Error::MissingDof`],
     /// [`Error::RepeatedDof`] and, if one is fixed, [`Error::Incompatible`]; [`Error::Incompatible`] too if the modes
-    /// leave no flexibility between them and some contact dofs; [`Error::Dimension`] and [`Error::NotFinite`] for the
+    /// leave no flexibility between them and some contact dofs, and for a tapered body whose parent has contact dofs
+    /// without mass unless a [`softening`](Self::softening) was chosen; [`Error::Dimension`] and [`Error::NotFinite`] for the
     /// constant load, [`Error::Parameter`] for exponent and damping; [`Error::LinearNotConverged`] if a static
     /// response is not found.
     pub fn modes(&self, count: usize) -> Result<ReducedBody<T>> {
@@ -308,9 +330,23 @@ impl<'a, T: Real> Reduction<'a, T> {
             let name = "the exponent of the taper";
             return Err(Error::Parameter { name, value: self.exponent, range: "finite and at least 1" });
         }
-        if !(self.softening >= 0.0 && self.softening.is_finite()) {
-            let (name, value) = ("the softening of a tapered reduction", self.softening);
+        if let Some(value) = self.softening.filter(|times| !(*times >= 0.0 && times.is_finite())) {
+            let name = "the softening of a tapered reduction";
             return Err(Error::Parameter { name, value, range: "finite and not negative" });
+        }
+        let massless = |dof: &&usize| sparse::entry(self.mass, **dof, **dof) == T::zero();
+        if self.boundary == Boundary::Tapered
+            && self.softening.is_none()
+            && let Some(dof) = self.contact.iter().find(massless)
+        {
+            let count = self.contact.iter().filter(massless).count();
+            return Err(Error::Incompatible {
+                part: format!(
+                    "a tapered reduction with contact dof {dof} (of {count} such) without mass in the parent"
+                ),
+                reason: "it would be too soft there: give a plain mass matrix, take `Boundary::Untapered` with many \
+                         modes, or choose a `softening`",
+            });
         }
         let Some(load) = &self.load else { return Ok(()) };
         let what = "the constant load of a reduced body";
@@ -347,7 +383,7 @@ impl<'a, T: Real> Reduction<'a, T> {
                 *share = of_mode(k, 1.0 - squares[k]) * at(k, contact);
             }
         }
-        let softening = if tapered { self.softening } else { 0.0 };
+        let softening = if tapered { self.softening.unwrap_or(SOFTENING) } else { 0.0 };
         let times = 1.0 + softening;
         let mut fields: Vec<f64> = residual.iter().map(|x| times * x).collect();
         add_product(1.0, n, &modes.shapes, &shares, &mut fields);
@@ -359,7 +395,8 @@ impl<'a, T: Real> Reduction<'a, T> {
             if left > 0.0 { left / (left + taken) } else { 0.0 }
         };
         let largest = (0..contacts).map(share).fold(0.0, f64::max);
-        let accuracy = Accuracy { residual: Some(largest), compliance: softening * largest, cutoff };
+        let (compliance, longest_step) = (softening * largest, longest_step(modes));
+        let accuracy = Accuracy { residual: Some(largest), compliance, cutoff, longest_step };
         Ok(Interface { sigma: squares.into_iter().map(f64::sqrt).collect(), fields, stiffness, accuracy })
     }
 
@@ -381,7 +418,8 @@ impl<'a, T: Real> Reduction<'a, T> {
             }
         }
         add_product(1.0, n, &modes.shapes, &shares, &mut fields);
-        let accuracy = Accuracy { residual: None, compliance: 0.0, cutoff: modes.next_frequency() };
+        let (cutoff, longest_step) = (modes.next_frequency(), longest_step(modes));
+        let accuracy = Accuracy { residual: None, compliance: 0.0, cutoff, longest_step };
         Ok(Interface { sigma: vec![1.0; count], fields, stiffness: Vec::new(), accuracy })
     }
 
@@ -421,7 +459,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         // As if the load were one more contact force: S of the load, less what the contact dofs have of it.
         if self.boundary == Boundary::Tapered {
             for x in &mut rest {
-                *x *= 1.0 + self.softening;
+                *x *= 1.0 + self.softening.unwrap_or(SOFTENING);
             }
         }
         let mut shares = vec![0.0; modes.count()];

@@ -63,6 +63,7 @@ pub struct Modes {
     next: f64,
     residual: f64,
     factorizations: usize,
+    solves: usize,
 }
 
 /// Modes of another code, for [`Modes::given`].
@@ -200,6 +201,7 @@ impl Modes {
             next: modes.next,
             residual: 0.0,
             factorizations: 0,
+            solves: 0,
         };
         check_rigid(pencil, &found, modes.tolerance)?;
         found.residual = found.worst_residual(pencil, modes.tolerance)?;
@@ -211,7 +213,7 @@ impl Modes {
             let frequency = if modes.next.is_finite() { modes.next } else { modes.frequencies[count - 1] };
             return Err(Error::ModesMissed { found: count, expected: below.unwrap_or(0), frequency });
         }
-        found.factorizations = pencil.factorizations;
+        (found.factorizations, found.solves) = (pencil.factorizations, pencil.solves);
         Ok(found)
     }
 
@@ -288,8 +290,10 @@ impl Modes {
             next: next.map_or(f64::INFINITY, f64::sqrt),
             residual: 0.0,
             factorizations: pencil.factorizations,
+            solves: 0,
         };
         modes.residual = modes.worst_residual(pencil, TOLERANCE)?;
+        modes.solves = pencil.solves;
         Ok(modes)
     }
 
@@ -361,6 +365,12 @@ impl Modes {
     /// Sparse factorizations that finding and checking them took.
     pub fn factorizations(&self) -> usize {
         self.factorizations
+    }
+
+    /// Right-hand sides that finding and checking them solved for, several at a time: no eigensolver on these matrices
+    /// that takes as many can be faster than they are.
+    pub fn solves(&self) -> usize {
+        self.solves
     }
 
     /// Number of dofs of the body, supports included.

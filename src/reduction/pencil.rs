@@ -38,6 +38,8 @@ pub(super) struct Pencil {
     factor: Box<dyn Factorization<f64>>,
     /// Factorizations so far.
     pub(super) factorizations: usize,
+    /// Right-hand sides solved for so far.
+    pub(super) solves: usize,
     /// Relative rounding of the entries of K.
     rounding: f64,
     /// Parts that nothing connects.
@@ -137,6 +139,7 @@ impl Pencil {
             by_stiffness: Product::new(k, Symmetry::Symmetric),
             factor: Automatic.analyze(sum.pattern(), &[])?,
             factorizations: 0,
+            solves: 0,
             rounding,
             bodies: parts(&sum, n),
             sum,
@@ -186,6 +189,7 @@ impl Pencil {
 
     /// `x ← (K + σM)⁻¹ x`, column by column.
     pub(super) fn solve(&mut self, x: &mut [f64]) -> Result<()> {
+        self.solves += x.len() / self.size();
         self.factor.solve(x)
     }
 

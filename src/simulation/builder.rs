@@ -5,6 +5,7 @@ use super::constraints::Constraints;
 use super::energy::Ledger;
 use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
+use super::massless_start::Balanced;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
     check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
@@ -60,6 +61,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     balance: EnergyBalance,
     stability: Stability,
     overclosure: InitialOverclosure,
+    balanced: Balanced,
 }
 
 /// Whether the default corrector is added, or correctors were chosen.
@@ -126,6 +128,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             balance: EnergyBalance::Off,
             stability: Stability::Checked,
             overclosure: InitialOverclosure::Refused,
+            balanced: Balanced::Massless,
         }
     }
 
@@ -288,6 +291,43 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
+    /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the free dofs
+    /// are brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way from
+    /// there, laws of springs as they are. A load that begins with the run then does not shake it.
+    ///
+    /// Newton's method, of linear systems two factorizations of K (no more than one is held at a time), one contact
+    /// problem on the rows that close. [`start_adjustment`](Simulation::start_adjustment) says how far dofs have moved.
+    /// Accelerations and contact forces follow from that state as from any other.
+    ///
+    /// Refused at [`build`](Self::build): initial velocities, of supports too; a K that is not positive definite, as
+    /// that of a body which contact alone holds ([`Error::Singular`]); a balance that is not found, as of nonlinear
+    /// systems far from it ([`Error::StartNotBalanced`]); systems over ranks. A run that is
+    /// [resumed](Self::resume) has started.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    ///
+    /// // Two masses on springs (k = 4, 1) in a row with a wall 0.1 behind the second one, the first pulled by 1.
+    /// let entries = [(0, 0, 5.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)].map(|(i, j, k)| Triplet::new(i, j, k));
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &entries)?;
+    /// let system = LinearSystem::lumped(vec![1.0; 2], k)?.load(|_, f| f[0] += 1.0);
+    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.01)
+    ///     .constraint(LinearRows::new().unilateral(&[(1, -1.0)], 0.1))
+    ///     .start_at_rest()
+    ///     .build()?;
+    /// // 5 u₀ − u₁ = 1, u₁ = 0.1, and the wall presses with u₀ − u₁.
+    /// run.run_until(1.0, &mut ())?;
+    /// assert!((run.state().displacement()[0] - 0.22).abs() < 1e-14);
+    /// assert!((run.state().contacts().forces()[0] - 0.12).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn start_at_rest(mut self) -> Self {
+        self.balanced = Balanced::All;
+        self
+    }
+
     /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused,
     /// and a step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
     ///
@@ -341,7 +381,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
-        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
+        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, balanced, .. } = self;
         step_size::<T>(h)?;
         check_times(t, self.overclosure)?;
         self.resumed.as_ref().map_or_else(|| Clock::new(t, h), Resumed::clock).check()?;
@@ -381,7 +421,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             Begun { state, history, adjustment: None }
         } else {
             let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
-            let start = Start { system, contact_solver, scheme: &scheme, together, h, t, massless, is_smooth };
+            let start =
+                Start { system, contact_solver, scheme: &scheme, together, h, t, massless, balanced, is_smooth };
             let violation = Violation::Initial(self.overclosure);
             start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
         };

@@ -2,6 +2,7 @@
 
 use super::operator::Operator;
 use super::program::CompiledStage;
+use super::responses::Unit;
 use crate::corrector::rounding;
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver};
@@ -268,7 +269,7 @@ impl<T: Real> MasslessBlock<T> {
         Ok(Self {
             dofs: dofs.to_vec(),
             columns: columns.without(dofs),
-            operator: Operator::of_part(Box::new(factor), interface)?,
+            operator: Operator::of_part(Box::new(factor), interface, Unit::Dof)?,
             stage: CompiledStage::of_displacements(),
             massive: massive.map(|(place, &dof)| (dof, place)).collect(),
             places: dofs.iter().map(|dof| interface.binary_search(dof).unwrap_or(interface.len())).collect(),

@@ -1,8 +1,10 @@
-//! Dofs without mass at the start of a run: brought into static balance with the others, the load and contact.
+//! Dofs without mass at the start of a run, or all dofs of one that starts at rest: brought into static balance with the
+//! others, the load and contact.
 
 use super::constraints::Constraints;
 use super::massless::{Columns, Embedded, is_damped};
 use super::operator::Operator;
+use super::responses::Unit;
 use crate::contact::{Candidates, ContactJacobian};
 use crate::contact_solver::{ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
@@ -11,7 +13,8 @@ use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
 
-/// How dofs without mass were moved when a simulation was built, before its first step.
+/// How dofs without mass, or all dofs of a run that [starts at rest](crate::SimulationBuilder::start_at_rest), were
+/// moved when a simulation was built, before its first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StartAdjustment<T> {
@@ -24,32 +27,46 @@ pub struct StartAdjustment<T> {
     pub dof: usize,
 }
 
+/// What is not positive definite where a run cannot start at rest.
+const AT_REST: &str = "stiffness matrix, with which the run was to start at rest (contact does not hold a body there),";
+
 /// The most iterations of the balance at the start. Linear systems take two.
 const ITERATIONS: usize = 30;
 
-/// Brings dofs without mass into static balance with the other dofs, the load and contact, by Newton's method: f_b + Gᵀ
-/// λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they were given. Those that are in balance
-/// to rounding are left alone, bit for bit, and so are those that damping acts on: their displacements are initial
-/// values of their own. With it comes what gaps may miss, as far as it is rounding of the ways that contact has taken
-/// back.
+/// Which dofs are brought into balance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Balanced {
+    /// Those without mass, if they have a stiffness of their own and no damping.
+    Massless,
+    /// All that are free: the run starts at rest, or is refused.
+    All,
+}
+
+/// Brings dofs (those without mass, or all that are free) into static balance with the other dofs, the load and contact,
+/// by Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they were
+/// given. Those that are in balance to rounding are left alone, bit for bit, and so are massless ones that damping acts
+/// on: their displacements are initial values of their own. With it comes what gaps may miss, as far as it is rounding
+/// of the ways that contact has taken back.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &mut ContactJacobian<T>),
     motion: &mut Motion<T>,
-    dofs: &[usize],
+    (dofs, balanced): (&[usize], Balanced),
     [h, ahead]: [f64; 2],
 ) -> Result<Option<(StartAdjustment<T>, T)>> {
-    if dofs.is_empty() || is_damped(system, dofs)? {
+    let is_massless = balanced == Balanced::Massless;
+    if dofs.is_empty() || is_massless && is_damped(system, dofs)? {
         return Ok(None);
     }
+    let unit = if is_massless { Unit::Dof } else { Unit::Row };
     let t = motion.t;
     let given = motion.u.clone();
     let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
     let interface = constraints.interface().to_vec();
     let mut residual = vec![T::zero(); motion.u.len()];
     let (mut on_interface, mut forces) = (vec![T::zero(); interface.len()], vec![T::zero(); interface.len()]);
-    let (mut first, mut missed) = (T::zero(), T::zero());
+    let (mut first, mut missed, mut worst) = (T::zero(), T::zero(), dofs[0]);
     for iteration in 0..ITERATIONS {
         system.force(t, &motion.u, &motion.v, &mut residual)?;
         let columns = Columns::of(system, dofs, motion)?;
@@ -57,14 +74,15 @@ pub(super) fn balance_start<T: Real>(
             Ok(factor) => factor,
             // Without a symmetric positive definite stiffness of their own no balance is sought. Whether the scheme can
             // do with that, the step decides.
-            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => {
+            Err(Error::Asymmetric { .. } | Error::Singular { .. }) if is_massless => {
                 motion.u = given;
                 constraints.search(motion, ahead, g)?;
                 return Ok(None);
             }
+            Err(Error::Singular { dof, .. }) => return Err(Error::Singular { matrix: AT_REST, dof }),
             Err(other) => return Err(other),
         };
-        let mut operator = Operator::of_part(Box::new(factor), &interface)?;
+        let mut operator = Operator::of_part(Box::new(factor), &interface, unit)?;
         operator.begin(&mut residual, &mut on_interface)?;
         let sliver = press_start(
             solver,
@@ -77,12 +95,15 @@ pub(super) fn balance_start<T: Real>(
         )?;
         operator.finish(&mut residual, &on_interface, &forces)?;
         missed = missed.max(sliver);
-        let size = dofs.iter().fold(T::zero(), |size, &dof| {
+        let mut size = T::zero();
+        for &dof in dofs {
             let d = residual[dof].abs();
-            if d > size || d.is_nan() { d } else { size }
-        });
+            if d > size || d.is_nan() {
+                (size, worst) = (d, dof);
+            }
+        }
         if !size.is_finite() {
-            let (dof, value) = (dofs[0], size.value());
+            let (dof, value) = (worst, size.value());
             return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
         }
         let scale = largest(&motion.u).max(largest(&given));
@@ -107,10 +128,15 @@ pub(super) fn balance_start<T: Real>(
             system.external_load(t, &mut residual)?;
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
+            if !is_massless {
+                // What the last iteration still moved is what rounding leaves of a solve with all of K: more than a row
+                // with small displacements of its own would count as rounding.
+                missed = missed.max(T::of(8.0) * g.largest_row() * (size + T::epsilon() * scale));
+            }
             return Ok(Some((StartAdjustment { energy, largest: moves(dof).abs(), dof }, missed)));
         }
     }
-    Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: dofs[0] })
+    Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: worst })
 }
 
 /// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns

@@ -1,5 +1,7 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 
+mod delassus;
+
 use super::contact_path::{ContactPath, analyze, condensation, respond};
 use super::responses::{Responses, Unit};
 use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
@@ -12,6 +14,7 @@ use crate::memory;
 use crate::real::Real;
 use crate::sparse::Combination;
 use crate::system::{Linearity, System, TangentWeights};
+use delassus::Delassus;
 use faer::sparse::SparseColMatRef;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
@@ -47,26 +50,6 @@ pub(crate) struct Operator<T> {
     whole: bool,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
-}
-
-/// The Delassus operator of some rows, kept until they or their responses change. It grows with them.
-#[derive(Debug)]
-struct Delassus<T> {
-    rows: Vec<usize>,
-    /// Row by row, with the compliances of the laws on the diagonal.
-    values: Vec<T>,
-    /// The diagonal without them.
-    diagonal: Vec<T>,
-    version: u64,
-}
-
-impl<T: Real> Delassus<T> {
-    /// Memory for as many rows as are foreseen on an interface of so many dofs.
-    fn foreseen(interface: usize) -> Self {
-        let rows = interface.min(FORESEEN);
-        let values = Vec::with_capacity(rows * rows);
-        Self { rows: Vec::with_capacity(rows), values, diagonal: Vec::with_capacity(rows), version: 0 }
-    }
 }
 
 impl<T: Real> Operator<T> {
@@ -127,8 +110,8 @@ impl<T: Real> Operator<T> {
     }
 
     /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it,
-    /// it is not factorized again.
-    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize]) -> Result<Self> {
+    /// it is not factorized again. Responses are kept for each `unit`.
+    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize], unit: Unit) -> Result<Self> {
         Ok(Self {
             weights: [f64::NAN; 3],
             tangent: Tangent::Absent,
@@ -139,7 +122,7 @@ impl<T: Real> Operator<T> {
             values: Vec::new(),
             factor,
             interface: interface.to_vec(),
-            responses: Responses::new(Unit::Dof, interface.len()),
+            responses: Responses::new(unit, interface.len()),
             reciprocals: Vec::new(),
             spread: SpreadRow::default(),
             rows: 0,
@@ -293,10 +276,11 @@ impl<T: Real> Operator<T> {
         compliance: impl Fn(usize) -> T,
         versions: &mut u64,
     ) -> Result<(&[T], u64)> {
-        let mut changed = self.delassus.rows != rows || self.delassus.version == 0;
+        let is_known = self.delassus.version > 0;
+        let mut changed = !is_known || self.delassus.rows != rows;
         if changed {
             self.delassus.version = 0;
-            self.assemble(g, rows)?;
+            self.assemble(g, rows, is_known)?;
         }
         let Delassus { values, diagonal, version, .. } = &mut self.delassus;
         for (k, &own) in diagonal.iter().enumerate() {
@@ -312,31 +296,39 @@ impl<T: Real> Operator<T> {
         Ok((values, *version))
     }
 
-    /// Forms W of some rows, without compliances.
-    fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
+    /// Forms W of some rows, without compliances, from that of others if it is known.
+    fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], is_known: bool) -> Result<()> {
         self.prepare(g, rows)?;
-        let Self {
-            delassus: Delassus { rows: assembled, values, diagonal, .. }, responses, reciprocals, spread, ..
-        } = self;
+        let Self { delassus, responses, reciprocals, spread, .. } = self;
         let size = rows.len();
-        assembled.clear();
-        values.clear();
-        memory::grow(values, size, size, "the Delassus operator")?;
         match self.contact {
             ContactPath::Apart => {
+                delassus.begin(rows)?;
                 for (k, &j) in rows.iter().enumerate() {
                     let response = || g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
                     spread.of(response, |response| {
-                        for (entry, &i) in values[k..].iter_mut().step_by(size).zip(rows) {
+                        for (entry, &i) in delassus.values[k..].iter_mut().step_by(size).zip(rows) {
                             *entry = g.interface_product(i, response);
                         }
                     });
                 }
             }
-            ContactPath::Condensed | ContactPath::Full => responses.couple(g, rows, values),
+            ContactPath::Condensed | ContactPath::Full => {
+                let by_entry = !responses.couples_by_tiles(g, rows);
+                match is_known && by_entry {
+                    true => delassus.rearrange(rows)?,
+                    false => delassus.begin(rows)?,
+                }
+                match by_entry {
+                    true => responses.couple(g, (rows, &delassus.joined), &mut delassus.values),
+                    false => responses.couple_by_tiles(g, rows, &mut delassus.values),
+                }
+            }
         }
+        let Delassus { rows: assembled, values, diagonal, .. } = delassus;
         diagonal.clear();
         diagonal.extend((0..size).map(|k| values[k * size + k]));
+        assembled.clear();
         assembled.extend_from_slice(rows);
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
 
 use super::constraints::Constraints;
+use super::massless_start::Balanced;
 use super::past::taylor;
 use super::program::{Compiler, Program};
 use super::responses::Unit;
@@ -262,6 +263,7 @@ impl<T: Real> Simulation<'_, T> {
             h,
             t,
             massless,
+            balanced: Balanced::Massless,
             is_smooth,
         };
         let Begun { state: mut begun, history: past, .. } =

@@ -37,9 +37,12 @@ pub(super) struct Responses<T> {
     size: usize,
     /// For each dof there, or each row, the number of its column.
     slots: Vec<usize>,
-    /// The columns, in blocks: none is moved when more are needed.
-    blocks: Vec<Vec<T>>,
-    columns: usize,
+    columns: Vec<Column>,
+    /// What the columns hold, in pages: none is moved when more are needed. Pages behind the `page`-th are empty.
+    pages: Vec<Vec<T>>,
+    page: usize,
+    /// Columns that are being solved for.
+    solved: Vec<T>,
     /// The dofs or rows whose columns are missing.
     missing: Vec<usize>,
     /// The response to a row.
@@ -47,11 +50,23 @@ pub(super) struct Responses<T> {
     tiles: Tiles<T>,
 }
 
+/// A column from the first to the last entry that is not zero: of bodies side by side a force moves two.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    page: usize,
+    start: usize,
+    /// The dofs it belongs to.
+    first: usize,
+    count: usize,
+}
+
 /// Dofs of an interface whose responses take little memory, all together.
 const SMALL: usize = 256;
 
 /// Entries of a row, in the mean, up to which the response to each is formed as a whole: those of nodes on obstacles.
 const SHORT: usize = 8;
+
+const WHAT: &str = "the responses of contact";
 
 /// A dof or row without a column, and one that is about to get one.
 const NONE: usize = usize::MAX;
@@ -61,13 +76,14 @@ impl<T: Real> Responses<T> {
     /// For an interface of so many dofs. Of a small one all columns have memory at once.
     pub(super) fn new(unit: Unit, size: usize) -> Self {
         let small = if size <= SMALL { size } else { 0 };
-        let blocks = (0..small.div_ceil(COLUMNS)).map(|_| vec![T::zero(); COLUMNS * size]).collect();
         Self {
             unit,
             size,
             slots: Vec::with_capacity(small),
-            blocks,
-            columns: 0,
+            columns: Vec::with_capacity(small),
+            pages: (0..small.div_ceil(COLUMNS)).map(|_| Vec::with_capacity(COLUMNS * size)).collect(),
+            page: 0,
+            solved: Vec::with_capacity(COLUMNS * small),
             missing: Vec::with_capacity(small),
             whole: Vec::with_capacity(size),
             tiles: Tiles::for_interface(small),
@@ -77,7 +93,9 @@ impl<T: Real> Responses<T> {
     /// Forgets all columns: they belong to another matrix. Their memory is used again.
     pub(super) fn reset(&mut self) {
         self.slots.clear();
-        self.columns = 0;
+        self.columns.clear();
+        self.pages.iter_mut().for_each(Vec::clear);
+        self.page = 0;
     }
 
     /// Forgets columns that belong to other rows.
@@ -95,7 +113,7 @@ impl<T: Real> Responses<T> {
         rows: &[usize],
         mut solve: impl FnMut(&mut [T]) -> Result<()>,
     ) -> Result<()> {
-        let Self { unit, size, slots, blocks, columns, missing, .. } = self;
+        let Self { unit, size, slots, missing, .. } = self;
         slots.resize(if *unit == Unit::Row { g.rows() } else { *size }, NONE);
         missing.clear();
         let mut ask = |index: usize| {
@@ -114,60 +132,91 @@ impl<T: Real> Responses<T> {
         for &index in missing.iter() {
             slots[index] = NONE;
         }
-        let mut rest = &missing[..];
-        while !rest.is_empty() {
-            // Blocks are full but for the last one, which is filled up first.
-            let filled = *columns % COLUMNS;
-            let count = rest.len().min(COLUMNS - filled);
-            if blocks.len() * COLUMNS == *columns {
-                blocks.push(memory::zeros(COLUMNS, *size, "the responses of contact")?);
-            }
-            let block = &mut blocks[*columns / COLUMNS][filled * *size..(filled + count) * *size];
-            block.fill(T::zero());
-            for (&index, column) in rest.iter().zip(block.chunks_exact_mut(*size)) {
-                match unit {
+        let (missing, mut solved) = (std::mem::take(&mut self.missing), std::mem::take(&mut self.solved));
+        let found = missing.chunks(COLUMNS).try_for_each(|indices| {
+            let size = self.size;
+            solved.clear();
+            memory::grow(&mut solved, indices.len(), size, WHAT)?;
+            for (&index, column) in indices.iter().zip(solved.chunks_exact_mut(size)) {
+                match self.unit {
                     Unit::Row => g.interface_scatter(index, T::one(), column),
                     Unit::Dof => column[index] = T::one(),
                 }
             }
-            solve(block)?;
-            for &index in &rest[..count] {
-                slots[index] = *columns;
-                *columns += 1;
-            }
-            rest = &rest[count..];
+            solve(&mut solved)?;
+            indices.iter().zip(solved.chunks_exact(size)).try_for_each(|(&index, column)| self.keep(index, column))
+        });
+        (self.missing, self.solved) = (missing, solved);
+        found
+    }
+
+    /// Keeps the column of a dof or row: of a row what is not zero, of a dof, for tiles, all of it.
+    fn keep(&mut self, index: usize, column: &[T]) -> Result<()> {
+        let Self { unit, size, slots, columns, pages, page, .. } = self;
+        let known = |x: &T| *x != T::zero();
+        let range = match (*unit, column.iter().position(known), column.iter().rposition(known)) {
+            (Unit::Row, Some(first), Some(last)) => first..last + 1,
+            (Unit::Row, ..) => 0..0,
+            (Unit::Dof, ..) => 0..*size,
+        };
+        let is_full = |page: &Vec<T>| page.capacity() - page.len() < range.len();
+        *page += usize::from(pages.get(*page).is_some_and(is_full));
+        if *page == pages.len() {
+            pages.push(memory::reserve(COLUMNS, *size, WHAT)?);
         }
+        let values = &mut pages[*page];
+        slots[index] = columns.len();
+        columns.push(Column { page: *page, start: values.len(), first: range.start, count: range.len() });
+        values.extend_from_slice(&column[range]);
         Ok(())
     }
 
-    /// The column of a dof or row that has one.
-    fn column(&self, index: usize) -> &[T] {
-        let (block, place) = (self.slots[index] / COLUMNS, self.slots[index] % COLUMNS);
-        &self.blocks[block][place * self.size..(place + 1) * self.size]
+    /// The column of a dof or row that has one, from the dof on where it begins.
+    fn column(&self, index: usize) -> (usize, &[T]) {
+        let Column { page, start, first, count } = self.columns[self.slots[index]];
+        (first, &self.pages[page][start..start + count])
+    }
+
+    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): its entries are then sums whose rounding
+    /// depends on which rows there are.
+    pub(super) fn couples_by_tiles(&self, g: &ContactJacobian<T>, rows: &[usize]) -> bool {
+        let entries = || rows.iter().map(|&row| g.located(row).count()).sum::<usize>();
+        self.unit == Unit::Dof && entries() > SHORT * rows.len()
     }
 
     /// W = G A⁻¹ Gᵀ of some rows, row by row.
-    pub(super) fn couple(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
-        let entries: usize = rows.iter().map(|&row| g.located(row).count()).sum();
-        if self.unit == Unit::Dof && entries > SHORT * rows.len() {
-            let mut tiles = std::mem::take(&mut self.tiles);
-            tiles.couple(g, rows, self.size, |place| self.column(place), w);
-            self.tiles = tiles;
-            return;
-        }
+    pub(super) fn couple_by_tiles(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
+        let mut tiles = std::mem::take(&mut self.tiles);
+        tiles.couple(g, rows, self.size, |place| self.column(place).1, w);
+        self.tiles = tiles;
+    }
+
+    /// The rows and columns of W = G A⁻¹ Gᵀ that belong to the `joined` places of some rows.
+    pub(super) fn couple(&mut self, g: &ContactJacobian<T>, (rows, joined): (&[usize], &[usize]), w: &mut [T]) {
         let mut whole = std::mem::take(&mut self.whole);
+        let mut next = joined.iter().peekable();
         for (k, &j) in rows.iter().enumerate() {
-            let response = match self.unit {
+            let (first, response) = match self.unit {
+                _ if joined.is_empty() => break,
                 Unit::Row => self.column(j),
                 Unit::Dof => {
                     whole.clear();
                     whole.resize(self.size, T::zero());
-                    g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place), &mut whole));
-                    &whole
+                    g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place).1, &mut whole));
+                    (0, &whole[..])
                 }
             };
-            for (entry, &i) in w[k..].iter_mut().step_by(rows.len()).zip(rows) {
-                *entry = g.interface_product(i, response);
+            let at = |place: usize| response.get(place.wrapping_sub(first)).copied().unwrap_or(T::zero());
+            let moved = |row: usize| g.located(row).map(|(place, weight)| weight * at(place)).sum::<T>();
+            let column = &mut w[k..];
+            if next.next_if(|place| **place == k).is_some() {
+                for (entry, &i) in column.iter_mut().step_by(rows.len()).zip(rows) {
+                    *entry = moved(i);
+                }
+            } else {
+                for &place in joined {
+                    column[place * rows.len()] = moved(rows[place]);
+                }
             }
         }
         self.whole = whole;
@@ -178,7 +227,8 @@ impl<T: Real> Responses<T> {
         response.fill(T::zero());
         let mut add = |index: usize, factor: T| {
             if factor != T::zero() {
-                T::axpy(factor, self.column(index), response);
+                let (first, column) = self.column(index);
+                T::axpy(factor, column, &mut response[first..first + column.len()]);
             }
         };
         match self.unit {

@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::finite::check_state;
-use super::massless_start::{StartAdjustment, balance_start};
+use super::massless_start::{Balanced, StartAdjustment, balance_start};
 use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
@@ -31,6 +31,8 @@ pub(super) struct Start<'s, T: Real> {
     pub(super) t: f64,
     /// Free dofs without mass.
     pub(super) massless: &'s [usize],
+    /// Which dofs are brought into static balance.
+    pub(super) balanced: Balanced,
     /// Whether accelerations are those of the smooth motion, without the forces of closed contacts.
     pub(super) is_smooth: bool,
 }
@@ -158,7 +160,7 @@ impl<T: Real> Start<'_, T> {
         projection: &mut JumpProjection<T>,
         violation: Violation,
     ) -> Result<Found<T>> {
-        let Self { system, contact_solver, scheme, h, t, massless, .. } = self;
+        let Self { system, contact_solver, scheme, together, h, t, massless, balanced, .. } = self;
         let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
@@ -177,9 +179,14 @@ impl<T: Real> Start<'_, T> {
         let mut touching = touching_contacts(constraints, g, (&motion, T::zero()), h, violation, &mut contacts)?;
         let mut adjustment = None;
         if let Violation::Initial(_) = violation {
+            let all = match balanced {
+                Balanced::Massless => Vec::new(),
+                Balanced::All => all_at_rest(&**system, together, &motion.v)?,
+            };
+            let balanced = (if *balanced == Balanced::All { &all } else { *massless }, *balanced);
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let rows = (&mut *constraints, &mut *g);
-            if let Some((adjusted, missed)) = balance_start(parts, solver, rows, &mut motion, massless, [h, ahead])? {
+            if let Some((adjusted, missed)) = balance_start(parts, solver, rows, &mut motion, balanced, [h, ahead])? {
                 adjustment = Some(adjusted);
                 constraints.search(&motion, ahead, g)?;
                 contacts.reset(&constraints.ids, constraints.tangents());
@@ -246,6 +253,20 @@ impl<T: Real> Start<'_, T> {
         problem.press(g, projection, &mut motion, &mut contacts)?;
         Ok(Found { motion, contacts, adjustment })
     }
+}
+
+/// The free dofs of a run that starts at rest. Refuses what moves, and ranks, none of which has all of the stiffness.
+fn all_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[T]) -> Result<Vec<usize>> {
+    if !together.is_alone() {
+        let reason = "no rank has all of the stiffness: give displacements in balance, as a static analysis finds them";
+        return Err(Error::Incompatible { part: "a start at rest over ranks".into(), reason });
+    }
+    if let Some(dof) = v.iter().position(|v| *v != T::zero()) {
+        let part = format!("a start at rest with the initial velocity {:e} of dof {dof}", v[dof]);
+        return Err(Error::Incompatible { part, reason: "what starts at rest has none, supports included" });
+    }
+    let prescribed = system.prescribed();
+    Ok((0..v.len()).filter(|dof| prescribed.binary_search(dof).is_err()).collect())
 }
 
 /// The friction of springs in compression, whose forces are known: it holds what is at rest, and slows what slides.

@@ -88,10 +88,25 @@ fn contact_dofs_loads_and_settings() {
     assert!(reduce(&[0]).boundary(Boundary::CraigBampton).modes(5).is_ok());
     let all = reduce(&[0, 1, 2, 3, 4, 5]).boundary(Boundary::CraigBampton);
     assert_refused!(all.modes(1), Error::Empty { .. });
+    // A contact dof without mass in the parent, unless the host says how soft.
+    let light: Matrix = diagonal(&[0.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+    let reduce_light = || Reduction::new(light.as_ref(), k.as_ref(), &[3, 0]);
+    let error = reduce_light().modes(3).unwrap_err();
+    assert!(matches!(error, Error::Incompatible { .. }) && error.to_string().contains("contact dof 0 (of 1 such)"));
+    assert!(reduce_light().softening(2.0).modes(3).is_ok());
+    assert!(reduce_light().boundary(Boundary::Untapered).modes(3).is_ok());
+    assert!(Reduction::new(light.as_ref(), k.as_ref(), &[3]).modes(3).is_ok());
+    // The longest step is that of the first mode left out.
+    let accuracy = reduce(&[0]).modes(3).unwrap().accuracy();
+    assert!((accuracy.longest_step * accuracy.cutoff - 2.5).abs() < 1e-12, "{accuracy:?}");
+    let whole = reduce(&[0]).boundary(Boundary::CraigBampton).modes(5).unwrap().accuracy();
+    assert!(whole.cutoff.is_infinite() && whole.longest_step > 0.0, "{whole:?}");
     // Modes of another body.
     let modes = Modes::lowest(m.as_ref(), k.as_ref(), &[5], 3).unwrap();
     assert_refused!(reduce(&[0]).with_modes(&modes), Error::Incompatible { .. });
     assert!(reduce(&[0]).fix(&[5]).with_modes(&modes).is_ok());
+    // Each mode is solved for at least once to be found, and once to be checked.
+    assert!(modes.solves() >= 2 * modes.count(), "{}", modes.solves());
 }
 
 #[test]

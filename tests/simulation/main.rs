@@ -15,6 +15,7 @@ mod quiet_input;
 mod random_scenes;
 mod stability;
 mod start;
+mod start_at_rest;
 mod step_control;
 mod step_size;
 mod stiffening;

@@ -1,11 +1,11 @@
 //! Many candidates and many pressed contacts: what they cost is what presses, and what is kept of them changes nothing.
 
-use contact_dynamics::contact::{NodesOnObstacle, Plane, Side, Sphere};
+use contact_dynamics::contact::{GapOffset, NodesOnObstacle, Plane, Side, Sphere};
 use contact_dynamics::contact_solver::Pivoting;
-use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Newmark, Simulation};
+use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Newmark, Simulation, SimulationBuilder};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{entries, matrix};
 
 /// A thin block on a large ball that slides under it: all nodes at the bottom press, and their normals turn.
 fn sliding(cells: [usize; 3]) -> contact_dynamics::SimulationBuilder<'static, f64> {
@@ -107,5 +107,56 @@ fn contact_by_products_of_w_is_that_of_its_entries() {
         applied.step().unwrap();
         resumed.step().unwrap();
         assert!(applied.state() == resumed.state(), "step {step}");
+    }
+}
+
+/// Plates side by side on a floor that waves: in every step some contacts open, others close.
+fn on_waves(plates: usize, cells: [usize; 3]) -> SimulationBuilder<'static, f64> {
+    let material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+    let plate = Solid::block([2.0, 2.0, 0.5], cells, material);
+    let bottom: Vec<usize> = (0..plate.nodes.len()).filter(|&node| plate.nodes[node][2] == 0.0).collect();
+    let (mass, stiffness) = (plate.lumped_mass::<f64>(), plate.stiffness::<f64>());
+    let (n, own) = (mass.len(), entries(&stiffness));
+    let all = (0..plates).flat_map(|body| own.iter().map(move |&(i, j, x)| (body * n + i, body * n + j, x)));
+    let masses = mass.repeat(plates);
+    let weight = masses.clone();
+    let system = LinearSystem::lumped(masses, matrix(plates * n, all)).unwrap().load(move |_, f| {
+        f.iter_mut().zip(&weight).skip(2).step_by(3).for_each(|(f, m)| *f = -0.05 * m);
+    });
+    let places = (0..plates).flat_map(|body| bottom.iter().map(move |&node| (body, node)));
+    let rows = places.fold(LinearRows::new(), |rows, (body, node)| {
+        let phase = 5.0 * plate.nodes[node][0] + 3.0 * plate.nodes[node][1] + body as f64;
+        let wave = move |t: f64| {
+            let (sin, cos) = (phase + 2.0 * t).sin_cos();
+            [0.03 - 0.03 * sin, -0.06 * cos, 0.12 * sin]
+        };
+        rows.unilateral(&[(body * n + 3 * node + 2, 1.0)], GapOffset::moving(wave))
+    });
+    Simulation::builder(system, Newmark::trapezoidal(), 0.1).constraint(rows)
+}
+
+#[test]
+fn rows_that_come_and_go_leave_nothing_behind() {
+    // (What is kept of W and of the responses belongs to rows, not to the way that led to them.)
+    for (plates, cells) in [(1, [5, 5, 1]), (3, [13, 13, 1])] {
+        let mut run = on_waves(plates, cells).build().unwrap();
+        let (mut most, mut least, mut before, mut changes) = (0, usize::MAX, Vec::new(), 0);
+        for step in 0..24 {
+            let (state, history) = (run.state().clone(), run.history().clone());
+            run.step().unwrap();
+            let closed_now = run.state().contacts().closed().to_vec();
+            changes += closed_now.iter().zip(&before).filter(|(now, before)| now != before).count();
+            before = closed_now;
+            if step > 4 {
+                (most, least) = (most.max(closed(&run)), least.min(closed(&run)));
+            }
+            if step % 4 == 3 {
+                let mut fresh = on_waves(plates, cells).resume(state, history).build().unwrap();
+                fresh.step().unwrap();
+                assert_eq!(run.state(), fresh.state(), "{plates} plates, step {step}");
+            }
+        }
+        assert!(changes > 10 * plates && least < most, "{plates}: {changes} {least} {most}");
+        assert!(plates == 1 || most > 256, "{most}");
     }
 }

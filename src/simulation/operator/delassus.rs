@@ -1,0 +1,179 @@
+//! The Delassus operator of the rows that press. Where rows join or leave, what the others do to each other stays: these
+//! entries are moved and not formed again, and are the same to the bit.
+
+use crate::contact_solver::FORESEEN;
+use crate::error::Result;
+use crate::memory;
+use crate::real::Real;
+
+/// W of some rows, kept until they or their responses change. It grows with them.
+#[derive(Debug)]
+pub(super) struct Delassus<T> {
+    pub(super) rows: Vec<usize>,
+    /// Row by row, with the compliances of the laws on the diagonal.
+    pub(super) values: Vec<T>,
+    /// The diagonal without them.
+    pub(super) diagonal: Vec<T>,
+    /// Its number, 0 if what is here belongs to no rows.
+    pub(super) version: u64,
+    /// Places of the rows that have joined.
+    pub(super) joined: Vec<usize>,
+    /// The rows that have stayed.
+    runs: Vec<Run>,
+}
+
+/// Rows side by side before and now: where they begin then, among those that stay, and now.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    before: usize,
+    among: usize,
+    now: usize,
+    count: usize,
+}
+
+const WHAT: &str = "the Delassus operator";
+
+impl<T: Real> Delassus<T> {
+    /// Memory for as many rows as are foreseen on an interface of so many dofs.
+    pub(super) fn foreseen(interface: usize) -> Self {
+        let rows = interface.min(FORESEEN);
+        Self {
+            rows: Vec::with_capacity(rows),
+            values: Vec::with_capacity(rows * rows),
+            diagonal: Vec::with_capacity(rows),
+            version: 0,
+            joined: Vec::with_capacity(rows),
+            runs: Vec::with_capacity(rows),
+        }
+    }
+
+    /// Memory for W of some rows; all of them have joined.
+    pub(super) fn begin(&mut self, rows: &[usize]) -> Result<()> {
+        self.values.clear();
+        memory::grow(&mut self.values, rows.len(), rows.len(), WHAT)?;
+        self.joined.clear();
+        self.joined.extend(0..rows.len());
+        Ok(())
+    }
+
+    /// Memory for W of some rows, where the entries of those that stay have been moved to their places, compliances
+    /// taken off: rows and columns of those that have joined are to be filled.
+    pub(super) fn rearrange(&mut self, rows: &[usize]) -> Result<()> {
+        if !self.compare(rows) {
+            return self.begin(rows);
+        }
+        let (was, now) = (self.rows.len(), rows.len());
+        let stay = now - self.joined.len();
+        let Self { values, diagonal, runs, .. } = self;
+        for (k, &own) in diagonal.iter().enumerate() {
+            values[k * was + k] = own;
+        }
+        if stay < was {
+            // Nothing is overwritten that is still to be moved: all goes towards the front, in the order of the places.
+            for to in &*runs {
+                for row in 0..to.count {
+                    for run in &*runs {
+                        let from = (to.before + row) * was + run.before;
+                        values.copy_within(from..from + run.count, (to.among + row) * stay + run.among);
+                    }
+                }
+            }
+        }
+        values.truncate(stay * stay);
+        memory::grow(values, now, now, WHAT)?;
+        if stay < now {
+            // And back to front here.
+            for to in runs.iter().rev() {
+                for row in (0..to.count).rev() {
+                    for run in runs.iter().rev() {
+                        let from = (to.among + row) * stay + run.among;
+                        values.copy_within(from..from + run.count, (to.now + row) * now + run.now);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds which rows stay, in the order that they had, and which have joined; says whether any stay.
+    fn compare(&mut self, rows: &[usize]) -> bool {
+        let Self { rows: before, runs, joined, .. } = self;
+        runs.clear();
+        runs.reserve(rows.len());
+        joined.clear();
+        joined.reserve(rows.len());
+        let (mut among, mut next) = (0, 0);
+        for (now, &row) in rows.iter().enumerate() {
+            let Some(ahead) = before[next..].iter().position(|other| *other == row) else {
+                joined.push(now);
+                continue;
+            };
+            let place = next + ahead;
+            match runs.last_mut() {
+                Some(run) if run.before + run.count == place && run.now + run.count == now => run.count += 1,
+                _ => runs.push(Run { before: place, among, now, count: 1 }),
+            }
+            (among, next) = (among + 1, place + 1);
+        }
+        among > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An entry that says whose it is.
+    fn entry(row: usize, column: usize) -> f64 {
+        (1000 * row + column) as f64
+    }
+
+    /// Fills what has joined, and puts compliances on the diagonal, as an operator does.
+    fn fill(w: &mut Delassus<f64>, rows: &[usize]) {
+        let n = rows.len();
+        for &k in &w.joined {
+            for i in 0..n {
+                w.values[i * n + k] = entry(rows[i], rows[k]);
+                w.values[k * n + i] = entry(rows[k], rows[i]);
+            }
+        }
+        w.diagonal = (0..n).map(|k| w.values[k * n + k]).collect();
+        w.rows = rows.to_vec();
+        for k in 0..n {
+            w.values[k * n + k] += 0.25;
+        }
+    }
+
+    #[test]
+    fn rows_come_and_go() {
+        let mut w = Delassus::foreseen(0);
+        let all: Vec<usize> = (0..40).collect();
+        let sets = |mask: usize| all.iter().copied().filter(move |row| (row * row + mask * 7) % (2 + mask % 5) != 1);
+        let mut list: Vec<Vec<usize>> = (0..30).map(|mask| sets(mask * mask).collect()).collect();
+        // None, one, all; normal rows with their tangents; another order, which no move gives.
+        list.extend([
+            vec![],
+            vec![3],
+            all.clone(),
+            vec![0, 20, 21, 1, 22],
+            vec![1, 22],
+            vec![1, 22, 0, 20],
+            vec![39],
+            all.clone(),
+        ]);
+        for rows in &list {
+            w.rearrange(rows).unwrap();
+            fill(&mut w, rows);
+            let n = rows.len();
+            assert_eq!(w.values.len(), n * n);
+            for (e, value) in w.values.iter().enumerate() {
+                let (i, j) = (e / n, e % n);
+                let compliance = if i == j { 0.25 } else { 0.0 };
+                assert_eq!(value.to_bits(), (entry(rows[i], rows[j]) + compliance).to_bits(), "{rows:?} {i} {j}");
+            }
+        }
+        // Of rows that stay nothing is to be filled.
+        w.rearrange(&all[1..]).unwrap();
+        assert!(w.joined.is_empty());
+    }
+}
