@@ -423,8 +423,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
             let start =
                 Start { system, contact_solver, scheme: &scheme, together, h, t, massless, balanced, is_smooth };
-            let violation = Violation::Initial(self.overclosure);
-            start.begin(u, v, &mut constraints, &mut g, &mut projection, violation)?
+            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Initial(self.overclosure))?
         };
         let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;
@@ -458,12 +457,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.keep_massless(massless);
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
-        if self.stability == Stability::Checked && together.is_alone() {
-            work.stiffening = Stiffening::of(&*system, &scheme, constraints.may_press());
-        }
-        let is_balanced = self.balance == EnergyBalance::On;
-        let ledger =
-            is_balanced.then(|| Ledger::new(&mut *system, together, &state, (&constraints, &g))).transpose()?;
+        let checked = self.stability == Stability::Checked && together.is_alone();
+        work.stiffening = checked.then(|| Stiffening::of(&*system, &scheme, constraints.may_press())).flatten();
+        let booked = self.balance == EnergyBalance::On;
+        let ledger = booked.then(|| Ledger::new(&mut *system, together, &state, (&constraints, &g))).transpose()?;
         let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
         Ok(Simulation {
             system,
@@ -489,7 +486,6 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 }
 
-/// Refuses times that are not finite, and an overclosure that is removed over a time that is not positive.
 /// Initial displacements and velocities as they were given, or zero; those of their owners on ranks.
 fn initial_motion<T: Real>(together: &Together<T>, given: [Option<Vec<T>>; 2], dofs: usize) -> Result<[Vec<T>; 2]> {
     let names = ["the initial displacement", "the initial velocity"];

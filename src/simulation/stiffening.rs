@@ -102,7 +102,7 @@ impl<T: Real> Stiffening<T> {
                 return Ok(());
             }
             self.iterate(&mut step, most)?;
-        } else if step.clock.steps % EVERY == 0
+        } else if step.clock.steps.is_multiple_of(EVERY)
             && let Some(frequency) = step.system.highest_frequency()
             && frequency * frequency > most
         {
@@ -175,27 +175,17 @@ impl<T: Real> Stiffening<T> {
             (row, reserve * k)
         };
         let mut springs: Vec<_> = self.springs.iter().map(reserved).collect();
-        let mut highest = self.highest(step, &springs, most)?;
-        if highest.is_some_and(|[square, _]| square > most) && springs != self.springs {
+        let mut found = highest(step, &springs, most)?;
+        if found.is_some_and(|[square, _]| square > most) && springs != self.springs {
             springs.clone_from(&self.springs);
-            highest = self.highest(step, &springs, most)?;
+            found = highest(step, &springs, most)?;
         }
-        if let Some([square, _]) = highest.filter(|[square, _]| *square > most) {
+        if let Some([square, _]) = found.filter(|[square, _]| *square > most) {
             let stiffest = springs.iter().max_by(|x, y| x.1.total_cmp(&y.1)).map(|spring| spring.0);
             return Err(self.refusal(step, square, stiffest));
         }
         self.cleared = (springs.iter().map(|&(row, k)| (step.constraints.ids[row], k)).collect(), h);
         Ok(())
-    }
-
-    /// Bounds of the square of the highest frequency with springs of contact.
-    fn highest(&self, step: &mut Taken<'_, '_, T>, springs: &[(usize, f64)], enough: f64) -> Result<Option<[f64; 2]>> {
-        let forces = step.contact.rows.curved.forces(step.g);
-        stability::highest_square(step.system, step.new, enough, |x, y| {
-            for &(row, k) in springs {
-                forces.scatter(row, T::of(k) * forces.product(row, x), y);
-            }
-        })
     }
 
     /// The Rayleigh quotient of ½ h² a, if it is large enough beside u to have digits.
@@ -234,7 +224,7 @@ impl<T: Real> Stiffening<T> {
 
     fn refusal(&self, step: &mut Taken<'_, '_, T>, square: f64, row: Option<usize>) -> Error {
         // (The largest stable step by the best that is known of the system, not by the motion that shows it is beyond.)
-        let known = self.highest(step, &self.springs, 0.0).ok().flatten();
+        let known = highest(step, &self.springs, 0.0).ok().flatten();
         let highest = known.map_or(square, |[_, at_most]| at_most.max(square));
         Error::Stiffened {
             integrator: step.scheme.integrator.name(),
@@ -245,6 +235,16 @@ impl<T: Real> Stiffening<T> {
             frequency: square.sqrt(),
         }
     }
+}
+
+/// Bounds of the square of the highest frequency with springs of contact.
+fn highest<T: Real>(step: &mut Taken<'_, '_, T>, springs: &[(usize, f64)], enough: f64) -> Result<Option<[f64; 2]>> {
+    let forces = step.contact.rows.curved.forces(step.g);
+    stability::highest_square(step.system, step.new, enough, |x, y| {
+        for &(row, k) in springs {
+            forces.scatter(row, T::of(k) * forces.product(row, x), y);
+        }
+    })
 }
 
 /// Whether accelerations have turned their sign and grown, or leapt, in the norm of a lumped mass.

@@ -110,9 +110,11 @@ fn weights_add_up_to_those_of_shape_functions() {
             }
             force
         };
-        for (with, without) in
-            [(dual(&stack, true), standard(&stack, true)), (triangles(&stack).dual().unwrap(), triangles(&stack))]
-        {
+        for quadrilaterals in [true, false] {
+            let (with, without) = match quadrilaterals {
+                true => (dual(&stack, true), standard(&stack, true)),
+                false => (triangles(&stack).dual().unwrap(), triangles(&stack)),
+            };
             let (rows, others) = (found(with, &still), found(without, &still));
             let differs = rows.iter().any(|(node, (area, row))| {
                 let (other, weights) = &others[node];

@@ -25,7 +25,7 @@ const MOST_CHANGE: f64 = 0.5;
 /// Gauss' rule of six points on a line of length one (degree 11): weight, and place from the middle, to both sides.
 /// (Slivers at a cut get what is wrong along it: with fewer points that is more than their weights can change by.)
 const LINE: [(f64, f64); 3] = [
-    (0.085_662_246_189_585_2, 0.466_234_757_101_576_05),
+    (0.085_662_246_189_585_2, 0.466_234_757_101_576),
     (0.180_380_786_524_069_3, 0.330_604_693_233_132_25),
     (0.233_956_967_286_345_5, 0.119_309_593_041_598_45),
 ];
