@@ -212,7 +212,8 @@ impl<T: Real> Factor<T> {
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
         // Largest entries of about one first: what follows does not see the unit of the matrix.
         // (The reciprocal of a subnormal number may be none.)
-        let size = a.val()[largest(a.val())].abs().max(T::min_positive_value());
+        // A matrix without entries is that of dof 0 too.
+        let size = a.val().get(largest(a.val())).ok_or(0_usize)?.abs().max(T::min_positive_value());
         let (unit, root) = (T::of(2.0).powi(-binary_exponent(size)), reciprocal_root(size));
         T::scale_into(unit, a.val(), &mut self.scaled);
         self.rows.fill(root);

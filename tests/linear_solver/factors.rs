@@ -4,7 +4,8 @@
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::faer::sparse::SparseColMatRef;
 use contact_dynamics::{
-    Automatic, ByBody, Cholesky, Diagonal, Error, Factorization, LinearSolver, Real, Result, Tridiagonal,
+    Automatic, ByBody, Cholesky, ConjugateGradients, Diagonal, Error, Factorization, LinearSolver, Lu, Real, Result,
+    Tridiagonal,
 };
 use contact_dynamics_scenes::hosts::Uncondensed;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -482,5 +483,25 @@ fn entries_on_one_side_that_are_zero_to_rounding_change_nothing() {
         };
         let (x, y) = (solution(&assembled), solution(&strewn));
         assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12), "{} last", last.len());
+    }
+}
+
+#[test]
+fn matrices_without_entries_are_singular() {
+    let solvers: [(&str, Box<dyn LinearSolver<f64>>); 7] = [
+        ("Cholesky", Box::new(Cholesky::default())),
+        ("LU", Box::new(Lu)),
+        ("tridiagonal", Box::new(Tridiagonal)),
+        ("diagonal", Box::new(Diagonal)),
+        ("conjugate gradients", Box::new(ConjugateGradients::default())),
+        ("automatic", Box::new(Automatic)),
+        ("by body", Box::new(ByBody::default())),
+    ];
+    for (name, solver) in solvers {
+        for n in [1, 3] {
+            let a = matrix::<f64>(n, []);
+            let refused = solver.analyze(a.symbolic(), &[]).and_then(|mut factor| factor.factorize(a.as_ref()));
+            assert!(matches!(refused, Err(Error::Singular { dof: 0, .. })), "{name}: {refused:?}");
+        }
     }
 }
