@@ -4,6 +4,7 @@
 
 mod by_chance;
 mod corners;
+mod curved_patch;
 mod folding;
 mod hertz;
 mod ironing;
@@ -20,6 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let quick = output.quick;
     let tables = [
         patch::table(quick)?,
+        curved_patch::table(quick)?,
         ties::table(quick)?,
         hertz::table(quick)?,
         ironing::table(quick)?,

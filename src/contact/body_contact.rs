@@ -32,8 +32,8 @@ use crate::real::Real;
 ///
 /// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
 /// - Nodes within faces are kept out in the mean over their facets only, as by [`Mortar`]: by a tenth of an element in
-///   blocks that fall on edges (`docs/contact.md` has a table). Of itself there are no weighted gaps: pressures are those
-///   of nodes on facets.
+///   blocks that fall on edges (`docs/contact.md` has a table). Of itself there are no weighted gaps: pressures are
+///   those of nodes on facets.
 ///
 /// ```
 /// use contact_dynamics::contact::BodyContact;
@@ -106,8 +106,8 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     }
 
     /// Contact of a surface with itself, of a body that folds or of any number of bodies whose surfaces are given as
-    /// one: every node with all facets that are not around it, and every edge with all edges that are not. Nothing needs
-    /// to be said of who meets whom. What a node or an edge does not meet of its own body is told by
+    /// one: every node with all facets that are not around it, and every edge with all edges that are not. Nothing
+    /// needs to be said of who meets whom. What a node or an edge does not meet of its own body is told by
     /// [`NodeToFacet::of_itself`]; nothing may be inside of itself in the reference configuration.
     ///
     /// Give the whole surfaces, as [`Surface::of_cells`](super::Surface::of_cells) finds them of all bodies at once.
@@ -252,8 +252,8 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     }
 
     /// The constraints, in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's on
-    /// the slave's, edges on edges; of a surface against itself nodes on facets, edges on edges. What a body has nothing
-    /// for is left out.
+    /// the slave's, edges on edges; of a surface against itself nodes on facets, edges on edges. What a body has
+    /// nothing for is left out.
     ///
     /// # Errors
     ///

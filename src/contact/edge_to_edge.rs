@@ -253,8 +253,8 @@ impl<T: Real> EdgeToEdge<T> {
     /// Rounds the edges: how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh,
     /// as [`NodeToFacet::offsets`](super::NodeToFacet::offsets). The gap is that of the lines less the radii of both
     /// edges where they are closest, which are linear between nodes. Edges of a surface that lies inside of its facets
-    /// (negative offsets) are found a little early, by up to 0.4 of the offset at right angles: between its faces a body
-    /// is smaller by more than that.
+    /// (negative offsets) are found a little early, by up to 0.4 of the offset at right angles: between its faces a
+    /// body is smaller by more than that.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;

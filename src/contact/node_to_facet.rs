@@ -362,13 +362,13 @@ impl<T: Real> NodeToFacet<T> {
     /// belong to no facet how thick they are: half the thickness of a shell whose facets are its middle surface, the
     /// thickness of a coating, the radius of a cable; negative if they lie inside. Between nodes the shape functions
     /// interpolate. The gap is the distance less the offsets of the node and of the closest point of the facet, and a
-    /// node meets the facet whose surface is closest. What a varying offset changes by as the closest point slides is in
-    /// the rows: forces then have a share along the facet, and keep linear and angular momentum.
+    /// node meets the facet whose surface is closest. What a varying offset changes by as the closest point slides is
+    /// in the rows: forces then have a share along the facet, and keep linear and angular momentum.
     ///
     /// Forces act on nodes and facets: that a friction force acts at a distance from the middle surface is left out. In
     /// dents sides are found that share a vertex with the closest facet: so in a dent of 90° with an offset of no more
-    /// than a facet's length. [Of itself](Self::of_itself) a body meets what is near beyond its [rings](Self::rings), so
-    /// a fold tighter than its offset is inside of itself.
+    /// than a facet's length. [Of itself](Self::of_itself) a body meets what is near beyond its [rings](Self::rings),
+    /// so a fold tighter than its offset is inside of itself.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;

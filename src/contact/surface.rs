@@ -431,7 +431,8 @@ impl Surface {
     /// behind of: it is outside then, on whichever side of the mean normal. (The facets whose closest points are nearer
     /// may be none that its node meets.)
     fn is_outside(&self, facet: usize, location: Location, arm: Point, positions: &[Point]) -> bool {
-        /// Share of a facet that a point is in front of one: edges that are flush, to a little, are those of one surface.
+        /// Share of a facet that a point is in front of one: edges that are flush, to a little, are those of one
+        /// surface.
         const FLUSH: f64 = 0.02;
         const ROUNDING: f64 = 1e-9;
         let (corner, neighbor) = match location {

@@ -11,8 +11,8 @@ pub(super) struct Extents {
     ranges: Vec<(usize, usize)>,
 }
 
-/// Rows begin and end at multiples of this: so many partial sums has a [`dot`](crate::dense::dot), which are then the same, to
-/// the bit, as those of a whole row.
+/// Rows begin and end at multiples of this: so many partial sums has a [`dot`](crate::dense::dot), which are then the
+/// same, to the bit, as those of a whole row.
 const LANES: usize = 4;
 
 impl Extents {

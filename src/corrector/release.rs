@@ -24,8 +24,8 @@ use crate::real::Real;
 ///
 /// Known failure: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping removes
 /// again. A contact that is pushed shut for good keeps what it took, and so does one of bodies that stay together
-/// without force: where it opens by rounding alone, by less than ε^⅔ of the speed that the impact took, nothing is given
-/// back. Schemes that read a past want it projected at
+/// without force: where it opens by rounding alone, by less than ε^⅔ of the speed that the impact took, nothing is
+/// given back. Schemes that read a past want it projected at
 /// impact ([`with_history_projection`](crate::PersistencyCorrection::with_history_projection)): else contacts may open
 /// and close again, and such a run of Park's scheme may end with .02 % of the energy less than without release.
 ///

@@ -7,9 +7,9 @@ use faer::sparse::SymbolicSparseColMatRef;
 /// Cuts a body into `count` parts, of as many dofs each, with few neighbors in other parts: which part each row of the
 /// pattern belongs to, from 0.
 ///
-/// The pattern (both triangles, entries on the diagonal or none) is that of a matrix of the whole body, or of its nodes:
-/// an entry for each two that share an element. Rows with the same neighbors, as the dofs of a node, stay together where
-/// the diagonal has entries. Parts are pieces of the multilevel nested dissection by which
+/// The pattern (both triangles, entries on the diagonal or none) is that of a matrix of the whole body, or of its
+/// nodes: an entry for each two that share an element. Rows with the same neighbors, as the dofs of a node, stay
+/// together where the diagonal has entries. Parts are pieces of the multilevel nested dissection by which
 /// [`Cholesky`](crate::Cholesky) orders solids (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998), the same in every
 /// run, so every [rank](crate::ranks::Ranks) can cut by itself; they are of no simple shape, and may be of several
 /// pieces. A part may be empty where there are more of them than rows.
@@ -18,8 +18,8 @@ use faer::sparse::SymbolicSparseColMatRef;
 ///
 /// # Errors
 ///
-/// [`Error::Parameter`] for no parts, [`Error::Dimension`] and [`Error::Incompatible`] for a pattern that is not square,
-/// not symmetric, or too large for numbers of 32 bits.
+/// [`Error::Parameter`] for no parts, [`Error::Dimension`] and [`Error::Incompatible`] for a pattern that is not
+/// square, not symmetric, or too large for numbers of 32 bits.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{Pair, SymbolicSparseColMat};

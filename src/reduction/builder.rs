@@ -230,8 +230,8 @@ impl<'a, T: Real> Reduction<'a, T> {
     /// Those of [`Modes::lowest`]; for the contact dofs [`Error::Empty`], [`Error::MissingDof`],
     /// [`Error::RepeatedDof`] and, if one is fixed, [`Error::Incompatible`]; [`Error::Incompatible`] too if the modes
     /// leave no flexibility between them and some contact dofs, and for a tapered body whose parent has contact dofs
-    /// without mass unless a [`softening`](Self::softening) was chosen; [`Error::Dimension`] and [`Error::NotFinite`] for the
-    /// constant load, [`Error::Parameter`] for exponent and damping; [`Error::LinearNotConverged`] if a static
+    /// without mass unless a [`softening`](Self::softening) was chosen; [`Error::Dimension`] and [`Error::NotFinite`]
+    /// for the constant load, [`Error::Parameter`] for exponent and damping; [`Error::LinearNotConverged`] if a static
     /// response is not found.
     pub fn modes(&self, count: usize) -> Result<ReducedBody<T>> {
         self.build(&|pencil| Modes::find(pencil, Wanted::Count(count)))

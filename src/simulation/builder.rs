@@ -292,8 +292,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the free dofs
-    /// are brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way from
-    /// there, laws of springs as they are. A load that begins with the run then does not shake it.
+    /// are brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way
+    /// from there, laws of springs as they are. A load that begins with the run then does not shake it.
     ///
     /// Newton's method, of linear systems two factorizations of K (no more than one is held at a time), one contact
     /// problem on the rows that close. [`start_adjustment`](Simulation::start_adjustment) says how far dofs have moved.
@@ -340,9 +340,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`). What comes
     /// later, a system that stiffens or compliant contacts that press, is looked at in each step, which ends with
-    /// [`Error::Stiffened`] if its frequency is beyond the limit. Damping counts if the scheme takes its forces from before the step. It is then assumed that the
-    /// highest mode has the strongest damping, which is exact for Rayleigh damping and otherwise may refuse a stable
-    /// step. Of a K that is not symmetric only Gershgorin's
+    /// [`Error::Stiffened`] if its frequency is beyond the limit. Damping counts if the scheme takes its forces from
+    /// before the step. It is then assumed that the highest mode has the strongest damping, which is exact for Rayleigh
+    /// damping and otherwise may refuse a stable step. Of a K that is not symmetric only Gershgorin's
     /// circles count.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {

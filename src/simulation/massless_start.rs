@@ -1,5 +1,5 @@
-//! Dofs without mass at the start of a run, or all dofs of one that starts at rest: brought into static balance with the
-//! others, the load and contact.
+//! Dofs without mass at the start of a run, or all dofs of one that starts at rest: brought into static balance with
+//! the others, the load and contact.
 
 use super::constraints::Constraints;
 use super::massless::{Columns, Embedded, is_damped};
@@ -42,11 +42,11 @@ pub(super) enum Balanced {
     All,
 }
 
-/// Brings dofs (those without mass, or all that are free) into static balance with the other dofs, the load and contact,
-/// by Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they were
-/// given. Those that are in balance to rounding are left alone, bit for bit, and so are massless ones that damping acts
-/// on: their displacements are initial values of their own. With it comes what gaps may miss, as far as it is rounding
-/// of the ways that contact has taken back.
+/// Brings dofs (those without mass, or all that are free) into static balance with the other dofs, the load and
+/// contact, by Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they
+/// were given. Those that are in balance to rounding are left alone, bit for bit, and so are massless ones that damping
+/// acts on: their displacements are initial values of their own. With it comes what gaps may miss, as far as it is
+/// rounding of the ways that contact has taken back.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
     solver: &mut dyn ContactSolver<T>,

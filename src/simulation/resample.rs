@@ -36,11 +36,11 @@ impl<T: Real> Simulation<'_, T> {
     /// closed contacts.
     ///
     /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`).
-    /// A step so much larger that the past would be extrapolated to more than three times its age (beyond its age, where
-    /// the scheme reads accelerations of it) makes it anew instead, by steps of the trapezoidal rule, as at the start of
-    /// a run, so that fast motions gain no energy to speak of. The velocity of the state becomes that of the scheme's
-    /// momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that goes back and
-    /// forth by such factors all the time is of order 1.
+    /// A step so much larger that the past would be extrapolated to more than three times its age (beyond its age,
+    /// where the scheme reads accelerations of it) makes it anew instead, by steps of the trapezoidal rule, as at the
+    /// start of a run, so that fast motions gain no energy to speak of. The velocity of the state becomes that of the
+    /// scheme's momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that
+    /// goes back and forth by such factors all the time is of order 1.
     ///
     /// Total momentum is conserved; the impulse of one contact agrees with the change of a body's momentum across a
     /// change of h only to the order of the scheme.

@@ -30,9 +30,9 @@ const LEAP: f64 = 4.0;
 /// * Springs of contact: the quotient of M⁻¹ Gᵀ of each, k G M⁻¹ Gᵀ, in every step. Where the bounds of mesh and
 ///   contact together do not admit the step, Lanczos' iteration with those that press, when one closes.
 /// * Systems that stiffen: the quotient of ½ h² a between u and u + ½ h² a, where accelerations have grown and turned
-///   their sign, as those of motions beyond the limit do in every step, or have become several times as large. (Of such a motion u + ½ h² a is the next
-///   state, so that for a nonlinear force it is the mean stiffness over the step that counts: a spring of the third
-///   power grows without bound exactly beyond it.)
+///   their sign, as those of motions beyond the limit do in every step, or have become several times as large. (Of such
+///   a motion u + ½ h² a is the next state, so that for a nonlinear force it is the mean stiffness over the step that
+///   counts: a spring of the third power grows without bound exactly beyond it.)
 ///
 /// Nothing is remembered from step to step but which springs have been found admissible.
 #[derive(Debug)]

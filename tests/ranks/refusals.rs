@@ -1,7 +1,8 @@
 //! What runs over ranks refuse when they are built, on all ranks.
 
 use crate::bodies::{Blocks, linear_part};
-use contact_dynamics::ranks::Ranks;
+use contact_dynamics::faer::sparse::{Pair, SymbolicSparseColMat};
+use contact_dynamics::ranks::{Ranks, parts};
 use contact_dynamics::{
     CentralDifference, Cholesky, ChungLee, Composite, Error, LinearRows, LinearSystem, Result, Simulation,
     SimulationBuilder,
@@ -153,4 +154,22 @@ fn dofs_without_mass_and_unknown_frequencies() {
         Simulation::builder(Bare::force_alone(linear_part(part, false), dofs), CentralDifference, 1e-5)
     });
     refused!(unknown, Error::Incompatible { .. }, "highest_frequency");
+}
+
+#[test]
+fn patterns_that_cannot_be_cut() {
+    let pattern = |rows: usize, columns: usize, pairs: &[(usize, usize)]| {
+        let pairs: Vec<_> = pairs.iter().map(|&(row, col)| Pair { row, col }).collect();
+        SymbolicSparseColMat::<usize>::try_new_from_indices(rows, columns, &pairs).unwrap().0
+    };
+    let chain = pattern(3, 3, &[(0, 1), (1, 0), (1, 2), (2, 1)]);
+    assert!(matches!(parts(chain.as_ref(), 0), Err(Error::Parameter { .. })));
+    let flat = pattern(2, 3, &[(0, 1)]);
+    assert!(matches!(parts(flat.as_ref(), 2), Err(Error::Dimension { expected: 2, found: 3, .. })));
+    let triangle = pattern(3, 3, &[(0, 0), (1, 0), (1, 1), (2, 2)]);
+    assert!(matches!(parts(triangle.as_ref(), 2), Err(Error::Incompatible { .. })));
+    // More parts than rows: some are empty. No rows: no parts.
+    assert_eq!(parts(chain.as_ref(), 5).unwrap().len(), 3);
+    assert!(parts(chain.as_ref(), 5).unwrap().iter().all(|&part| part < 5));
+    assert!(parts(pattern(0, 0, &[]).as_ref(), 2).unwrap().is_empty());
 }

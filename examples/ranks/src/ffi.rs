@@ -1,7 +1,8 @@
 //! All that is unsafe here and in the modules below: calls of the C side, each behind a safe function.
 //!
-//! MPI is initialized with `MPI_THREAD_FUNNELED`: only the thread that has initialized it may call it, and every function
-//! asserts that. So handles may be moved and shared between threads: nothing but a panic comes of their use elsewhere.
+//! MPI is initialized with `MPI_THREAD_FUNNELED`: only the thread that has initialized it may call it, and every
+//! function asserts that. So handles may be moved and shared between threads: nothing but a panic comes of their use
+//! elsewhere.
 #![allow(unsafe_code)]
 // (A `World` is the proof that MPI has been initialized.)
 #![allow(clippy::unused_self)]

@@ -3,9 +3,9 @@
 //!
 //! The body is a cube of n dofs of which a tenth of the nodes of one face presses, k = ⅒ (n/3)^⅔ rows. Its factor has
 //! c n^{4/3} entries (nested dissection in space: George 1973). A step reads them twice; the reads are spread over the
-//! ranks but for the largest separator, n^⅔ dofs, whose triangle is swept by one rank after the other. Messages go up and
-//! down a tree of the ranks. Contact is replicated: W is k² numbers on every rank, formed and factorized anew as often
-//! as rows join or leave, by blocks of rows.
+//! ranks but for the largest separator, n^⅔ dofs, whose triangle is swept by one rank after the other. Messages go up
+//! and down a tree of the ranks. Contact is replicated: W is k² numbers on every rank, formed and factorized anew as
+//! often as rows join or leave, by blocks of rows.
 
 use crate::bodies::{Blocks, Scene};
 use crate::engine::Engine;

@@ -1,5 +1,5 @@
-//! Checkpoints: `ranks save <folder>` writes one file a rank in the middle of a run, `ranks resume <folder>` reads them,
-//! over any number of ranks, goes on, and compares with a run in one piece that never stopped.
+//! Checkpoints: `ranks save <folder>` writes one file a rank in the middle of a run, `ranks resume <folder>` reads
+//! them, over any number of ranks, goes on, and compares with a run in one piece that never stopped.
 
 use crate::bodies::{Blocks, Scene};
 use crate::compare::{difference, end, run_alone};

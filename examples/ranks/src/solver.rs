@@ -1,6 +1,6 @@
 //! MUMPS as the linear solver of a run: the matrix on rank 0 or on all ranks, with the Schur complement of the contact
-//! dofs or without. Where the matrix is on all ranks so are right-hand sides and solutions: what passes through rank 0 is
-//! the interface alone.
+//! dofs or without. Where the matrix is on all ranks so are right-hand sides and solutions: what passes through rank 0
+//! is the interface alone.
 
 use crate::faults::Fault;
 use crate::ffi::{Counts, Failed, Input, Mumps};

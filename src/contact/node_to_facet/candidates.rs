@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> NodeToFacet<T> {
-    /// Finds the boxes of all facets, and makes lists of facets valid for the positions now, and for feet as far away as `range`.
+    /// Finds the boxes of all facets, and makes lists of facets valid for the positions now, and for feet as far away
+    /// as `range`.
     pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
         let positions = &self.nodes.positions;
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
@@ -24,8 +25,8 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass at t, in the order of its nodes: of those near enough in the box given, which the other body
-    /// makes with its velocities in theirs within the time `ahead`.
+    /// The rows of one pass at t, in the order of its nodes: of those near enough in the box given, which the other
+    /// body makes with its velocities in theirs within the time `ahead`.
     pub(super) fn find_rows(
         &mut self,
         pass: usize,

@@ -9,8 +9,8 @@ use super::search::Neighborhood;
 use super::shape::{Point, add_scaled, dot};
 use super::{Base, Facet, Surface};
 
-/// Greatest cosine between the normals of two facets of a body such that a ray into the one may leave by the other, once
-/// the body has bent.
+/// Greatest cosine between the normals of two facets of a body such that a ray into the one may leave by the other,
+/// once the body has bent.
 const LEAVING: f64 = 0.5;
 
 /// The same of facets that tell how thick the material is: by sides across a right angle a ray leaves only if the body

@@ -231,8 +231,8 @@ impl Base {
         }
     }
 
-    /// The product of the tangents where the shape functions are `weights` (of a segment with the unit vector out of the
-    /// plane), and the derivative of its part along n, the facet's area for its coordinates, by the corners.
+    /// The product of the tangents where the shape functions are `weights` (of a segment with the unit vector out of
+    /// the plane), and the derivative of its part along n, the facet's area for its coordinates, by the corners.
     pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
         let tangents = self.tangents(weights);
         (cross(tangents[0], tangents[1]), self.turned_by(tangents, weights, self.normal))

@@ -116,8 +116,8 @@ impl Shape {
         self.project(p, rim).is_some_and(|foot| foot.location == Location::Inside)
     }
 
-    /// How far along a ray from x the facet is, if the ray goes through it from the back to the front; a quadrilateral is
-    /// taken as two triangles.
+    /// How far along a ray from x the facet is, if the ray goes through it from the back to the front; a quadrilateral
+    /// is taken as two triangles.
     pub(crate) fn left_by(&self, x: Point, direction: Point) -> Option<f64> {
         let [a, b, c, d] = self.corners;
         let halves = match self.count {
@@ -186,8 +186,8 @@ impl Shape {
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
     }
 
-    /// Whether all normals of the facet, going on beyond its sides for a share of itself, are surely within the angle of
-    /// this sine of a unit vector.
+    /// Whether all normals of the facet, going on beyond its sides for a share of itself, are surely within the angle
+    /// of this sine of a unit vector.
     pub(crate) fn is_turned_less(&self, vector: Point, sine: f64, beyond: f64) -> bool {
         let is_within = |product: Point| {
             let turned = cross(vector, product);

@@ -1,4 +1,5 @@
-//! How the closest point of a facet slides as the node and the facet move: what a varying offset adds to rows and rates.
+//! How the closest point of a facet slides as the node and the facet move: what a varying offset adds to rows and
+//! rates.
 
 use super::projection::{Ground, Stand};
 use super::shape::{Location, Point, Shape, add_scaled, dot};

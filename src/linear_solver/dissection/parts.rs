@@ -103,8 +103,8 @@ mod tests {
         }
     }
 
-    /// A chain in p parts has p − 1 edges between them at least, and two for each piece that lies apart from the rest of
-    /// its part: of those along one path of the tree, at most.
+    /// A chain in p parts has p − 1 edges between them at least, and two for each piece that lies apart from the rest
+    /// of its part: of those along one path of the tree, at most.
     #[test]
     fn few_edges_join_parts() {
         for count in [2, 3, 7] {

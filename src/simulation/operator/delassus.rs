@@ -1,5 +1,5 @@
-//! The Delassus operator of the rows that press. Where rows join or leave, what the others do to each other stays: these
-//! entries are moved and not formed again, and are the same to the bit.
+//! The Delassus operator of the rows that press. Where rows join or leave, what the others do to each other stays:
+//! these entries are moved and not formed again, and are the same to the bit.
 
 use crate::contact_solver::FORESEEN;
 use crate::error::Result;

@@ -1,5 +1,5 @@
-//! Bars that collide or bounce and a disc that falls, run by a combination, and what is measured of them over the phases
-//! of the impact within a step.
+//! Bars that collide or bounce and a disc that falls, run by a combination, and what is measured of them over the
+//! phases of the impact within a step.
 
 use crate::Bars;
 use crate::combinations::Combination;

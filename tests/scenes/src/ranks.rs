@@ -1,4 +1,5 @@
-//! Ranks as threads that speak through shared memory, a body cut into the parts of ranks, and a linear solver over them.
+//! Ranks as threads that speak through shared memory, a body cut into the parts of ranks, and a linear solver over
+//! them.
 
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::Solid;

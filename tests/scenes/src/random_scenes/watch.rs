@@ -9,7 +9,8 @@ use contact_dynamics::{Error, History, Real, Simulation, State};
 /// Gaps are met within so many roots of the rounding, of the sizes of their terms.
 const ROUNDING: f64 = 10.0;
 
-/// Momentum is conserved up to this share of the largest Σ m (|v| + |u|/h + h |a|): steps of a thousand periods magnify rounding.
+/// Momentum is conserved up to this share of the largest Σ m (|v| + |u|/h + h |a|): steps of a thousand periods magnify
+/// rounding.
 const MOMENTUM: f64 = 1e-6;
 
 /// Explicit runs on springs alone may gain by impacts that last two steps, but do not grow beyond this.
@@ -26,7 +27,8 @@ pub(super) struct Watch<'a> {
     conserves: bool,
     start: f64,
     momentum: Vec<f64>,
-    /// The largest of each so far: force, the sum of the sizes of momenta by dof (and of m u/h and m h a), and u, h v and h² a of each dof.
+    /// The largest of each so far: force, the sum of the sizes of momenta by dof (and of m u/h and m h a), and u, h v
+    /// and h² a of each dof.
     force: f64,
     size: f64,
     ways: Vec<f64>,
