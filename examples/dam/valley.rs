@@ -54,7 +54,7 @@ impl Plan {
         friction: 0.0,
     };
     pub(crate) const FULL: Self = Self {
-        cells: [2, 7, 20],
+        cells: [2, 4, 11],
         step: 0.0125,
         steps: 240,
         reduced: &[(Tapered, 100), (Untapered, 100), (CraigBampton, 30)],
