@@ -444,8 +444,12 @@ impl<'a> Sides<'a> {
     fn pair(&self, [first, second]: [usize; 2]) -> Pair<'a> {
         let (edges, surfaces) = ([&self.edges[0][first], &self.edges[1][second]], self.surfaces.each_ref());
         let depth = self.kin.map_or(f64::INFINITY, |kin| {
-            let nodes = edges.iter().flat_map(|edge| edge.nodes);
-            nodes.map(|node| kin.depth(surfaces[0].place(node))).fold(f64::INFINITY, f64::min)
+            let toward = |[one, other]: [&Edge; 2]| {
+                let [facet, _] = other.facets();
+                one.nodes.map(|node| kin.depth(surfaces[0].place(node), facet))
+            };
+            let depths = [edges, [edges[1], edges[0]]].into_iter().flat_map(toward);
+            depths.fold(f64::INFINITY, f64::min)
         });
         Pair { edges, surfaces, offsets: self.offsets, depth }
     }

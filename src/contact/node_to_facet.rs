@@ -140,8 +140,6 @@ pub struct NodeToFacet<T: Real> {
     thickness: Thickness,
     reach: Reach,
     rebuilds: usize,
-    /// The node that a node of the first pass stands on exactly, where that one may stand on it.
-    partners: Vec<Option<usize>>,
     rows: Rows<T>,
     /// What the search under way finds.
     found: Rows<T>,
@@ -254,7 +252,6 @@ impl<T: Real> NodeToFacet<T> {
             friction: 0.0,
             thickness: Thickness::default(),
             rebuilds: 0,
-            partners: Vec::new(),
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
         }
@@ -263,12 +260,14 @@ impl<T: Real> NodeToFacet<T> {
     /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. For bodies that
     /// fold, and for several bodies whose surfaces are given as one.
     ///
-    /// Of the facets a node does not meet those within one [ring](Self::rings), those that do not face it (normals
-    /// within 102° of each other), and those behind it by more than half of the material there: how thick that is is
-    /// found in the reference configuration, as far as the [`reach`](Self::reach). So nothing may be inside of itself
-    /// there. Of two nodes that stand on each other the one with the smaller number has a row. A search reaches as far
-    /// as any two nodes of the surface move against each other within the step: a body that spins fast looks farther
-    /// than it must.
+    /// Of the facets of its own body a node does not meet those within one [ring](Self::rings), and those behind it by
+    /// more than half of the material there: how thick that is is found in the reference configuration, as far as the
+    /// [`reach`](Self::reach). So nothing may be inside of itself there. Nor does it meet those that do not face it:
+    /// normals within 60° of each other, as of two surfaces; of facets beside it in the reference configuration, by two
+    /// reaches or two facets, within 102°, but where the node is in front of them. Facets that share no node with its
+    /// body, nor with one another through others, are another body. Of two nodes that stand on each other the sharper
+    /// one has a row, or else that with the smaller number. A search reaches as far as any two nodes of the surface
+    /// move against each other within the step: a body that spins fast looks farther than it must.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -476,8 +475,6 @@ impl<T: Real> NodeToFacet<T> {
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        let meet = self.passes.len() > 1 || self.kin.is_some();
-        self.partners = vec![None; if meet { self.nodes.coordinates.len() } else { 0 }];
         self.reach.forget();
         Ok(())
     }
@@ -552,9 +549,8 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         }
         if boxes[0].inflated(wide).intersects(&boxes[1]) {
             self.update_lists(&motions, range);
-            self.partners.fill(None);
             for pass in 0..self.passes.len() {
-                self.find_rows(pass, (&boxes[1 - pass].inflated(wide), &speeds[1 - pass]), (t, u, v), ahead);
+                self.find_rows(pass, &boxes[1 - pass].inflated(wide), (t, u, v), (&speeds, ahead));
             }
         }
         let (rows, found) = (&self.rows, &self.found);

@@ -406,6 +406,23 @@ impl Surface {
         unit(sum)
     }
 
+    /// How steeply the sides around a node rise above the plane across its mean normal: the mean of the sines, below
+    /// zero at a convex corner, above in a dent.
+    pub(crate) fn rise(&self, node: usize, positions: &[Point]) -> f64 {
+        let Some(normal) = self.node_normal(node, positions) else { return 0.0 };
+        let at = positions[node];
+        let mut mean = (0.0, 0.0);
+        for (facet, k) in self.corners_around(node) {
+            let nodes = self.facets[facet].nodes();
+            for next in [(k + 1) % nodes.len(), (k + nodes.len() - 1) % nodes.len()] {
+                if let Some(along) = unit(sub(positions[nodes[next]], at)) {
+                    mean = (mean.0 + dot(normal, along), mean.1 + 1.0);
+                }
+            }
+        }
+        if mean.1 > 0.0 { mean.0 / mean.1 } else { 0.0 }
+    }
+
     /// The side or vertex that a point of a facet lies on, up to `share` of the facet.
     fn near(&self, facet: usize, shape: &Shape, foot: &Foot, share: f64) -> Location {
         let (count, rim) = (self.facets[facet].nodes().len(), &self.rims[facet]);

@@ -127,6 +127,15 @@ impl<T: Real> ConeNewton<T> {
         }
         if solved {
             multipliers.copy_from_slice(&tried);
+            // What is held without a force may be pulled by rounding: it is open then, if that does as well.
+            for (rows, set) in problem.blocks() {
+                if set.friction().is_some() && !set.is_bilateral() && tried[rows.start] < T::zero() {
+                    tried[rows].fill(T::zero());
+                }
+            }
+            if acceptance.accepts(problem, &tried) {
+                multipliers.copy_from_slice(&tried);
+            }
         }
         self.tried = tried;
         solved

@@ -237,10 +237,14 @@ impl<T: Real> Rubbing<T> {
         /// Passes, each of which takes over half of what the last one has found. What is left then is accepted: the
         /// friction that is reported is in its cone, and the jump that it leaves is one of accelerations.
         const PASSES: usize = 60;
+        /// Growth of what a pass changes at which passes diverge, as they may where rows are nearly the same and what
+        /// the one is pulled by the other presses: what slides is then given no friction.
+        const DIVERGES: f64 = 1e2;
         let half = T::of(0.5);
         for &position in positions {
             self.totals[position] = T::zero();
         }
+        let (mut least, mut diverges) = (T::infinity(), false);
         for _ in 0..PASSES {
             group.pose(self, positions, Friction::Lags);
             group.solve(solver, Friction::Lags)?;
@@ -260,6 +264,23 @@ impl<T: Real> Rubbing<T> {
             if change <= T::of(1e-12).max(T::of(8.0) * T::epsilon()) * largest {
                 break;
             }
+            least = least.min(change);
+            diverges = !(change <= T::of(DIVERGES) * least);
+            if diverges {
+                break;
+            }
+        }
+        if diverges {
+            for &position in positions {
+                self.totals[position] = T::zero();
+            }
+            group.pose(self, positions, Friction::Lags);
+            group.solve(solver, Friction::Lags)?;
+            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
+                self.totals[positions[at]] = multiplier;
+            }
+            self.measure(positions, group);
+            return Ok(());
         }
         for &at in &group.unknowns {
             let (position, block) = (positions[at], &self.blocks[self.owners[positions[at]]]);

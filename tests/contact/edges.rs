@@ -541,6 +541,12 @@ fn corners_in_the_dents_that_they_make_gain_no_energy() {
 }
 
 #[test]
+fn corners_of_one_surface_keep_their_rows() {
+    // The node under a corner had the row of both, slid off the corner, and let it in: 1.05 and 1.10, 0.2 elements.
+    check_falls(Landing::Corner, Keeps::Itself, 77, &[9, 13], 4.0);
+}
+
+#[test]
 fn edges_that_end_on_edges_gain_no_energy() {
     // Rows of edges and of nodes that are nearly the same saw pasts that contradict each other: 1.02 and 1.29.
     check_falls(Landing::Across, Keeps::TwoPassesAndEdges, 77, &[7], 3.8);

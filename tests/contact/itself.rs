@@ -163,6 +163,35 @@ fn a_hairpin_that_snaps_shut_gains_no_energy() {
 }
 
 #[test]
+fn a_sheet_that_snaps_shut_is_kept_out_of_itself() {
+    // Its sides bulge where it folds, so that nodes of one side are in front of the flank that the other side ends at:
+    // through the whole sheet, and not outside. With elements wider than the slot its creases face each other flatly.
+    for wide in [1, 2] {
+        let sheet = Folding::sheet(wide, 0.2, 3.0);
+        let system = Hyperelastic::new(&sheet.solid, Law::NeoHookean);
+        let figures = sheet.run(system, sheet.of_itself().unwrap(), EnergyMomentum, (5e-3, 0.15)).unwrap();
+        assert!(figures.pressed > 3 && figures.refused < 5, "{wide}: {figures:?}");
+        assert!(figures.highest < 1.0 + 1e-9 && figures.depth < 0.05 * 0.2, "{wide}: {figures:?}");
+    }
+}
+
+#[test]
+fn a_corner_on_a_node_has_the_row_of_both() {
+    // A cube that stands on its corner, turned a little, just above a node of the block below: whichever comes first
+    // among the nodes, the corner has the row, on the facets below, and the node under it has none.
+    let block = Solid::block([3.0, 3.0, 1.0], [3, 3, 1], MATERIAL).moved([-1.0, -1.0, -1.0]);
+    let cube = Solid::block([1.0; 3], [1; 3], MATERIAL)
+        .rotated([1.0, -1.0, 0.0], (1.0 / 3.0_f64.sqrt()).acos())
+        .rotated([0.0, 0.0, 1.0], 0.3)
+        .moved([0.0, 0.0, 1e-3]);
+    for pair in [block.clone().with(cube.clone()), cube.with(block)] {
+        let found = rows(of_itself(&pair).reach(0.1).unwrap());
+        let [(node, gap)] = found[..] else { panic!("{found:?}") };
+        assert!((pair.nodes[node][2] - 1e-3).abs() < 1e-12 && (gap - 1e-3).abs() < 1e-12, "{found:?}");
+    }
+}
+
+#[test]
 fn columns_in_space_meet_and_units_do_not_matter() {
     // Two columns on a plate, 0.3 apart, thrown at each other.
     let column = |from: f64| Solid::block([1.0, 1.0, 2.0], [2, 2, 4], MATERIAL).moved([from, 0.0, 0.0]);

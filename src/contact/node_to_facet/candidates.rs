@@ -30,50 +30,56 @@ impl<T: Real> NodeToFacet<T> {
     pub(super) fn find_rows(
         &mut self,
         pass: usize,
-        (near, speeds): (&Bounds, &Bounds),
+        near: &Bounds,
         (t, u, v): (f64, &[T], &[T]),
-        ahead: f64,
+        (speeds, ahead): (&[Bounds; 2], f64),
     ) {
         let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
-        self.find_rows_and(pass, (near, speeds), (t, u, v), ahead, &mut clearance);
+        self.find_rows_and(pass, near, (t, u, v), (speeds, ahead), &mut clearance);
         self.passes[pass].clearance = clearance;
     }
 
     fn find_rows_and(
         &mut self,
         pass: usize,
-        (near, speeds): (&Bounds, &Bounds),
+        near: &Bounds,
         (t, u, v): (f64, &[T], &[T]),
-        ahead: f64,
+        (speeds, ahead): (&[Bounds; 2], f64),
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, partners, found, .. } = self;
+        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, found, .. } = self;
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
         let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
         let [_, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
-        let Some(ground) = ground(pass, passes, surfaces, places, Self::rounding()) else { return };
-        let ground = Ground { boxes: Some(&passes[pass].boxes), ..ground };
+        let ground_of = |pass: usize| {
+            let ground = ground(pass, passes, surfaces, places, Self::rounding())?;
+            Some(Ground { boxes: Some(&passes[pass].boxes), ..ground })
+        };
+        let Some(ground) = ground_of(pass) else { return };
+        // What the facets' nodes stand on, if they are looked at: of two surfaces that is the other pass.
+        let back = if kin.is_some() { Some((pass, ground)) } else { Some(1 - pass).zip(ground_of(1 - pass)) };
+        let back = back.filter(|_| kin.is_some() || passes.len() > 1);
+        let way_of = |pass: usize, node: usize| {
+            growth + ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(&speeds[1 - pass])
+        };
         for (place, (&node, clearance)) in ground.nodes.iter().zip(clearance).enumerate() {
             if !near.contains(positions[node]) {
                 continue;
             }
-            let way = growth + ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(speeds);
+            let way = way_of(pass, node);
             let (distance, stand) = ground.clearance(place, reach.least() + way);
             *clearance = distance;
             let Some(stand) = stand.map(|stand| ground.first_side(stand, way)) else { continue };
-            let vertices = ground.surface.facets()[stand.facet].nodes();
-            if !partners.is_empty() {
-                let on = vertices.iter().zip(&stand.weights).find(|(_, weight)| **weight >= 1.0 - Self::rounding());
-                let on = on.map(|(&vertex, _)| vertex);
-                let first = on.filter(|&vertex| partners[vertex] == Some(node));
-                match pass {
-                    // (Of a surface against itself.)
-                    0 if first.is_some_and(|vertex| vertex < node) => continue,
-                    0 => partners[node] = on,
-                    _ if first.is_some() => continue,
-                    _ => {}
-                }
+            let face_each_other = ground.vertex(&stand).zip(back).is_some_and(|(vertex, (pass, back))| {
+                let way = way_of(pass, vertex);
+                let place = back.nodes.binary_search(&vertex).ok();
+                let other = place.and_then(|place| back.closest(place, reach.least() + way, None));
+                let other = other.map(|other| back.first_side(other, way));
+                other.and_then(|other| back.vertex(&other)) == Some(node)
+            });
+            if face_each_other && ground.is_second(&stand, pass) {
+                continue;
             }
             let mut beside = ground.beside(&stand, way).peekable();
             let first = if beside.peek().is_some() { ground.first_in_dent(stand) } else { stand };
@@ -162,7 +168,7 @@ fn ground<'a>(
     (positions, offsets): (&'a [Point], Offsets<'a>),
     rounding: f64,
 ) -> Option<Ground<'a>> {
-    let Pass { nodes, neighborhood, .. } = &passes[pass];
+    let Pass { nodes, neighborhood, .. } = passes.get(pass)?;
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
     let neighborhood = Some(neighborhood);
     Some(Ground { nodes, neighborhood, surface, boxes: None, own, kin, positions, offsets, rounding })

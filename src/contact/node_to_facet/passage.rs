@@ -165,24 +165,24 @@ impl Crossing<'_> {
         let own_normal = start.own_normal(place);
         let ends = [start.positions[node], end.positions[node]];
         let whole = Bounds::of_points(ends);
-        let goes_through = |facet: &Facet, corners: [[Point; 4]; 2]| {
+        let goes_through = |facet: usize, corners: [[Point; 4]; 2]| {
             let swept = Bounds::of_points(corners.iter().flatten().copied());
             if !whole.intersects(&swept) {
                 return false;
             }
-            let triangles: &[[usize; 3]] = match facet.nodes().len() {
+            let triangles: &[[usize; 3]] = match self.facet(facet).nodes().len() {
                 4 => &[[0, 1, 2], [0, 2, 3]],
                 _ => &[[0, 1, 2]],
             };
-            let segment = facet.nodes().len() == 2;
+            let segment = self.facet(facet).nodes().len() == 2;
             triangles.iter().any(|triangle| {
                 let corners = corners.map(|corners| triangle.map(|k| corners[k]));
-                pierces(ends, corners, segment, length, |normal| start.meets(normal, own_normal))
+                pierces(ends, corners, segment, length, |normal| start.meets((self.place, facet), normal, own_normal))
             })
         };
         start.near(place).any(|index| {
             let mut layers = start.layers(place, index).zip(end.layers(place, index));
-            layers.any(|(from, to)| goes_through(self.facet(index), [from, to]))
+            layers.any(|(from, to)| goes_through(index, [from, to]))
         })
     }
 }

@@ -40,7 +40,8 @@ impl Ground<'_> {
                     }
                     let beside = self.on_plane(stand.place, facet, beyond)?;
                     let is_dent = self.is_dent((stand, normal), &shape, &beside, &other, positions[vertex]);
-                    (is_dent && self.meets(beside.normal, self.own_normal(stand.place))).then_some(beside)
+                    let is_met = || self.meets((stand.place, facet), beside.normal, self.own_normal(stand.place));
+                    (is_dent && is_met()).then_some(beside)
                 },
             )
         })

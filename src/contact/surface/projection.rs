@@ -4,7 +4,7 @@ use super::Surface;
 use super::kin::{FACING, Kin};
 use super::offsets::Offsets;
 use super::search::{Bounds, Neighborhood, overhang};
-use super::shape::{Foot, Location, Point, Shape, add_scaled, dot};
+use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
 use std::cell::OnceCell;
 
 /// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
@@ -14,7 +14,7 @@ const SAME_SIDE: f64 = 0.5;
 /// The same for the facet that a node stands on already, within a step.
 const SAME_SIDE_OF_LAST: f64 = 0.75;
 
-/// The same for a facet of its own surface.
+/// The same for a facet beside it on its own body.
 const FACING_OF_LAST: f64 = 0.25;
 
 /// How far, in shares of the facet, the surface goes on beyond its rim for a node that leaves it within a step.
@@ -95,22 +95,29 @@ impl Ground<'_> {
     }
 
     /// Whether a node with this normal, if it has one, meets the front of a facet with that one.
-    pub(crate) fn meets(&self, normal: Point, own_normal: Option<Point>) -> bool {
-        own_normal.is_none_or(|own| dot(own, normal) <= self.limit())
+    pub(crate) fn meets(&self, (place, facet): (usize, usize), normal: Point, own_normal: Option<Point>) -> bool {
+        own_normal.is_none_or(|own| dot(own, normal) <= self.limit(place, facet))
     }
 
     /// The cosine between the normals of a node and of a facet up to which they meet.
-    fn limit(&self) -> f64 {
-        if self.kin.is_some() { FACING } else { SAME_SIDE }
+    fn limit(&self, place: usize, facet: usize) -> f64 {
+        if self.is_kin(place, facet) { FACING } else { SAME_SIDE }
     }
 
-    /// Whether a facet is behind a node of its own surface by more than there can be of it inside. (By the normal that
-    /// the gap would have: on a side or a vertex a node may be in front of the one facet and behind the other.)
-    fn is_beyond(&self, place: usize, facet: usize, projected: &(Shape, Foot)) -> bool {
+    /// Whether a facet is beside a node on its own body.
+    fn is_kin(&self, place: usize, facet: usize) -> bool {
+        self.kin.is_some_and(|kin| kin.is_beside(place, facet))
+    }
+
+    /// Whether a facet is behind a node of its own body by more than there can be of it inside. (By the normal that the
+    /// gap would have: on a side or a vertex a node may be in front of the one facet and behind the other. Where it
+    /// looks along that normal itself there is its own body on the way, whose flanks bulge.)
+    fn is_beyond(&self, place: usize, facet: usize, projected: &(Shape, Foot), own_normal: Option<Point>) -> bool {
         self.kin.is_some_and(|kin| {
             let p = self.positions[self.nodes[place]];
             let direction = || self.direction(place, facet, p, projected);
-            projected.1.distance > kin.depth(place) && direction().is_some_and(|(_, gap)| gap < 0.0)
+            let is_behind = |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal);
+            projected.1.distance > kin.depth(place, facet) && direction().is_some_and(is_behind)
         })
     }
 
@@ -174,7 +181,11 @@ impl Ground<'_> {
             if depth > reach || best.is_some_and(|best| !is_better(&best)) {
                 continue;
             }
-            if faces(&projected, own_normal, self.limit()) && !self.is_beyond(place, facet, &projected) {
+            let is_met = || {
+                faces(&projected, own_normal, self.limit(place, facet))
+                    || faces(&projected, own_normal, SAME_SIDE) && is_over(&projected, p)
+            };
+            if is_met() && !self.is_beyond(place, facet, &projected, own_normal) {
                 best = Some((facet, projected, depth));
             }
         }
@@ -186,7 +197,7 @@ impl Ground<'_> {
     pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
-        let limit = if self.kin.is_some() { FACING_OF_LAST } else { SAME_SIDE_OF_LAST };
+        let limit = if self.is_kin(place, facet) { FACING_OF_LAST } else { SAME_SIDE_OF_LAST };
         let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), limit);
         stays.then(|| self.on(place, facet, &projected)).flatten()
     }
@@ -195,11 +206,30 @@ impl Ground<'_> {
         self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
     }
 
+    /// The vertex that a stand is on, if it is on one.
+    pub(crate) fn vertex(&self, stand: &Stand) -> Option<usize> {
+        let mut vertices = self.surface.facets()[stand.facet].nodes().iter().zip(&stand.weights);
+        vertices.find(|(_, weight)| **weight >= 1.0 - self.rounding).map(|(&vertex, _)| vertex)
+    }
+
+    /// Whether a node that stands on a vertex, which stands on the node, leaves the row to that: the sharper one of both
+    /// keeps it, which may have rows in a dent too, or else the first one. (What stands on a sharp corner slides off.)
+    pub(crate) fn is_second(&self, stand: &Stand, pass: usize) -> bool {
+        /// Sine below which a difference is rounding.
+        const ROUNDING: f64 = 1e-6;
+        let Some(vertex) = self.vertex(stand) else { return false };
+        let node = self.nodes[stand.place];
+        let own = self.own.map_or(0.0, |own| own.rise(node, self.positions));
+        let steeper = own - self.surface.rise(vertex, self.positions);
+        let comes_later = if self.kin.is_some() { vertex < node } else { pass > 0 };
+        steeper > ROUNDING || (steeper >= -ROUNDING && comes_later)
+    }
+
     /// The normal along which a node at p stands on a facet, and its distance along it.
     fn direction(&self, place: usize, facet: usize, p: Point, projected: &(Shape, Foot)) -> Option<(Point, f64)> {
         // (Asked for by the facets around a vertex or a side that the node touches only, by each of them.)
         let own = OnceCell::new();
-        let meets = |normal: Point| self.meets(normal, *own.get_or_init(|| self.own_normal(place)));
+        let meets = |normal: Point| self.meets((place, facet), normal, *own.get_or_init(|| self.own_normal(place)));
         self.surface.direction(facet, p, projected, (self.rounding, &meets), self.positions)
     }
 
@@ -233,6 +263,16 @@ impl Ground<'_> {
 fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f64) -> bool {
     let same = |normal: Point| shape.normal(&foot.weights).is_none_or(|facet| dot(facet, normal) > same_side);
     own_normal.is_none_or(|normal| !same(normal))
+}
+
+/// Whether a point is in front of the inside of a facet, or no deeper than it is pressed: then it is met from there,
+/// beside the own body as well.
+fn is_over((shape, foot): &(Shape, Foot), p: Point) -> bool {
+    /// Depth in shares of the facet.
+    const PRESSED: f64 = 0.05;
+    let height = |normal: Point| dot(normal, sub(p, foot.point));
+    foot.location == Location::Inside
+        && shape.normal(&foot.weights).is_some_and(|normal| height(normal) > -PRESSED * shape.size())
 }
 
 impl Stand {

@@ -87,6 +87,21 @@ pub(crate) struct Neighborhood {
 }
 
 impl Neighborhood {
+    /// Of lists in ascending order.
+    pub(crate) fn of_lists(lists: impl Iterator<Item = Vec<usize>>) -> Self {
+        let mut all = Self { starts: vec![0], facets: Vec::new() };
+        for list in lists {
+            all.facets.extend(list);
+            all.starts.push(all.facets.len());
+        }
+        all
+    }
+
+    /// Whether a facet is in the list of the k-th box.
+    pub(crate) fn holds(&self, k: usize, facet: usize) -> bool {
+        self.of(k).binary_search(&facet).is_ok()
+    }
+
     /// Facets to look at for the k-th box, in ascending order: the result does not depend on the age of the list.
     pub(crate) fn of(&self, k: usize) -> &[usize] {
         match self.starts.get(k..k + 2) {
