@@ -212,8 +212,8 @@ impl Ground<'_> {
         vertices.find(|(_, weight)| **weight >= 1.0 - self.rounding).map(|(&vertex, _)| vertex)
     }
 
-    /// Whether a node that stands on a vertex, which stands on the node, leaves the row to that: the sharper one of both
-    /// keeps it, which may have rows in a dent too, or else the first one. (What stands on a sharp corner slides off.)
+    /// Whether a node that stands on a vertex, which stands on the node, leaves the row to that: the sharper one of
+    /// both keeps it, which may have rows in a dent too, or else the first one. (What stands on a corner slides off.)
     pub(crate) fn is_second(&self, stand: &Stand, pass: usize) -> bool {
         /// Sine below which a difference is rounding.
         const ROUNDING: f64 = 1e-6;
