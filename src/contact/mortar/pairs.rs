@@ -25,7 +25,8 @@ impl Pairs {
     }
 
     /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// do not belong to facets behind sharp edges, and are no far sides of both bodies. (The result does not depend on the age of the lists.)
+    /// do not belong to facets behind sharp edges, and are no far sides of both bodies. (The result does not depend on
+    /// the age of the lists.)
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
