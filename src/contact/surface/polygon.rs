@@ -60,7 +60,7 @@ impl Polygon {
     /// (A rule on the triangles from there changes with the polygon as smoothly as this does: where two corners come
     /// out of one, a triangle without area is added. Listed as they are found, another corner would be the first, and
     /// what the rule lacks another: rows would not find rest.)
-    fn from_apex(&self) -> Self {
+    fn turned_to_apex(&self) -> Self {
         let height = |corner: &[f64; 2]| APEX[0] * corner[0] + APEX[1] * corner[1];
         let corners = self.corners();
         let farthest = (0..corners.len()).max_by(|&i, &j| height(&corners[i]).total_cmp(&height(&corners[j])));
@@ -71,7 +71,7 @@ impl Polygon {
 
     /// Calls `act` with weights and points of a rule on triangles that make up the polygon.
     pub(super) fn each_point(&self, rule: Rule, act: &mut impl FnMut(f64, [f64; 2])) {
-        let turned = self.from_apex();
+        let turned = self.turned_to_apex();
         let [first, rest @ ..] = turned.corners() else { return };
         for pair in rest.windows(2) {
             let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
@@ -140,7 +140,9 @@ mod tests {
 
     fn polygon(corners: &[[f64; 2]]) -> Polygon {
         let mut polygon = Polygon::default();
-        corners.iter().for_each(|&corner| polygon.push(corner));
+        for &corner in corners {
+            polygon.push(corner);
+        }
         polygon
     }
 
