@@ -1,7 +1,7 @@
 //! Ironing: a round stamp is pressed into a block and drawn along it, slowly. The forces of a continuum are constant.
 
 use contact_dynamics::contact::ContactConstraint;
-use contact_dynamics::{InitialOverclosure, Newmark, Simulation};
+use contact_dynamics::{Newmark, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
 use std::error::Error;
@@ -89,10 +89,7 @@ fn run(scene: &Stack<2>, contact: Box<dyn ContactConstraint<f64>>) -> Result<[f6
         }
     }
     // A scheme that damps all waves: forces of a slow motion.
-    // (A dual gap over a curved master may be below zero where nothing touches: it is taken off.)
-    let overclosure = InitialOverclosure::RemovedOver(0.5 * SETTLED);
-    let builder = Simulation::builder(system, Newmark::new(0.5, 1.0)?, 0.25).initial_overclosure(overclosure);
-    let mut run = builder.constraint(contact).build()?;
+    let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0)?, 0.25).constraint(contact).build()?;
     let (mut smallest, mut largest, mut sum, mut across, mut count) = (f64::INFINITY, 0.0_f64, 0.0, 0.0_f64, 0.0);
     while run.time() < END {
         run.step()?;
