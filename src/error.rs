@@ -413,7 +413,7 @@ pub enum Error {
     /// The initial state violates a contact constraint.
     #[error(
         "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is \
-         not negative (zero for an equality row)"
+         not negative (zero for an equality row), or say by `initial_overclosure` what becomes of it"
     )]
     InitialViolation {
         /// The contact.

@@ -1,4 +1,4 @@
-//! Patch tests on curved surfaces: rings around each other, against Lamé's closed form.
+//! Patch tests on curved surfaces: rings and balls around each other, against Lamé's closed form.
 
 use contact_dynamics_scenes::curved_patch::{CurvedPatch, PatchErrors};
 use contact_dynamics_scenes::second_order::Family;
@@ -31,9 +31,26 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     ];
     for (name, family) in families {
         let meshes: &[[usize; 2]] = if quick { &[[4, 5]] } else { &[[4, 5], [8, 10], [16, 20], [32, 40]] };
-        rows(&mut table, name, meshes, |mesh, contact| pressed(&CurvedPatch::rings(mesh, family), contact))?;
+        let pressed = |mesh, contact| pressed(&CurvedPatch::rings(mesh, family), contact);
+        rows(&mut table, (name, &CONTACTS[..]), meshes, pressed)?;
     }
+    balls(&mut table, quick)?;
     Ok(table)
+}
+
+/// Parts of balls around each other.
+fn balls(table: &mut String, quick: bool) -> Result<(), Box<dyn Error>> {
+    table.push_str(
+        "\nThe same of balls, a quarter of a cube's side of each, by elements along the sides of the inner one and the \
+         outer one\n\n\
+         | facets | elements | contact | pressure | order | displacement | order |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let meshes: &[[usize; 2]] = if quick { &[[2, 3]] } else { &[[2, 3], [4, 6]] };
+    rows(table, ("first order", &CONTACTS[..2]), meshes, |mesh, contact| {
+        let patch = CurvedPatch::balls(mesh, None);
+        patch.pressed(patch.mortar(contact == 0)?)
+    })
 }
 
 /// By one of the contacts.
@@ -48,11 +65,11 @@ fn pressed(patch: &CurvedPatch<2>, contact: usize) -> contact_dynamics::Result<P
 /// The lines of a case by meshes whose elements are half as large from one to the next.
 fn rows(
     table: &mut String,
-    name: &str,
+    (name, contacts): (&str, &[&str]),
     meshes: &[[usize; 2]],
     errors: impl Fn([usize; 2], usize) -> contact_dynamics::Result<PatchErrors>,
 ) -> Result<(), Box<dyn Error>> {
-    for (contact, what) in CONTACTS.iter().enumerate() {
+    for (contact, what) in contacts.iter().enumerate() {
         let mut before: Option<PatchErrors> = None;
         for &mesh in meshes {
             let found = match errors(mesh, contact) {

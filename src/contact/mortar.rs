@@ -78,8 +78,7 @@ const BEYOND: f64 = 0.25;
 ///   later. [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
-///   not exact to rounding (`docs/contact.md`): their areas are those of the parts. On quadrilaterals that are no
-///   parallelograms up to 3e-9 may be left.
+///   not exact to rounding (`docs/contact.md`): their areas are those of the parts.
 /// - Gaps are measured along the normals of facets, of second order along those of their parts.
 ///
 /// # Identity
@@ -312,8 +311,10 @@ impl<T: Real> Mortar<T> {
     /// N, and momenta are conserved.
     ///
     /// Known failure: distances far from the node count with a negative weight, so that over rough or curved masters a
-    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart, and a
-    /// start nearly in contact may be refused ([`Error::InitialViolation`]).
+    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart. A start
+    /// nearly in contact may be refused for that ([`Error::InitialViolation`]); let
+    /// [`InitialOverclosure::RemovedOver`](crate::InitialOverclosure::RemovedOver) take such gaps off, or let the
+    /// surface with the larger radius of curvature be the master.
     ///
     /// ```
     /// use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};

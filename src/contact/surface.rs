@@ -11,6 +11,7 @@ mod offsets;
 mod outer;
 mod output;
 mod overlap;
+mod polygon;
 mod projection;
 mod ramp;
 mod reach;

@@ -30,3 +30,23 @@ fn weighted_gaps_of_rings_converge() {
         }
     }
 }
+
+/// Facets are warped and cut each other anywhere; gaps are far from those of the start where displacements are 1e-6.
+#[test]
+fn weighted_gaps_of_balls_converge() {
+    for outer in [true, false] {
+        let pressed = |factor| {
+            let patch = CurvedPatch::balls([2 * factor, 3 * factor], None);
+            patch.pressed(patch.mortar(outer)?)
+        };
+        let (orders, fine) = orders(pressed);
+        let what = format!("outer {outer}: {orders:?}, {fine:?}");
+        assert!(orders.iter().all(|&order| order > 1.2), "{what}");
+        assert!(fine.pressure < 0.012 && fine.displacement < 4e-3, "{what}");
+    }
+    for outer in [true, false] {
+        let patch = CurvedPatch::balls([2, 3], Some(Family::Lagrange));
+        let errors = patch.pressed(patch.mortar(outer).unwrap()).unwrap();
+        assert!(errors.pressure < 0.013 && errors.displacement < 6e-3, "outer {outer}: {errors:?}");
+    }
+}

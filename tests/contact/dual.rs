@@ -3,7 +3,7 @@
 use super::mortar::{blocks, check_patches_of_blocks, check_patches_of_plates, plates, shaken};
 use super::two_bodies::check_impact;
 use contact_dynamics::contact::{BondStrength, ContactConstraint, Contacts, Facet, Mortar};
-use contact_dynamics::{Composite, Error, PersistencyCorrection, Simulation, verify};
+use contact_dynamics::{Composite, Error, InitialOverclosure, Newmark, PersistencyCorrection, Simulation, verify};
 use contact_dynamics_scenes::second_order::{Family, SecondOrderStack};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
@@ -204,14 +204,114 @@ fn rows_are_the_derivatives_of_gaps() {
             let (u, v) = (shaken(stack.solid.dofs(), 0.02, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
             let error = verify::gap_jacobian(&mut triangles(&stack).dual().unwrap(), 0.0, &u, &v, 1e-6).unwrap();
             assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 1e-8, "{shift}: {error:?}");
-            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature. Dual functions add
-            // up what it leaves of shape functions: 9 times it at a corner, over areas of a third of theirs at least.)
+            // (Warped facets, and shape functions that are no polynomials in the plane: quadrature.)
             let error = verify::gap_jacobian(&mut dual(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-            let other = verify::gap_jacobian(&mut standard(&stack, true), 0.0, &u, &v, 1e-6).unwrap();
-            assert!(error.rows == other.rows && error.rows_lost == 0, "{shift}: {error:?}");
-            assert!(error.jacobian < 27.0 * other.jacobian && other.jacobian < 1e-3, "{shift}: {error:?} {other:?}");
+            assert!(error.rows >= 6 && error.rows_lost == 0 && error.jacobian < 5e-3, "{shift}: {error:?}");
         }
     }
+}
+
+/// The gaps of a search at u.
+fn gaps(contact: &mut Mortar<f64>, u: &[f64]) -> Vec<f64> {
+    contact.search(0.0, u, &vec![0.0; u.len()], 0.0).unwrap();
+    let mut gaps = vec![0.0; Contacts::of(&*contact).len()];
+    contact.gaps(0.0, u, &mut gaps).unwrap();
+    gaps
+}
+
+/// Where facets are parallelograms and stay such, sums over points are integrals of polynomials, and rows their
+/// derivatives to rounding: along all affine motions of either body.
+#[test]
+fn rows_are_the_derivatives_of_gaps_along_affine_motions() {
+    // Covered wholly, facets over the rim by parts at all stages of the weights, and by a lot.
+    for shift in [0.0, 0.125, 0.15, 0.2, 0.35] {
+        let [below, above] = blocks([4, 3, 1], [3, 2, 1]);
+        let above = above.mapped(|[x, y, z]| [0.15 + shift + 0.7 * x, 0.15 + 0.5 * shift + 0.7 * y, z]);
+        let slanted =
+            |[x, y, z]: [f64; 3]| [x + 0.3 * y, y - 0.1 * x, z + if z > 1.05 { 0.1 * x - 0.05 * y } else { 0.04 * y }];
+        let stack = Stack::new([below, above], 0.1, slanted);
+        for (contact, kind) in [(dual(&stack, true), "dual"), (standard(&stack, true), "standard")] {
+            let mut contact = contact;
+            let dofs = contact.dofs().to_vec();
+            let still = vec![0.0; dofs.len()];
+            assert!(gaps(&mut contact, &still).len() >= 6);
+            let rows: Vec<Vec<(usize, f64)>> = {
+                let contacts = Contacts::of(&contact);
+                (0..contacts.len()).map(|row| contacts.row(row).collect()).collect()
+            };
+            let mut largest = 0.0_f64;
+            for (upper, axis, along) in [true, false]
+                .into_iter()
+                .flat_map(|upper| (0..3).flat_map(move |axis| (0..4).map(move |along| (upper, axis, along))))
+            {
+                let motion: Vec<f64> = dofs
+                    .iter()
+                    .map(|&dof| match (dof / 3 >= stack.split) == upper && dof % 3 == axis {
+                        true => stack.solid.nodes[dof / 3].get(along).map_or(1.0, |x| *x),
+                        false => 0.0,
+                    })
+                    .collect();
+                // (Weights have second derivatives that jump, where a facet is covered wholly or by three quarters.)
+                let size = 1e-6;
+                let [before, after] =
+                    [-size, size].map(|size| gaps(&mut contact, &motion.iter().map(|x| size * x).collect::<Vec<_>>()));
+                assert!(before.len() == rows.len() && after.len() == rows.len(), "{shift}");
+                for (row, (before, after)) in rows.iter().zip(before.iter().zip(&after)) {
+                    let rate = row.iter().map(|&(place, weight)| weight * motion[place]).sum::<f64>();
+                    let error = ((after - before) / (2.0 * size) - rate).abs();
+                    largest = largest.max(rate.abs());
+                    assert!(error < 1e-8, "{kind}, {shift}, {upper} {axis} {along}: {rate} off by {error:e}");
+                }
+            }
+            assert!(largest > 0.5);
+        }
+    }
+}
+
+/// A block below a stamp with a round lower side, which is pressed into it after some time, and held; the block is the
+/// slave.
+fn stamped(gap: f64, overclosure: InitialOverclosure) -> Result<f64, Error> {
+    let below = Solid::rectangle([2.0, 1.0], [20, 5], MATERIAL);
+    let above = Solid::rectangle([1.0; 2], [14, 6], MATERIAL);
+    let split = below.nodes.len();
+    let mut stack = Stack::new([below, above], gap, |x| x);
+    for [x, y] in &mut stack.solid.nodes[split..] {
+        let from_middle = *x - 0.5;
+        *y += (1.0 - (1.0 - from_middle * from_middle).sqrt()) * (2.0 + gap - *y);
+        *x += 0.5;
+    }
+    let time = 1.0 / MATERIAL.wave_speed();
+    let (mut system, depth) = (stack.solid.system(), 0.01 + gap);
+    for (node, &[_, y]) in stack.solid.nodes.iter().enumerate() {
+        if y < 1e-9 {
+            system = system.fix(2 * node)?.fix(2 * node + 1)?;
+        } else if y > 2.0 + gap - 1e-9 {
+            system = system.fix(2 * node)?.drive(2 * node + 1, move |t| {
+                let s = (t / (20.0 * time)).min(1.0);
+                let speed = 6.0 * s * (1.0 - s) / (20.0 * time);
+                [-depth * s * s * (3.0 - 2.0 * s), -depth * speed, 0.0]
+            })?;
+        }
+    }
+    let mut run = Simulation::builder(system, Newmark::new(0.5, 1.0)?, time)
+        .constraint(stack.mortar(false)?.dual()?)
+        .initial_overclosure(overclosure)
+        .build()?;
+    run.run_until(100.0 * time, &mut ())?;
+    Ok(run.state().contacts().forces().iter().sum())
+}
+
+#[test]
+fn gaps_below_zero_of_surfaces_apart_are_taken_off() {
+    // The weighted gap of the node below the stamp is below zero, though nothing touches.
+    let gap = 1e-6;
+    let refused = stamped(gap, InitialOverclosure::Refused);
+    assert!(matches!(refused, Err(Error::InitialViolation { gap, .. }) if -1e-2 < gap && gap < -1e-5), "{refused:?}");
+    let time = 10.0 / MATERIAL.wave_speed();
+    let taken = stamped(gap, InitialOverclosure::RemovedOver(time)).unwrap();
+    // From farther apart nothing is to be taken off, and the end is the same.
+    let apart = stamped(3e-3, InitialOverclosure::Refused).unwrap();
+    assert!((taken / apart - 1.0).abs() < 2e-3, "{taken} {apart}");
 }
 
 #[test]

@@ -209,12 +209,11 @@ impl Integrals {
         sums.clear();
         sums.resize(slave.nodes().len(), Sums::default());
         for (index, facet) in slave.facets().iter().enumerate() {
-            let Some(mut base) = Base::new(facet, positions) else { continue };
+            let Some(base) = Base::new(facet, positions) else { continue };
             let places = Sums::begin(sums, slave, index, &base);
             if partners(index).is_empty() {
                 continue;
             }
-            base.see_beside(slave, index, positions);
             let mut own = [Sums::default(); 4];
             for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
                 let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
@@ -249,12 +248,11 @@ impl Integrals {
         self.sums.resize(slave.nodes().len(), Sums::default());
         self.entries.clear();
         for (index, facet) in slave.facets().iter().enumerate() {
-            let Some(mut base) = Base::new(facet, positions) else { continue };
+            let Some(base) = Base::new(facet, positions) else { continue };
             let places = *Sums::begin(&mut self.sums, slave, index, &base);
             if partners(index).is_empty() {
                 continue;
             }
-            base.see_beside(slave, index, positions);
             let (places, first) = (&places[..base.count()], self.entries.len());
             let mut own = Own::default();
             self.others.clear();

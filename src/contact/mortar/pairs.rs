@@ -25,7 +25,8 @@ impl Pairs {
     }
 
     /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// and are no far sides of both bodies. (The result does not depend on the age of the lists.)
+    /// do not belong to facets behind sharp edges, and are no far sides of both bodies. (The result does not depend on
+    /// the age of the lists.)
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
@@ -41,14 +42,19 @@ impl Pairs {
         masters.extend(master.boxes(positions).zip(normals));
         for (index, facet) in slave.facets().iter().enumerate() {
             let listed = lists.of(index);
-            if let Some(base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
+            if let Some(mut base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
+                base.see_beside(slave, index, positions);
                 let around = Bounds::of_corners(&base.shape).inflated(range);
                 let own = Side { surface: slave, behind: &behind[0], facet: index };
                 near.extend(listed.iter().copied().filter(|&partner| {
                     let (bounds, normal) = &masters[partner];
                     let other = Side { surface: master, behind: &behind[1], facet: partner };
-                    let meets = |normal| base.may_meet(normal, &master.facets()[partner], positions, depth);
-                    around.intersects(bounds) && normal.is_some_and(meets) && !is_far_side(own, other, &base, positions)
+                    let facet = &master.facets()[partner];
+                    let meets = |normal| base.may_meet(normal, facet, positions, depth);
+                    around.intersects(bounds)
+                        && normal.is_some_and(meets)
+                        && !base.has_beside(facet, positions)
+                        && !is_far_side(own, other, &base, positions)
                 }));
             }
             starts.push(near.len());

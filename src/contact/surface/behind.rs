@@ -85,7 +85,7 @@ impl Side<'_> {
 }
 
 /// Whether a slave facet, with its plane as `base`, lies on the far side of its body from where a master facet lies on
-/// the far side of its own: for most of what they have in common.
+/// the far side of its own: for most of what they have in common. (`base` [sees](Base::see_beside) what is beside it.)
 pub(crate) fn is_far_side(slave: Side<'_>, master: Side<'_>, base: &Base, positions: &[Point]) -> bool {
     if slave.is_thick() || master.is_thick() {
         return false;
@@ -96,12 +96,13 @@ pub(crate) fn is_far_side(slave: Side<'_>, master: Side<'_>, base: &Base, positi
     if deepest >= -ROUNDING * base.shape.size() || -deepest < LEFT * one.min(other) {
         return false;
     }
-    let mut base = *base;
-    base.see_beside(slave.surface, slave.facet, positions);
     let (mut far, mut all) = (0.0, 0.0);
     base.each_sample(facet, positions, &mut |sample| {
-        all += sample.area;
         let (depth, x) = (-sample.gap, base.shape.point(&sample.slave));
+        if base.is_beside(add_scaled(x, -depth, base.normal), -depth) {
+            return;
+        }
+        all += sample.area;
         if depth > 0.0 {
             let under = slave.inside(x, base.normal.map(|x| -x), positions);
             let over = || master.inside(add_scaled(x, -depth, base.normal), base.normal, positions);

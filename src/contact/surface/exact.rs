@@ -10,8 +10,8 @@
 
 use super::overlap::Flat;
 
-/// The most points of a rule: six triangles of an octagon, six points each.
-const MOST: usize = 36;
+/// The most points of a rule: six triangles of an octagon, twelve points each.
+const MOST: usize = 72;
 
 /// Share of the sides of a quadrilateral by which its corners may be off a parallelogram and quadrature not know.
 const SKEWED: f64 = 1e-4;
@@ -22,12 +22,14 @@ const ALIKE: f64 = 1e-12;
 /// The most that a weight changes by, in shares of it: more is asked for by rounding alone.
 const MOST_CHANGE: f64 = 0.5;
 
-/// Gauss' rule of six points on a line of length one (degree 11): weight, and place from the middle, to both sides.
-/// (Slivers at a cut get what is wrong along it: with fewer points that is more than their weights can change by.)
-const LINE: [(f64, f64); 3] = [
-    (0.085_662_246_189_585_2, 0.466_234_757_101_576),
-    (0.180_380_786_524_069_3, 0.330_604_693_233_132_25),
-    (0.233_956_967_286_345_5, 0.119_309_593_041_598_45),
+/// Gauss' rule of twelve points on a line of length one (degree 23): weight, and place from the middle, to both sides.
+const LINE: [(f64, f64); 6] = [
+    (0.023_587_668_193_255_914, 0.490_780_317_123_359_6),
+    (0.053_469_662_997_659_21, 0.452_058_628_185_237_45),
+    (0.080_039_164_271_673_11, 0.384_951_337_097_152_35),
+    (0.101_583_713_361_532_96, 0.293_658_977_143_308_74),
+    (0.116_746_268_269_177_4, 0.183_915_749_499_090_1),
+    (0.124_573_522_906_701_39, 0.062_616_704_255_734_46),
 ];
 
 /// A point of a rule: its weight, place, and the shape functions of both facets.
@@ -85,10 +87,15 @@ impl RulePoints {
         let mut factors: Function = [1.0; MOST];
         let mut before: Option<(Function, f64, f64)> = None;
         for (flat, product) in [(slave, of(&|point| point.slave[2])), (master, of(&|point| point.master[2]))] {
-            if !flat.is_skewed() {
+            // (Shape functions of a triangle are linear.)
+            if flat.count < 4 {
                 continue;
             }
-            let mut missing = flat.integral_of_product(polygon) - sum(&product, &one);
+            // Of a parallelogram s t is a polynomial: nothing is missing, and nothing may be once weights have changed.
+            let mut missing = match flat.is_skewed() {
+                true => flat.integral_of_product(polygon) - sum(&product, &one),
+                false => 0.0,
+            };
             let mut rest = product;
             kept.iter().zip(squares).for_each(|(other, square)| leave_out(&mut rest, other, square, &sum));
             let whole = sum(&rest, &rest);
@@ -97,14 +104,13 @@ impl RulePoints {
                 leave_out(&mut rest, other, *square, &sum);
             }
             let square = sum(&rest, &rest);
-            if square > ALIKE * whole {
+            let largest = rest[..self.count].iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            if square > ALIKE * whole && missing.abs() * largest < MOST_CHANGE * square {
                 factors.iter_mut().zip(&rest).for_each(|(factor, rest)| *factor += missing / square * rest);
                 before = Some((rest, square, missing));
             }
         }
-        if factors[..self.count].iter().all(|factor| (factor - 1.0).abs() < MOST_CHANGE) {
-            self.points.iter_mut().zip(factors).for_each(|(point, factor)| point.weight *= factor);
-        }
+        self.points.iter_mut().zip(factors).for_each(|(point, factor)| point.weight *= factor);
     }
 }
 

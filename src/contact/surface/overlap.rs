@@ -5,6 +5,7 @@
 //! section 4); in two dimensions it is a part of a line.
 
 use super::exact::{RulePoint, RulePoints};
+use super::polygon::{Polygon, Rule};
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 use super::{Facet, Surface};
 
@@ -101,9 +102,34 @@ impl Base {
     }
 
     /// Whether what is at x, by `gap` above the facet, belongs to a facet behind a sharp edge.
-    fn is_beside(&self, x: Point, gap: f64) -> bool {
+    pub(super) fn is_beside(&self, x: Point, gap: f64) -> bool {
         let is_above = |[point, normal]: &[Point; 2]| dot(*normal, sub(x, *point)) > NEARER * gap;
         gap < 0.0 && self.beside.iter().flatten().any(is_above)
+    }
+
+    /// Whether a master facet belongs to facets behind sharp edges: for most of what it covers, or with all corners if
+    /// it covers nothing.
+    ///
+    /// (Decided for the facet as a whole, in a search. Point by point, while rows are linearized again, points came and
+    /// went with what the contact made of them, and rows found no rest.)
+    pub(crate) fn has_beside(&self, facet: &Facet, positions: &[Point]) -> bool {
+        if self.beside.iter().all(Option::is_none) || self.lowest(facet, positions) >= 0.0 {
+            return false;
+        }
+        let (mut beside, mut all) = (0.0, 0.0);
+        self.each_sample(facet, positions, &mut |sample| {
+            let x = add_scaled(self.shape.point(&sample.slave), sample.gap, self.normal);
+            all += sample.area;
+            beside += if self.is_beside(x, sample.gap) { sample.area } else { 0.0 };
+        });
+        if all > 0.0 {
+            return 2.0 * beside > all;
+        }
+        facet
+            .nodes()
+            .iter()
+            .zip(self.heights(facet, positions))
+            .all(|(&node, gap)| self.is_beside(positions[node], gap))
     }
 
     fn in_plane(&self, x: Point) -> [f64; 2] {
@@ -138,22 +164,20 @@ impl Base {
         }
         let own = Flat { corners: self.corners, count: self.count };
         let Some(common) = own.common(&master, SLIVER * self.size * self.size) else { return };
-        let linear = self.count == 3 && count == 3 && !self.curved && facet.whole.is_none();
-        let rule: &[[f64; 4]] = if linear { &THREE } else { &SIX };
+        let (curved, quadrilateral) = (self.curved || facet.whole.is_some(), self.count == 4 || count == 4);
+        let rule = match (curved, quadrilateral) {
+            (false, false) => Rule::Two,
+            (true, true) => Rule::Six,
+            _ => Rule::Four,
+        };
         let mut skewed = (own.is_skewed() || master.is_skewed()).then(RulePoints::new);
-        let [first, rest @ ..] = common.corners() else { return };
-        for pair in rest.windows(2) {
-            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
-            let area = 0.5 * (a[0] * b[1] - a[1] * b[0]);
-            for &[weight, _, s, t] in rule {
-                let at = [first[0] + s * a[0] + t * b[0], first[1] + s * a[1] + t * b[1]];
-                let (slave, master) = (own.weights_at(at), master.weights_at(at));
-                match &mut skewed {
-                    Some(points) => points.push(RulePoint { weight: weight * area, at, slave, master }),
-                    None => self.sample(weight * area, slave, &shape, master, act),
-                }
+        common.each_point(rule, &mut |weight, at| {
+            let (slave, master) = (own.weights_at(at), master.weights_at(at));
+            match &mut skewed {
+                Some(points) => points.push(RulePoint { weight, at, slave, master }),
+                None => self.sample(weight, slave, &shape, master, act),
             }
-        }
+        });
         if let Some(points) = &mut skewed {
             points.correct([&own, &master], common.corners());
             for point in points.as_slice() {
@@ -181,7 +205,7 @@ impl Base {
         let point = shape.point(&master);
         let gap = dot(self.normal, sub(point, self.shape.point(&slave)));
         // (A warped facet may be seen from its side somewhere.)
-        if cosine < 0.0 && gap.is_finite() && !self.is_beside(point, gap) {
+        if cosine < 0.0 && gap.is_finite() {
             act(&Sample { area, slave, master, gap, direction: normal.map(|x| x / cosine) });
         }
     }
@@ -203,9 +227,6 @@ impl Base {
                 let master = shape.on_side(k, share);
                 let point = shape.point(&master);
                 let gap = dot(self.normal, sub(point, self.shape.point(&slave)));
-                if self.is_beside(point, gap) {
-                    return;
-                }
                 let [along, across] = outward;
                 let outward = add_scaled(self.axes[0].map(|x| along * x), across, self.axes[1]);
                 act(&RimSample { length, slave, master, gap, outward });
@@ -407,74 +428,6 @@ impl Flat {
     }
 }
 
-/// A convex polygon: a quadrilateral cut by four lines.
-#[derive(Clone, Copy, Debug, Default)]
-struct Polygon {
-    corners: [[f64; 2]; 8],
-    count: usize,
-}
-
-impl Polygon {
-    fn push(&mut self, corner: [f64; 2]) {
-        // (A quadrilateral that is not convex may have more corners in common: the last ones are left out.)
-        if let Some(place) = self.corners.get_mut(self.count) {
-            *place = corner;
-            self.count += 1;
-        }
-    }
-
-    fn corners(&self) -> &[[f64; 2]] {
-        &self.corners[..self.count]
-    }
-
-    fn area(&self) -> f64 {
-        let corners = self.corners();
-        let Some(&first) = corners.first() else { return 0.0 };
-        let triangle = |pair: &[[f64; 2]]| {
-            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
-            0.5 * (a[0] * b[1] - a[1] * b[0])
-        };
-        corners.windows(2).map(triangle).sum()
-    }
-
-    /// What is to the left of a line.
-    fn cut(&self, from: [f64; 2], to: [f64; 2]) -> Self {
-        let along = [to[0] - from[0], to[1] - from[1]];
-        let left = |x: [f64; 2]| along[0] * (x[1] - from[1]) - along[1] * (x[0] - from[0]);
-        let mut kept = Self::default();
-        let Some(&last) = self.corners().last() else { return kept };
-        let (mut before, mut height_before) = (last, left(last));
-        for &corner in self.corners() {
-            let height = left(corner);
-            if (height > 0.0) != (height_before > 0.0) {
-                let share = height_before / (height_before - height);
-                kept.push(std::array::from_fn(|i| before[i] + share * (corner[i] - before[i])));
-            }
-            if height > 0.0 {
-                kept.push(corner);
-            }
-            (before, height_before) = (corner, height);
-        }
-        kept
-    }
-}
-
 /// Gauss' rule of three points on a line of length one (degree 5): weight and place.
 const LINE: [(f64, f64); 3] =
     [(5.0 / 18.0, 0.112_701_665_379_258_31), (8.0 / 18.0, 0.5), (5.0 / 18.0, 0.887_298_334_620_741_7)];
-
-/// Rules on a triangle of area one: weight, and the three weights of the corners (Dunavant, Int. J. Numer. Methods Eng.
-/// 21, 1985). Of degree 2, enough for products of two linear functions, and of degree 4, for bilinear ones.
-const THREE: [[f64; 4]; 3] = [
-    [1.0 / 3.0, 2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
-    [1.0 / 3.0, 1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
-    [1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
-];
-const SIX: [[f64; 4]; 6] = [
-    [0.223_381_589_678_011_46, 0.108_103_018_168_070_23, 0.445_948_490_915_964_9, 0.445_948_490_915_964_9],
-    [0.223_381_589_678_011_46, 0.445_948_490_915_964_9, 0.108_103_018_168_070_23, 0.445_948_490_915_964_9],
-    [0.223_381_589_678_011_46, 0.445_948_490_915_964_9, 0.445_948_490_915_964_9, 0.108_103_018_168_070_23],
-    [0.109_951_743_655_321_87, 0.816_847_572_980_458_5, 0.091_576_213_509_770_74, 0.091_576_213_509_770_74],
-    [0.109_951_743_655_321_87, 0.091_576_213_509_770_74, 0.816_847_572_980_458_5, 0.091_576_213_509_770_74],
-    [0.109_951_743_655_321_87, 0.091_576_213_509_770_74, 0.091_576_213_509_770_74, 0.816_847_572_980_458_5],
-];
