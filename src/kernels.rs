@@ -9,6 +9,7 @@ pub(crate) mod dense;
 pub(crate) mod elimination;
 pub(crate) mod forest;
 pub(crate) mod inertia;
+pub(crate) mod interleaved_sweep;
 pub(crate) mod lu;
 pub(crate) mod plan;
 pub(crate) mod product;

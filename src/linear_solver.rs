@@ -102,7 +102,8 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// [`Error::LinearNotConverged`] or
     /// [`Error::Indefinite`] of an iteration, [`Error::Host`] or, if a smaller
     /// step may help, [`Error::Inadmissible`] of a host's own solver. `rhs` then holds nothing of
-    /// use, and the step is undone. Direct factorizations do not fail here.
+    /// use, and the step is undone. Direct factorizations do not fail here, but for [`Error::OutOfMemory`] on
+    /// several columns.
     fn solve(&mut self, rhs: &mut [T]) -> Result<()>;
 
     /// Frees what only factorizations need, where the matrix stays for long: the next one allocates it again. Default:

@@ -6,14 +6,14 @@
 mod stored;
 
 use crate::kernels::chain::{self, Chains};
-use crate::kernels::cholesky::{self, Columns, Factorization, Simplicial, Supernodal};
+use crate::kernels::cholesky::{self, Columns, Simplicial, Supernodal};
 use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
 use crate::kernels::forest::Forest;
 use crate::kernels::lu::{self, Side};
 use crate::kernels::product::{self, LowerColumns, Tridiagonal};
 use crate::kernels::side_by_side::{self, LANES, SideVectors};
 use crate::kernels::vector::{self, Accumulate};
-use crate::kernels::{block_sweep, supernodal, sweep};
+use crate::kernels::{block_sweep, interleaved_sweep, supernodal, sweep};
 use crate::scalar::Scalar;
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::SparseColMatRef;
@@ -87,14 +87,10 @@ pub trait Kernels: Sized {
     ) -> Result<(), usize>;
     /// What a thread needs to factorize a matrix with so many dofs; nothing if there is no memory.
     fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>>;
-    /// Solves in place for the columns of `rhs` with a supernodal factor.
-    fn supernodal_solve(
-        symbolic: &SymbolicCholesky<usize>,
-        values: &[Self],
-        rhs: &mut [Self],
-        columns: usize,
-        memory: &mut MemBuffer,
-    );
+    /// Solves in place for the columns of `rhs`, at most [`WIDEST`](interleaved_sweep::WIDEST), with a supernodal
+    /// factor. `order` lists the dofs as they are eliminated; `memory` is as large as [`room`](interleaved_sweep::room)
+    /// says.
+    fn supernodal_solve(factor: &Supernodal<'_, Self>, order: Option<&[usize]>, rhs: &mut [Self], memory: &mut [Self]);
     /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
     fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
     /// The backward sweep over `columns`; entries behind them hold the solution.
@@ -149,8 +145,8 @@ pub trait Kernels: Sized {
         b: &mut [Self],
         vectors: Vectors<'_, Self>,
     ) -> Outcome;
-    /// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
-    fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq;
+    /// Scratch for factorizing a simplicial factor.
+    fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq;
     /// Solves for several right-hand sides with a scaled matrix, given below its diagonal entry by entry.
     fn conjugate_gradients_side_by_side(
         lower: &Blocks<'_, Self>,
@@ -245,13 +241,12 @@ macro_rules! kernels {
                 supernodal::workspace(dofs)
             }
             fn supernodal_solve(
-                symbolic: &SymbolicCholesky<usize>,
-                values: &[Self],
+                factor: &Supernodal<'_, Self>,
+                order: Option<&[usize]>,
                 rhs: &mut [Self],
-                columns: usize,
-                memory: &mut MemBuffer,
+                memory: &mut [Self],
             ) {
-                cholesky::supernodal_solve(symbolic, values, rhs, columns, memory);
+                interleaved_sweep::solve(factor, order, rhs, memory);
             }
             fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
                 cholesky::simplicial_forward(factor, columns, x);
@@ -329,8 +324,8 @@ macro_rules! kernels {
                     _ => conjugate_gradients::solve::<$scalar, 1>(iteration, b, vectors),
                 }
             }
-            fn cholesky_scratch(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
-                cholesky::scratch::<$scalar>(kind, symbolic, columns)
+            fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq {
+                cholesky::scratch::<$scalar>(symbolic)
             }
             fn conjugate_gradients_side_by_side(
                 lower: &Blocks<'_, Self>,

@@ -9,6 +9,10 @@ use std::time::Instant;
 pub(crate) struct Record {
     pub(crate) name: String,
     pub(crate) is_reduced: bool,
+    /// Whether the scheme damps: it is then compared with meshes under the same scheme.
+    pub(crate) is_damped: bool,
+    /// Whether contact dofs have no mass and the scheme does not damp: forces grow beyond all bounds.
+    pub(crate) runs_away: bool,
     pub(crate) unknowns: usize,
     /// Seconds before the first step, and of all steps.
     pub(crate) build: f64,

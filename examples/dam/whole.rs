@@ -1,10 +1,11 @@
 //! The dam as one system: of meshes, or of reduced blocks.
 
 use crate::record::{Record, Steps};
-use crate::valley::{Dam, Loading, Plan, RAYLEIGH};
+use crate::valley::{Dam, Loading, Plan, RAYLEIGH, Scheme, Way};
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::reduction::{Blocks, Boundary, Reduction};
-use contact_dynamics::{LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection, Result, Simulation};
+use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSolver, LinearSystem, Newmark, PersistencyCorrection};
+use contact_dynamics::{Result, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::reduced::Model;
 use contact_dynamics_scenes::sparse::diagonal;
 
@@ -72,15 +73,25 @@ fn rows(places: &[[usize; 2]], friction: f64) -> LinearRows<'static, f64> {
     })
 }
 
+impl Scheme {
+    fn integrator(self) -> Result<Box<dyn TimeIntegrator + Send>> {
+        Ok(match self {
+            Self::Trapezoidal => Box::new(Newmark::trapezoidal()),
+            Self::Damped => Box::new(GeneralizedAlpha::chung_hulbert(0.9)?),
+        })
+    }
+}
+
 /// All meshes, with one linear solver.
 pub(crate) fn meshes(
     name: &str,
+    scheme: Scheme,
     dam: &Dam,
     loading: &Loading,
     plan: &Plan,
     solver: Box<dyn LinearSolver<f64> + Send>,
 ) -> Result<Record> {
-    Record::of(name, dam, plan.steps, || {
+    let record = Record::of(name, dam, plan.steps, || {
         let (mut blocks, mut firsts) = (Blocks::new(), Vec::new());
         for block in &dam.blocks {
             let mass: SparseColMat<usize, f64> = diagonal(&block.mass);
@@ -90,24 +101,27 @@ pub(crate) fn meshes(
         let [of_mass, of_stiffness] = RAYLEIGH;
         let system = under(blocks.system()?.rayleigh(of_mass, of_stiffness)?, loading, loads);
         let places = places(dam, |(block, dof)| firsts[block] + dof);
-        let run = Simulation::builder(system, Newmark::trapezoidal(), plan.step)
+        let run = Simulation::builder(system, scheme.integrator()?, plan.step)
             .constraint(rows(&places, plan.friction))
             .corrector(PersistencyCorrection::new())
             .linear_solver(solver)
             .start_at_rest()
             .build()?;
         Ok(Whole { run, unknowns: dam.dofs(), places })
-    })
+    })?;
+    Ok(Record { is_damped: scheme == Scheme::Damped, ..record })
 }
 
 /// All blocks reduced to so many modes each, and their contact dofs.
-pub(crate) fn reduced(
-    dam: &Dam,
-    loading: &Loading,
-    plan: &Plan,
-    (boundary, modes): (Boundary, usize),
-) -> Result<Record> {
-    let name = format!("{}, {modes} modes a block", Model::Reduced(boundary).name());
+pub(crate) fn reduced(dam: &Dam, loading: &Loading, plan: &Plan, way: Way) -> Result<Record> {
+    let Way { boundary, softening, modes, scheme } = way;
+    let has_mass = boundary == Boundary::CraigBampton;
+    let softened = softening.map_or(String::new(), |softening| format!(", softening {softening}"));
+    let mut name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
+    let runs_away = !has_mass && scheme == Scheme::Trapezoidal;
+    if runs_away {
+        name += ", trapezoidal rule";
+    }
     let mut record = Record::of(&name, dam, plan.steps, || {
         let (mut blocks, mut firsts, mut loads) = (Blocks::new(), Vec::new(), [const { Vec::new() }; 4]);
         for block in &dam.blocks {
@@ -115,8 +129,8 @@ pub(crate) fn reduced(
             let [of_mass, of_stiffness] = RAYLEIGH;
             let body = Reduction::new(mass.as_ref(), block.stiffness.as_ref(), &block.contact(plan.friction))
                 .boundary(boundary)
-                .rayleigh(of_mass, of_stiffness)
-                .modes(modes)?;
+                .rayleigh(of_mass, of_stiffness);
+            let body = softening.into_iter().fold(body, Reduction::softening).modes(modes)?;
             firsts.push(blocks.reduced(&body)?.start + body.contact_dofs().start);
             for (all, own) in loads.iter_mut().zip(&block.loads) {
                 all.extend(body.load(own)?);
@@ -125,18 +139,20 @@ pub(crate) fn reduced(
         let contact: Vec<Vec<usize>> = dam.blocks.iter().map(|block| block.contact(plan.friction)).collect();
         let place = |(block, dof): (usize, usize)| firsts[block] + contact[block].partition_point(|&own| own < dof);
         let places = places(dam, place);
-        let builder = Simulation::builder(under(blocks.system()?, loading, loads), Newmark::trapezoidal(), plan.step)
+        let builder = Simulation::builder(under(blocks.system()?, loading, loads), scheme.integrator()?, plan.step)
             .constraint(rows(&places, plan.friction))
             .start_at_rest();
         // Contact dofs without mass leave nothing to correct.
-        let run = match boundary {
-            Boundary::CraigBampton => builder.corrector(PersistencyCorrection::new()),
-            _ => builder.uncorrected(),
+        let run = match has_mass {
+            true => builder.corrector(PersistencyCorrection::new()),
+            false => builder.uncorrected(),
         }
         .build()?;
         let places = if plan.friction > 0.0 { places } else { Vec::new() };
         Ok(Whole { run, unknowns: blocks.dofs(), places })
     })?;
     record.is_reduced = true;
+    record.is_damped = scheme == Scheme::Damped;
+    record.runs_away = runs_away;
     Ok(record)
 }

@@ -21,7 +21,7 @@ pub(crate) struct Block {
     pub(crate) stiffness: SparseColMat<usize, f64>,
     pub(crate) contact: Vec<usize>,
     gaps: Vec<f64>,
-    plain: SparseColMat<usize, f64>,
+    pub(crate) plain: SparseColMat<usize, f64>,
     pub(crate) velocity: Vec<f64>,
     pub(crate) h: f64,
 }
@@ -86,7 +86,7 @@ impl Block {
     }
 
     /// A cube of `cells`³ hex8, turned about an axis.
-    fn cube(cells: usize, (axis, tilt): ([f64; 3], f64)) -> Result<Self> {
+    pub(crate) fn cube(cells: usize, (axis, tilt): ([f64; 3], f64)) -> Result<Self> {
         let solid = Solid::block([1.0; 3], [cells; 3], SOFT);
         let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
         Self::new(solid.rotated(axis, tilt), &bottom, 0.5 / cells as f64 / SOFT.wave_speed())
@@ -99,9 +99,20 @@ impl Block {
         contact: &[usize],
         velocity: Vec<f64>,
     ) -> Result<Simulation<'static, f64>> {
+        self.run_in(self.h, system, contact, velocity)
+    }
+
+    /// The same in steps of h.
+    pub(crate) fn run_in(
+        &self,
+        h: f64,
+        system: LinearSystem<'static, f64>,
+        contact: &[usize],
+        velocity: Vec<f64>,
+    ) -> Result<Simulation<'static, f64>> {
         let rows = contact.iter().zip(&self.gaps);
         let rows = rows.fold(LinearRows::new(), |rows, (&dof, &gap)| rows.unilateral(&[(dof, 1.0)], gap));
-        Simulation::builder(system, trapezoidal(), self.h).velocity(velocity).constraint(rows).build()
+        Simulation::builder(system, trapezoidal(), h).velocity(velocity).constraint(rows).build()
     }
 
     fn full(&self, until: f64) -> Result<Fall> {

@@ -8,13 +8,13 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::prelude::ReborrowMut;
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
-use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
+use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
+use faer::{MatMut, MatRef, Par, Side, Spec};
 use std::ops::Range;
 
 /// How a factor of a symmetric matrix is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Factorization {
+pub(crate) enum Factorization {
     /// L D Lᵀ, simplicial.
     Ldlt,
     /// L Lᵀ, supernodal.
@@ -88,26 +88,10 @@ pub(crate) fn simplicial<T: Scalar>(
     Ok(())
 }
 
-/// Scratch for factorizing a simplicial factor, and for solving `columns` right-hand sides with a supernodal one.
+/// Scratch for factorizing a simplicial factor.
 #[inline]
-pub(crate) fn scratch<T: Scalar>(kind: Factorization, symbolic: &SymbolicCholesky<usize>, columns: usize) -> StackReq {
-    match kind {
-        Factorization::Llt => symbolic.solve_in_place_scratch::<T>(columns, Par::Seq),
-        Factorization::Ldlt => symbolic.factorize_numeric_ldlt_scratch::<T>(Par::Seq, Spec::default()),
-    }
-}
-
-/// Solves in place for the columns of `rhs` with a supernodal factor.
-#[inline]
-pub(crate) fn supernodal_solve<T: Scalar>(
-    symbolic: &SymbolicCholesky<usize>,
-    values: &[T],
-    rhs: &mut [T],
-    columns: usize,
-    memory: &mut MemBuffer,
-) {
-    let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
-    LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(memory));
+pub(crate) fn scratch<T: Scalar>(symbolic: &SymbolicCholesky<usize>) -> StackReq {
+    symbolic.factorize_numeric_ldlt_scratch::<T>(Par::Seq, Spec::default())
 }
 
 // In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory

@@ -131,18 +131,18 @@ fn backward_serial<T: Scalar>(interior: &Interior<'_, T>, range: Range<usize>, f
 }
 
 /// The part of a supernode that a sweep over some columns visits.
-struct Panel<'a, T> {
+pub(super) struct Panel<'a, T> {
     /// First column, and number of columns.
-    start: usize,
-    size: usize,
+    pub(super) start: usize,
+    pub(super) size: usize,
     /// Rows from the diagonal entry of the first column down.
-    rows: usize,
+    pub(super) rows: usize,
     /// Entries of a column of the whole supernode.
     stride: usize,
     /// The columns, `stride` apart, from the diagonal entry of the first one on.
     values: &'a [T],
     /// The rows below the columns of the whole supernode.
-    pattern: &'a [usize],
+    pub(super) pattern: &'a [usize],
 }
 
 impl<'a, T> Panel<'a, T> {
@@ -161,7 +161,7 @@ impl<'a, T> Panel<'a, T> {
 
     /// Column j from its row `from` on.
     #[inline]
-    fn column(&self, j: usize, from: usize) -> &'a [T] {
+    pub(super) fn column(&self, j: usize, from: usize) -> &'a [T] {
         &self.values[j * self.stride + from..j * self.stride + self.rows]
     }
 
@@ -173,7 +173,7 @@ impl<'a, T> Panel<'a, T> {
 
     /// All of a supernode.
     #[inline]
-    fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
+    pub(super) fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
         let symbolic = factor.symbolic;
         Self::new(factor, supernode, &(symbolic.supernode_begin()[supernode]..symbolic.supernode_end()[supernode]))
     }

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::kernels::cholesky::{Columns, Factorization as Kind, Simplicial, Supernodal};
 use crate::kernels::elimination::Elimination;
 use crate::kernels::forest::Forest;
+use crate::kernels::interleaved_sweep::{self, WIDEST};
 use crate::kernels::supernodal::{Problem, Workspace};
 use crate::real::Real;
 use crate::threads::PerThread;
@@ -162,8 +163,8 @@ struct Factor<T: Real> {
     /// How a supernodal factor is computed, and what threads need for it.
     elimination: Option<Elimination>,
     workspaces: Option<PerThread<Workspace<T>>>,
-    /// Right-hand sides that `memory` has room for.
-    columns: usize,
+    /// Memory of solves for several right-hand sides.
+    together: Vec<T>,
     /// Pivots in the numbering of the matrix.
     pivots: Vec<T>,
     /// The interior of a supernodal factor, and the work vectors of its supernodes.
@@ -205,7 +206,10 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
             SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
         };
-        let memory = Some(buffer(T::cholesky_scratch(kind, &symbolic, 1))?);
+        let memory = match kind {
+            Kind::Ldlt => Some(buffer(T::cholesky_scratch(&symbolic))?),
+            Kind::Llt => None,
+        };
         let n = symbolic.nrows();
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
@@ -230,7 +234,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
             memory,
             elimination,
             workspaces,
-            columns: 1,
+            together: Vec::new(),
             pivots,
             forest,
             work,
@@ -312,6 +316,24 @@ impl<T: Real> Factor<T> {
         }
     }
 
+    fn solve_one(&mut self, column: &mut [T]) {
+        let size = self.size();
+        self.forward(column, size);
+        self.backward(size);
+        self.give(column);
+    }
+
+    /// Solves for some columns side by side with a supernodal factor.
+    fn solve_together(&mut self, columns: &mut [T]) -> Result<()> {
+        let Self { symbolic, values, together, .. } = self;
+        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return Ok(()) };
+        let room = interleaved_sweep::room(symbolic.nrows(), tallest(raw));
+        memory::grow(together, room, WIDEST, "right-hand sides of a sparse Cholesky factor")?;
+        let order = symbolic.perm().map(|perm| perm.arrays().0);
+        T::supernodal_solve(&Supernodal { symbolic: raw, values }, order, columns, together);
+        Ok(())
+    }
+
     /// Brings the solution into the order of the matrix.
     fn give(&self, solution: &mut [T]) {
         let Self { symbolic, forest, work, sweep: x, .. } = self;
@@ -373,9 +395,7 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self {
-            fingerprint, symbolic, kind, values, pivots, memory, elimination, workspaces: threads, cursor, ..
-        } = self;
+        let Self { fingerprint, symbolic, values, pivots, memory, elimination, workspaces: threads, cursor, .. } = self;
         fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
@@ -391,7 +411,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
             } else {
                 let memory = match memory {
                     Some(memory) => memory,
-                    None => memory.insert(buffer(T::cholesky_scratch(*kind, symbolic, 1))?),
+                    None => memory.insert(buffer(T::cholesky_scratch(symbolic))?),
                 };
                 T::simplicial_cholesky(symbolic, a, values, pivots, memory)
             };
@@ -407,26 +427,18 @@ impl<T: Real> Factorization<T> for Factor<T> {
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         let size = self.size();
-        let columns = rhs.len().checked_div(size).unwrap_or(0);
-        if self.kind == Kind::Llt && columns > 1 {
-            if columns > self.columns {
-                (self.memory, self.columns) = (None, columns);
+        for columns in rhs.chunks_mut(size * WIDEST) {
+            match self.symbolic.raw() {
+                SymbolicCholeskyRaw::Supernodal(_) if columns.len() > size => self.solve_together(columns)?,
+                _ => columns.chunks_exact_mut(size).for_each(|column| self.solve_one(column)),
             }
-            let Self { kind, symbolic, values, memory, columns: most, .. } = self;
-            let memory = memory.get_or_insert_with(|| MemBuffer::new(T::cholesky_scratch(*kind, symbolic, *most)));
-            T::supernodal_solve(symbolic, values, rhs, columns, memory);
-            return Ok(());
-        }
-        for column in rhs.chunks_exact_mut(size) {
-            self.forward(column, size);
-            self.backward(size);
-            self.give(column);
         }
         Ok(())
     }
 
     fn release(&mut self) {
-        (self.memory, self.workspaces, self.cursor) = (None, None, Vec::new());
+        (self.memory, self.workspaces) = (None, None);
+        (self.cursor, self.together) = (Vec::new(), Vec::new());
     }
 
     fn stored_values(&self) -> usize {

@@ -70,7 +70,7 @@ fn check<T: Real>(solver: &dyn LinearSolver<T>, n: usize, pairs: &[(usize, usize
         if released {
             factor.release();
         }
-        for columns in [1, 3] {
+        for columns in [1, 3, 8, 13, 17] {
             let x: Vec<T> = (0..n * columns).map(|i| T::of((i as f64 * 0.7).sin())).collect();
             let mut b = vec![T::zero(); n * columns];
             for (x, b) in x.chunks(n).zip(b.chunks_mut(n)) {

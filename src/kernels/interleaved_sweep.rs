@@ -1,0 +1,182 @@
+//! Sweeps over a supernodal factor for a few right-hand sides side by side: the entries of a row lie next to one
+//! another, so that every entry of L is read once for all of them, and multiplies a whole vector at a time.
+//!
+//! Where a factor is larger than the caches the time of a solve is that of reading it: eight right-hand sides take a
+//! little longer than one.
+#![allow(clippy::inline_always)] // what is not inlined is not compiled for the vector units
+
+use super::cholesky::Supernodal;
+use super::sweep::Panel;
+use crate::scalar::Scalar;
+use faer::traits::pulp::{Arch, Simd, WithSimd};
+
+/// Columns of a supernode that are processed together: with eight right-hand sides what they multiply stays in
+/// registers.
+const GROUP: usize = 4;
+
+/// Right-hand sides at a time, and those of a narrower sweep.
+pub(crate) const WIDEST: usize = 8;
+const NARROW: usize = 4;
+
+/// Rows of `WIDEST` values that a solve needs: the vectors, and the rows of the tallest supernode.
+pub(crate) fn room(dofs: usize, tallest: usize) -> usize {
+    dofs + tallest
+}
+
+/// Solves in place for the columns of `rhs`, at most `WIDEST`. `order` lists the dofs as they are eliminated; `memory`
+/// is as large as [`room`] says.
+#[inline]
+pub(crate) fn solve<T: Scalar>(factor: &Supernodal<'_, T>, order: Option<&[usize]>, rhs: &mut [T], memory: &mut [T]) {
+    match rhs.len() <= NARROW * factor.symbolic.nrows() {
+        true => solve_together::<T, NARROW>(factor, order, rhs, memory),
+        false => solve_together::<T, WIDEST>(factor, order, rhs, memory),
+    }
+}
+
+fn solve_together<T: Scalar, const W: usize>(
+    factor: &Supernodal<'_, T>,
+    order: Option<&[usize]>,
+    rhs: &mut [T],
+    memory: &mut [T],
+) {
+    let (dofs, arch) = (factor.symbolic.nrows(), Arch::new());
+    let dof = |k: usize| order.map_or(k, |order| order[k]);
+    let (x, w) = memory.as_chunks_mut::<W>().0.split_at_mut(dofs);
+    x.fill([T::zero(); W]);
+    for (lane, rhs) in rhs.chunks_exact(dofs).enumerate() {
+        x.iter_mut().enumerate().for_each(|(k, x)| x[lane] = rhs[dof(k)]);
+    }
+    let supernodes = 0..factor.symbolic.n_supernodes();
+    for s in supernodes.clone() {
+        forward(&Panel::whole(factor, s), arch, x, w);
+    }
+    for s in supernodes.rev() {
+        backward(&Panel::whole(factor, s), arch, x, w);
+    }
+    for (lane, rhs) in rhs.chunks_exact_mut(dofs).enumerate() {
+        x.iter().enumerate().for_each(|(k, x)| rhs[dof(k)] = x[lane]);
+    }
+}
+
+/// Eliminates the columns of a supernode.
+fn forward<T: Scalar, const W: usize>(panel: &Panel<'_, T>, arch: Arch, x: &mut [[T; W]], w: &mut [[T; W]]) {
+    let (start, size) = (panel.start, panel.size);
+    let w = &mut w[..panel.rows];
+    w[..size].copy_from_slice(&x[start..start + size]);
+    w[size..].fill([T::zero(); W]);
+    let grouped = size - size % GROUP;
+    (0..grouped).step_by(GROUP).for_each(|column| eliminate::<T, W, GROUP>(panel, arch, column, w));
+    (grouped..size).for_each(|column| eliminate::<T, W, 1>(panel, arch, column, w));
+    x[start..start + size].copy_from_slice(&w[..size]);
+    for (&row, change) in panel.pattern.iter().zip(&w[size..]) {
+        x[row].iter_mut().zip(change).for_each(|(x, change)| *x += *change);
+    }
+}
+
+/// Solves for the columns of a supernode.
+fn backward<T: Scalar, const W: usize>(panel: &Panel<'_, T>, arch: Arch, x: &mut [[T; W]], w: &mut [[T; W]]) {
+    let (start, size) = (panel.start, panel.size);
+    let w = &mut w[..panel.rows];
+    w[..size].copy_from_slice(&x[start..start + size]);
+    w[size..].iter_mut().zip(panel.pattern).for_each(|(w, &row)| *w = x[row]);
+    let grouped = size - size % GROUP;
+    (grouped..size).rev().for_each(|column| substitute::<T, W, 1>(panel, arch, column, w));
+    (0..grouped).step_by(GROUP).rev().for_each(|column| substitute::<T, W, GROUP>(panel, arch, column, w));
+    x[start..start + size].copy_from_slice(&w[..size]);
+}
+
+/// Eliminates N columns.
+#[inline]
+fn eliminate<T: Scalar, const W: usize, const N: usize>(
+    panel: &Panel<'_, T>,
+    arch: Arch,
+    column: usize,
+    w: &mut [[T; W]],
+) {
+    let l = std::array::from_fn(|k| panel.column(column + k, column));
+    arch.dispatch(Eliminate::<T, W, N> { l, w: &mut w[column..] });
+}
+
+/// Solves for N columns.
+#[inline]
+fn substitute<T: Scalar, const W: usize, const N: usize>(
+    panel: &Panel<'_, T>,
+    arch: Arch,
+    column: usize,
+    w: &mut [[T; W]],
+) {
+    let l = std::array::from_fn(|k| panel.column(column + k, column));
+    arch.dispatch(Substitute::<T, W, N> { l, w: &mut w[column..] });
+}
+
+/// The small triangle, column by column, then the rows below it: `w −= Σ l_k w_k`.
+struct Eliminate<'a, T, const W: usize, const N: usize> {
+    /// The columns, all from the row of the first one on, as `w`.
+    l: [&'a [T]; N],
+    w: &'a mut [[T; W]],
+}
+
+impl<T: Scalar, const W: usize, const N: usize> WithSimd for Eliminate<'_, T, W, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { l, w } = self;
+        let l = l.map(|l| &l[..w.len()]);
+        let (own, below) = w.split_at_mut(N);
+        let mut c = [[T::zero(); W]; N];
+        for k in 0..N {
+            let mut row = own[k];
+            for j in 0..k {
+                subtract(&mut row, l[j][k], &c[j]);
+            }
+            c[k] = row.map(|x| x / l[k][k]);
+            own[k] = c[k];
+        }
+        for (i, row) in below.iter_mut().enumerate() {
+            let mut sum = *row;
+            for k in 0..N {
+                subtract(&mut sum, l[k][N + i], &c[k]);
+            }
+            *row = sum;
+        }
+    }
+}
+
+/// The sums over the rows below, `Σ l_k w`, then the small triangle.
+struct Substitute<'a, T, const W: usize, const N: usize> {
+    l: [&'a [T]; N],
+    w: &'a mut [[T; W]],
+}
+
+impl<T: Scalar, const W: usize, const N: usize> WithSimd for Substitute<'_, T, W, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { l, w } = self;
+        let l = l.map(|l| &l[..w.len()]);
+        let (own, below) = w.split_at_mut(N);
+        let mut rest: [[T; W]; N] = std::array::from_fn(|k| own[k]);
+        for (i, row) in below.iter().enumerate() {
+            for k in 0..N {
+                subtract(&mut rest[k], l[k][N + i], row);
+            }
+        }
+        for k in (0..N).rev() {
+            for j in k + 1..N {
+                let known = own[j];
+                subtract(&mut rest[k], l[k][j], &known);
+            }
+            own[k] = rest[k].map(|x| x / l[k][k]);
+        }
+    }
+}
+
+/// `x −= l c`.
+#[inline(always)]
+fn subtract<T: Scalar, const W: usize>(x: &mut [T; W], l: T, c: &[T; W]) {
+    for (x, &c) in x.iter_mut().zip(c) {
+        *x -= l * c;
+    }
+}
