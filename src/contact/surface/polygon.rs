@@ -161,8 +161,9 @@ mod tests {
                 let found = integral(&polygon(&SQUARE), rule, |[x, y]| x.powi(i) * y.powi(j));
                 assert!((found - 1.0 / f64::from((i + 1) * (j + 1))).abs() < 1e-15, "{rule:?}: x^{i} y^{j}: {found}");
             }
-            let beyond = integral(&polygon(&SQUARE), rule, |[x, _]| x.powi(degree + 1));
-            assert!((beyond - 1.0 / f64::from(degree + 2)).abs() > 1e-9, "{rule:?}: {beyond}");
+            // (Of odd powers the square has what is symmetric alone.)
+            let beyond = integral(&polygon(&SQUARE), rule, |[x, _]| x.powi(degree + 2));
+            assert!((beyond - 1.0 / f64::from(degree + 3)).abs() > 1e-9, "{rule:?}: {beyond}");
         }
     }
 
