@@ -24,8 +24,8 @@ pub(crate) fn make_room<T>(vector: &mut Vec<T>, entries: usize, what: &'static s
     vector.try_reserve(entries).map_err(|_| refused::<T>(vector.len().saturating_add(entries), what))
 }
 
-/// Gives a vector `rows · columns` entries, new ones zero; the memory of one that has some at least doubles when it must
-/// grow.
+/// Gives a vector `rows · columns` entries, new ones zero; the memory of one that has some at least doubles when it
+/// must grow.
 pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, what: &'static str) -> Result<()> {
     let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
     match vector.capacity() {

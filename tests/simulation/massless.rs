@@ -364,8 +364,8 @@ fn damping_at_such_dofs_does_not_ring() {
     }
 }
 
-/// A free mass (dof 1) with a foot (dof 0) on a spring k and a damper c side by side moves on: the foot follows by c ḋ +
-/// k d = 0, whatever velocity it was given.
+/// A free mass (dof 1) with a foot (dof 0) on a spring k and a damper c side by side moves on: the foot follows by
+/// c ḋ + k d = 0, whatever velocity it was given.
 #[test]
 fn a_damped_foot_in_the_air_does_not_move_its_mass() {
     const BETA: f64 = 0.05;
