@@ -1,6 +1,12 @@
 //! The one error type of the crate: every variant carries the numbers and says what to mend.
 
 mod check;
+
+/// The words for so many bytes.
+fn asked(bytes: Option<usize>) -> String {
+    bytes.map_or_else(String::new, |bytes| format!(": {bytes} bytes were asked for"))
+}
+
 #[cfg(test)]
 mod page;
 
@@ -302,11 +308,14 @@ pub enum Error {
         /// The frequency.
         frequency: f64,
     },
-    /// A factorization does not fit into memory or its index range.
-    #[error("no memory for {what}")]
+    /// A factorization, or the matrices of contact, do not fit into memory or their index range.
+    #[error("no memory for {what}{}", asked(*.bytes))]
     OutOfMemory {
         /// What was to be allocated.
         what: &'static str,
+        /// How much was asked for; none where that is known to the linear algebra library alone, or is more than can be
+        /// addressed.
+        bytes: Option<usize>,
     },
     /// A contact row has no effect on any free degree of freedom.
     #[error("contact {contact} acts on no free dof with mass: its row of G is zero or all its dofs are prescribed")]

@@ -185,8 +185,8 @@ pub trait Condensation<T: Real> {
 }
 
 /// Which of `count` parts each dof of a pattern belongs to. Nothing if the pattern is not symmetric, or too large.
-pub(crate) fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, count: usize) -> Option<Vec<usize>> {
-    quotient::Quotient::new(pattern, &[]).map(|quotient| dissection::parts(&quotient, count))
+pub(crate) fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, count: usize) -> Result<Option<Vec<usize>>> {
+    quotient::Quotient::new(pattern, &[])?.map(|quotient| dissection::parts(&quotient, count)).transpose()
 }
 
 /// Checks what is to be analyzed, and returns the number of dofs.

@@ -4,26 +4,46 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::dyn_stack::{MemBuffer, StackReq};
 
-/// A zero vector of `rows · columns` entries. Pages are touched when they are first written, not here.
+/// A zero vector of `rows · columns` entries.
 pub(crate) fn zeros<T: Real>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
-    reserve::<T>(rows, columns, what)?;
-    Ok(vec![T::zero(); rows * columns])
+    let mut vector = Vec::new();
+    grow(&mut vector, rows, columns, what)?;
+    Ok(vector)
 }
 
 /// An empty vector with room for `rows · columns` entries.
 pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
-    let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what })?;
+    let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
     let mut vector = Vec::new();
-    vector.try_reserve_exact(size).map_err(|_| Error::OutOfMemory { what })?;
+    vector.try_reserve_exact(size).map_err(|_| refused::<T>(size, what))?;
     Ok(vector)
 }
 
-/// Gives a vector `rows · columns` entries, new ones zero; its memory at least doubles when it must grow.
+/// Room for so many entries more than a vector has; its memory at least doubles when it must grow.
+pub(crate) fn make_room<T>(vector: &mut Vec<T>, entries: usize, what: &'static str) -> Result<()> {
+    vector.try_reserve(entries).map_err(|_| refused::<T>(vector.len().saturating_add(entries), what))
+}
+
+/// Gives a vector `rows · columns` entries, new ones zero; the memory of one that has some at least doubles when it
+/// must grow.
 pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, what: &'static str) -> Result<()> {
-    let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what })?;
-    vector.try_reserve(size.saturating_sub(vector.len())).map_err(|_| Error::OutOfMemory { what })?;
+    let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
+    match vector.capacity() {
+        0 => *vector = reserve(size, 1, what)?,
+        _ => make_room(vector, size.saturating_sub(vector.len()), what)?,
+    }
     vector.resize(size, T::zero());
     Ok(())
+}
+
+/// Whether `rows · columns` entries could be had, before a part of a host or of a library asks for them that cannot
+/// return an error.
+pub(crate) fn probe<T>(rows: usize, columns: usize, what: &'static str) -> Result<()> {
+    reserve::<T>(rows, columns, what).map(|_| ())
+}
+
+fn refused<T>(entries: usize, what: &'static str) -> Error {
+    Error::OutOfMemory { what, bytes: entries.checked_mul(size_of::<T>()) }
 }
 
 /// Scratch memory for faer's kernels; a clone starts empty.
@@ -62,8 +82,10 @@ mod tests {
 
     #[test]
     fn absurd_sizes_are_errors() {
-        assert!(matches!(zeros::<f64>(usize::MAX, 2, "x"), Err(Error::OutOfMemory { what: "x" })));
-        assert!(matches!(zeros::<f64>(1 << 40, 1 << 20, "x"), Err(Error::OutOfMemory { .. })));
+        assert!(matches!(zeros::<f64>(usize::MAX, 2, "x"), Err(Error::OutOfMemory { what: "x", bytes: None })));
+        let error = zeros::<f32>(1 << 40, 1 << 20, "x").unwrap_err();
+        assert!(matches!(error, Error::OutOfMemory { bytes: Some(bytes), .. } if bytes == 1 << 62), "{error}");
+        assert_eq!(error.to_string(), "no memory for x: 4611686018427387904 bytes were asked for");
         assert_eq!(zeros::<f32>(2, 2, "x").unwrap(), [0.0; 4]);
     }
 }

@@ -220,13 +220,13 @@ impl Combination {
             rows.extend_from_slice(&column_rows);
             pointers.push(rows.len());
         }
-        let slots = sources
+        let slots: Result<_> = sources
             .iter()
             .map(|source| {
                 if kept_as_it_is(*source, &pointers, &rows) {
-                    return None;
+                    return Ok(None);
                 }
-                let mut slots = Vec::with_capacity(source.row_idx().len());
+                let mut slots = memory::reserve(source.row_idx().len(), 1, "the pattern of the effective matrix")?;
                 for column in 0..n {
                     let range = pointers[column]..pointers[column + 1];
                     for row in source.row_idx_of_col_raw(column) {
@@ -234,9 +234,10 @@ impl Combination {
                         slots.push(found.map_or(DROPPED, |at| range.start + at));
                     }
                 }
-                Some(slots)
+                Ok(Some(slots))
             })
             .collect();
+        let slots = slots?;
         rows.shrink_to_fit();
         let entries = rows.len();
         let pattern = SymbolicSparseColMat::new_checked(n, n, pointers, None, rows);

@@ -683,3 +683,50 @@ fn friction_goes_on_too() {
         document["state"]["contacts"][field] = before;
     }
 }
+
+/// A writer that has room for so many bytes.
+struct Full {
+    room: usize,
+}
+
+impl std::io::Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = bytes.len().min(self.room);
+        self.room -= written;
+        match written {
+            0 => Err(std::io::ErrorKind::StorageFull.into()),
+            _ => Ok(written),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Whatever byte the disk is full after, the format says so, and the run goes on as if nothing had been written.
+#[test]
+fn a_full_disk_is_an_error_and_the_run_goes_on() {
+    let mut run = small(alpha()).build().unwrap();
+    let mut untouched = small(alpha()).build().unwrap();
+    for _ in 0..3 {
+        run.step().unwrap();
+        untouched.step().unwrap();
+    }
+    let files = save(&run);
+    for room in 0..files.text.len() {
+        let error = serde_json::to_writer(Full { room }, &run.checkpoint()).unwrap_err();
+        assert_eq!(error.io_error_kind(), Some(std::io::ErrorKind::StorageFull), "{room}");
+    }
+    serde_json::to_writer(Full { room: files.text.len() }, &run.checkpoint()).unwrap();
+    for room in 0..files.bytes.len() {
+        assert!(postcard::to_io(&run.checkpoint(), Full { room }).is_err(), "{room}");
+    }
+    postcard::to_io(&run.checkpoint(), Full { room: files.bytes.len() }).unwrap();
+    assert_eq!(save(&run), files);
+    for _ in 0..3 {
+        run.step().unwrap();
+        untouched.step().unwrap();
+        assert_eq!(run.state(), untouched.state());
+    }
+}

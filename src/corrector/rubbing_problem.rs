@@ -265,7 +265,7 @@ impl<T: Real> Rubbing<T> {
                 break;
             }
             least = least.min(change);
-            diverges = !(change <= T::of(DIVERGES) * least);
+            diverges = change > T::of(DIVERGES) * least || !change.is_finite();
             if diverges {
                 break;
             }

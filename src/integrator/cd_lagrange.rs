@@ -15,8 +15,11 @@ use crate::tableau::{ContactLevel, Rows, Stage, Tableau};
 ///
 /// * Order 2 on smooth motion; period shortening Ω²/24, no damping; stable for Ω < 2.
 /// * Conserves linear momentum in the form v + ½ h a. Impacts are plastic (restitution 0).
-/// * Contact is imposed on v' + ½ h a' once the gap has closed: a penetration below h times the approach speed stays
-///   while the contact lasts. At impact the force is the impulse over h, and no correction applies.
+/// * Contact is imposed on v' + ½ h a' once the gap has closed. A node that would meet an obstacle a fraction φ of a
+///   step after its beginning, at the relative speed v, keeps a penetration of (1 − φ) h v as long as they touch. It is
+///   of first order in h, and that of a single step: impacts do not add up (theory, 5.1; `docs/reliability.md` has long
+///   runs). [`CentralDifference`](crate::CentralDifference), with the same rows, has none. At impact the force is the
+///   impulse over h, and no correction applies.
 ///
 /// ```
 /// use contact_dynamics::{CdLagrange, TimeIntegrator, analysis};

@@ -17,8 +17,11 @@ use crate::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 /// * Unconditionally stable for θ ≥ ½; ρ∞ = (1 − θ)/θ. θ = ½ conserves the energy of linear free motion and has the
 ///   trapezoidal rule's spectrum.
 /// * Conserves linear momentum in the form v. Impacts are plastic (restitution 0).
-/// * Contact is imposed on the velocities at the end of the step. Gaps are not controlled: a penetration of the order
-///   of h times the approach speed stays. At the impact the force is the impulse over h, and no correction applies.
+/// * Contact is imposed on the velocities at the end of the step, and gaps are not controlled. A node that would meet
+///   an obstacle a fraction φ of a step after its beginning, at the relative speed v, keeps a penetration of
+///   (1 − θ − φ) h v for φ ≤ ½ and of (2 − θ − φ) h v beyond as long as they touch (negative: a gap); with θ = ½ that
+///   is ((½ − φ) mod 1) h v. It is of first order in h, and that of a single step: impacts do not add up (theory, 5.1;
+///   `docs/reliability.md` has long runs). At the impact the force is the impulse over h, and no correction applies.
 ///
 /// ```
 /// use contact_dynamics::{MoreauJean, TimeIntegrator, analysis};

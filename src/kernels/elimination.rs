@@ -3,6 +3,8 @@
 
 use super::forest::supernode_parents;
 use super::plan::{Plan, plan};
+use crate::error::Result;
+use crate::memory;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
@@ -36,7 +38,7 @@ impl Update {
 }
 
 impl Elimination {
-    pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
+    pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Result<Self> {
         let count = symbolic.n_supernodes();
         let size = |s: usize| symbolic.supernode_end()[s] - symbolic.supernode_begin()[s];
         let mut supernode_of = Vec::with_capacity(symbolic.nrows());
@@ -55,7 +57,8 @@ impl Elimination {
         }
         (0..count).for_each(|s| first[s + 1] += first[s]);
         let mut next = first.clone();
-        let mut updates = vec![Update { source: 0, first: 0, end: 0 }; first[count]];
+        let mut updates = memory::reserve(first[count], 1, "the updates of a sparse Cholesky factor")?;
+        updates.resize(first[count], Update { source: 0, first: 0, end: 0 });
         for source in 0..count {
             let below = symbolic.supernode(source).pattern();
             for rows in of_one_supernode(below, &supernode_of) {
@@ -65,7 +68,7 @@ impl Elimination {
             }
         }
         let plan = plan(&supernode_parents(symbolic, count), &work, GRAIN);
-        Self { updates, first, work, plan }
+        Ok(Self { updates, first, work, plan })
     }
 
     /// What updates a supernode.

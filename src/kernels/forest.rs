@@ -8,6 +8,8 @@
 //! for bit on any number of threads.
 
 use super::plan::{Plan, plan};
+use crate::error::Result;
+use crate::memory;
 use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
@@ -33,7 +35,7 @@ pub struct Forest {
 
 impl Forest {
     /// The supernodes whose columns all lie before `interior`.
-    pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>, interior: usize) -> Self {
+    pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>, interior: usize) -> Result<Self> {
         let count = symbolic.supernode_end().partition_point(|&end| end <= interior);
         let mut begins = symbolic.supernode_begin()[..count].to_vec();
         let end = count.checked_sub(1).map_or(0, |last| symbolic.supernode_end()[last]);
@@ -54,14 +56,16 @@ impl Forest {
             plan: Plan::Serial(0..count),
             offsets,
         };
-        forest.places = forest.places_in_parents(symbolic, &parents);
+        forest.places = forest.places_in_parents(symbolic, &parents)?;
         let reads: Vec<usize> = (0..count).map(|s| forest.reads(s)).collect();
         forest.plan = plan(&parents, &reads, GRAIN);
-        forest
+        Ok(forest)
     }
 
-    fn places_in_parents(&self, symbolic: &SymbolicSupernodalCholesky<usize>, parents: &[usize]) -> Vec<usize> {
-        let mut places = vec![0; self.offsets[parents.len()] - self.end];
+    fn places_in_parents(&self, symbolic: &SymbolicSupernodalCholesky<usize>, parents: &[usize]) -> Result<Vec<usize>> {
+        let size = self.offsets[parents.len()] - self.end;
+        let mut places = memory::reserve(size, 1, "the sweeps of a sparse Cholesky factor")?;
+        places.resize(size, 0);
         let mut place_of = vec![0; symbolic.nrows()];
         for parent in 0..parents.len() {
             let size = self.size(parent);
@@ -82,7 +86,7 @@ impl Forest {
                 *place = row - self.end;
             }
         }
-        places
+        Ok(places)
     }
 
     /// Scalars in the work vectors of all supernodes.
@@ -220,7 +224,7 @@ mod tests {
         ] {
             let (symbolic, interior) = grid(sides, &ordering);
             let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a solid") };
-            let forest = Forest::new(raw, interior);
+            let forest = Forest::new(raw, interior).unwrap();
             assert!(forest.end <= interior && forest.count() > 1);
             let mut order = Vec::new();
             let found = flatten(&forest.plan, &forest, &mut order);
@@ -233,7 +237,7 @@ mod tests {
     fn rows_find_their_places_in_the_parent() {
         let (symbolic, interior) = grid([15, 14, 13], &Ordering::NestedDissection);
         let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a solid") };
-        let forest = Forest::new(raw, interior);
+        let forest = Forest::new(raw, interior).unwrap();
         let mut seen = 0;
         for parent in 0..forest.count() {
             let rows: Vec<usize> =

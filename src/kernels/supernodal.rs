@@ -72,8 +72,11 @@ pub(crate) fn workspace<T: Scalar>(dofs: usize) -> Option<Workspace<T>> {
     place_of.try_reserve_exact(dofs).ok()?;
     place_of.resize(dofs, 0);
     let scratch = cholesky_in_place_scratch::<T>(PANEL, Par::Seq, Spec::default());
+    let (mut product, size) = (Vec::new(), TILE * ROWS.min(dofs));
+    product.try_reserve_exact(size).ok()?;
+    product.resize(size, T::zero());
     Some(Workspace {
-        product: vec![T::zero(); TILE * ROWS.min(dofs)],
+        product,
         places: Vec::with_capacity(ROWS),
         runs: Vec::with_capacity(ROWS),
         place_of,

@@ -257,7 +257,7 @@ impl<T: Real> Part<T> {
         }
         let own = SymbolicSparseColMatRef::new_checked(dofs.len(), dofs.len(), &pointers, None, &rows)
             .to_owned()
-            .map_err(|_| Error::OutOfMemory { what: "the pattern of a body" })?;
+            .map_err(|_| Error::OutOfMemory { what: "the pattern of a body", bytes: None })?;
         let of_body = |(_, dof): &(usize, &usize)| dofs.binary_search(dof).is_ok();
         let (interface, own_last): (Vec<usize>, Vec<usize>) =
             last.iter().enumerate().filter(of_body).map(|(at, &dof)| (at, places[dof])).unzip();

@@ -217,7 +217,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let (forest, elimination, workspaces) = match symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(_) => (None, None, None),
             SymbolicCholeskyRaw::Supernodal(raw) => {
-                (Some(Forest::new(raw, first)), Some(Elimination::new(raw)), Some(workspaces(n)?))
+                (Some(Forest::new(raw, first)?), Some(Elimination::new(raw)?), Some(workspaces(n)?))
             }
         };
         let work = memory::zeros(forest.as_ref().map_or(0, Forest::work), 1, "the sweeps of a sparse Cholesky factor")?;
@@ -249,12 +249,14 @@ impl<T: Real> LinearSolver<T> for Cholesky {
 
 /// Scratch of faer's kernels.
 fn buffer(size: StackReq) -> Result<MemBuffer> {
-    MemBuffer::try_new(size).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch" })
+    let bytes = Some(size.unaligned_bytes_required());
+    MemBuffer::try_new(size).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch", bytes })
 }
 
 /// What the threads of the current pool need for a factorization.
 fn workspaces<T: Real>(dofs: usize) -> Result<PerThread<Workspace<T>>> {
-    PerThread::new(|| T::supernodal_workspace(dofs)).ok_or(Error::OutOfMemory { what: "sparse Cholesky scratch" })
+    PerThread::new(|| T::supernodal_workspace(dofs))
+        .ok_or(Error::OutOfMemory { what: "sparse Cholesky scratch", bytes: None })
 }
 
 /// The largest number of rows that a sweep over part of a supernode's columns has below it.
@@ -427,7 +429,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         let size = self.size();
-        for columns in rhs.chunks_mut(size * WIDEST) {
+        for columns in rhs.chunks_mut((size * WIDEST).max(1)) {
             match self.symbolic.raw() {
                 SymbolicCholeskyRaw::Supernodal(_) if columns.len() > size => self.solve_together(columns)?,
                 _ => columns.chunks_exact_mut(size).for_each(|column| self.solve_one(column)),
@@ -484,12 +486,13 @@ impl<T: Real> Condensation<T> for Factor<T> {
         let Self { symbolic, values, below, trailing: x, interface: places, .. } = self;
         let columns = forces.len() / height;
         if x.len() < forces.len() {
-            x.resize(forces.len(), T::zero());
+            let what = "the interface of a sparse Cholesky factor";
+            memory::grow(x, forces.len(), 1, what)?;
             let tall = match symbolic.raw() {
                 SymbolicCholeskyRaw::Simplicial(_) => 0,
                 SymbolicCholeskyRaw::Supernodal(raw) => tallest(raw),
             };
-            below.resize(tall * columns, T::zero());
+            memory::grow(below, tall, columns, what)?;
         }
         let x = &mut x[..forces.len()];
         for (forces, x) in forces.chunks_exact(height).zip(x.chunks_exact_mut(height)) {

@@ -166,11 +166,14 @@ fn blocks(pattern: SymbolicSparseColMatRef<'_, usize>, size: usize) -> Result<(V
     pointers.push(0);
     for node in 0..nodes {
         let start = columns.len();
+        let others = (node * size..(node + 1) * size).map(|dof| pattern.row_idx_of_col_raw(dof).len()).sum();
+        memory::make_room(&mut columns, others, "the blocks of an iterative solver")?;
         // The pattern is symmetric: columns are rows.
         for dof in node * size..(node + 1) * size {
             let others = pattern.row_idx_of_col_raw(dof).iter().map(|other| other / size);
             for other in others.take_while(|other| *other < node) {
-                let other = u32::try_from(other).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits" })?;
+                let other =
+                    u32::try_from(other).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits", bytes: None })?;
                 if columns.len() == start || columns[columns.len() - 1] != other {
                     columns.push(other);
                 }

@@ -32,14 +32,14 @@ pub(super) fn by_coordinates(quotient: &Quotient, places: &[[f64; 3]]) -> Result
 }
 
 /// The part of each dof, of so many parts alike in size (one at least); dofs with the same neighbors are together.
-pub(super) fn parts(quotient: &Quotient, count: usize) -> Vec<usize> {
+pub(super) fn parts(quotient: &Quotient, count: usize) -> Result<Vec<usize>> {
     let graph = &quotient.graph;
-    let of_vertices = parts::parts(graph, count);
+    let of_vertices = parts::parts(graph, count)?;
     let mut parts = vec![0; quotient.size()];
     for (vertex, part) in (0..).zip(of_vertices) {
         quotient.dofs(vertex).iter().for_each(|&dof| parts[dof] = part);
     }
-    parts
+    Ok(parts)
 }
 
 /// `bisect` gets connected parts of the graph with the names of their vertices; `weigh` says whether it reads weights
@@ -49,7 +49,7 @@ fn dissect(quotient: &Quotient, weigh: bool, bisect: impl Fn(&Graph, &[u32]) -> 
     let mut local = vec![NONE; whole.size()];
     let interior: Vec<u32> = (0..number(whole.size())).filter(|&vertex| !quotient.is_last(vertex)).collect();
     let (sparse, dense) = without_dense(whole, interior);
-    let mut part = whole.part(&sparse, &mut local);
+    let mut part = whole.part(&sparse, &mut local)?;
     if weigh {
         part.weigh_edges();
     }
@@ -112,7 +112,7 @@ impl<F: Fn(&Graph, &[u32]) -> Separator + Sync> Dissection<'_, F> {
             put(order, &leaf::order(self.whole, &names, local));
             return Ok(());
         }
-        let part = part.part(piece, local);
+        let part = part.part(piece, local)?;
         let components = part.components();
         if components.len() > 1 {
             return self.pieces(&part, &names, components, order, local);
@@ -162,7 +162,7 @@ mod tests {
             let places: Vec<[f64; 3]> = (0..n).map(|i| [(i % 7) as f64, (i % 11) as f64, (i / 77) as f64]).collect();
             let side: Vec<usize> = (0..n / 5).collect();
             for last in [vec![], side, (0..n).step_by(3).collect(), (0..n).collect()] {
-                let quotient = Quotient::new(pattern.as_ref(), &last).unwrap();
+                let quotient = Quotient::new(pattern.as_ref(), &last).unwrap().unwrap();
                 for vertices in [by_graph(&quotient).unwrap(), by_coordinates(&quotient, &places).unwrap()] {
                     let mut order = quotient.expanded(&vertices);
                     order.extend(&last);
@@ -177,7 +177,7 @@ mod tests {
     fn orders_are_the_same_in_every_run() {
         let (n, pairs) = cube(7);
         let pattern = pattern(n, &pairs);
-        let order = || by_graph(&Quotient::new(pattern.as_ref(), &[1]).unwrap()).unwrap();
+        let order = || by_graph(&Quotient::new(pattern.as_ref(), &[1]).unwrap().unwrap()).unwrap();
         assert_eq!(order(), order());
     }
 
@@ -194,9 +194,9 @@ mod tests {
     #[test]
     fn separators_separate_and_refinement_makes_them_lighter() {
         for (n, pairs) in [cube(8), (600, strewn(600, 900, 5)), (300, chain(300))] {
-            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
+            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().unwrap().graph;
             let largest = graph.components().into_iter().max_by_key(Vec::len).unwrap();
-            let graph = graph.part(&largest, &mut vec![NONE; graph.size()]);
+            let graph = graph.part(&largest, &mut vec![NONE; graph.size()]).unwrap();
             for seed in [0, graph.size() / 3, graph.size() - 1] {
                 let grown = grow(&graph, number(seed));
                 check_separates(&graph, &grown);
@@ -212,7 +212,7 @@ mod tests {
     fn a_cube_is_cut_into_halves_by_a_plane() {
         for side in [9, 12, 15, 24] {
             let (n, pairs) = cube(side);
-            let mut graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
+            let mut graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().unwrap().graph;
             graph.weigh_edges();
             let separator = multilevel::bisect(&graph);
             check_separates(&graph, &separator);

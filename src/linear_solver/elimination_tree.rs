@@ -99,7 +99,7 @@ mod tests {
     fn fill_is_that_of_the_elimination() {
         for (n, pairs) in [cube(4), frame(60), (90, chain(90)), (150, strewn(150, 200, 4)), (9, vec![])] {
             for last in [vec![], (0..n).step_by(5).collect::<Vec<_>>()] {
-                let quotient = Quotient::new(pattern(n, &pairs).as_ref(), &last).unwrap();
+                let quotient = Quotient::new(pattern(n, &pairs).as_ref(), &last).unwrap().unwrap();
                 let graph = &quotient.graph;
                 let size = number(graph.size());
                 // Interior vertices strewn, the others behind them.

@@ -1,5 +1,7 @@
 //! Undirected graphs with weights, and parts of them.
 
+use crate::error::Result;
+use crate::memory;
 use faer::sparse::SymbolicSparseColMatRef;
 
 /// No vertex: a graph has fewer.
@@ -23,11 +25,16 @@ pub(super) struct Graph {
 
 impl Graph {
     /// A graph without vertices, with room for some.
-    pub(super) fn with_capacity(vertices: usize, entries: usize) -> Self {
-        let mut starts = Vec::with_capacity(vertices + 1);
+    pub(super) fn with_capacity(vertices: usize, entries: usize) -> Result<Self> {
+        let room = |entries: usize| memory::reserve(entries, 1, "the graph of a matrix, whose order is sought");
+        let mut starts = room(vertices + 1)?;
         starts.push(0);
-        let (neighbors, edges) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        Self { starts, neighbors, edges, weights: Vec::with_capacity(vertices) }
+        Ok(Self { starts, neighbors: room(entries)?, edges: room(entries)?, weights: room(vertices)? })
+    }
+
+    /// One that is smaller than another which is there; it gets its memory as it grows.
+    pub(super) fn smaller() -> Self {
+        Self { starts: vec![0], neighbors: Vec::new(), edges: Vec::new(), weights: Vec::new() }
     }
 
     /// Adds an edge of the vertex that the next [`close`](Self::close) adds, and returns its place.
@@ -110,9 +117,9 @@ impl Graph {
     }
 
     /// The graph of some of the vertices; `local` has room for all of them, with [`NONE`] everywhere, and is left so.
-    pub(super) fn part(&self, vertices: &[u32], local: &mut [u32]) -> Self {
+    pub(super) fn part(&self, vertices: &[u32], local: &mut [u32]) -> Result<Self> {
         let entries = vertices.iter().map(|&vertex| self.neighbors(vertex).len()).sum();
-        let mut part = Self::with_capacity(vertices.len(), entries);
+        let mut part = Self::with_capacity(vertices.len(), entries)?;
         for (place, &vertex) in vertices.iter().enumerate() {
             local[vertex as usize] = number(place);
         }
@@ -127,7 +134,7 @@ impl Graph {
         for &vertex in vertices {
             local[vertex as usize] = NONE;
         }
-        part
+        Ok(part)
     }
 
     /// The connected parts, each as a list of its vertices.

@@ -99,11 +99,11 @@ impl<T: Real> LinearSolver<T> for Lu {
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
         let n = check_analysis(pattern, last)?;
-        let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU" };
+        let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU", bytes: None };
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(no_memory)?;
         let bound = bound(pattern, &symbolic)?;
         let memory = MemBuffer::try_new(T::lu_scratch(&symbolic, 1))
-            .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch" })?;
+            .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch", bytes: None })?;
         let pattern = pattern.to_owned().map_err(no_memory)?;
         let zero = |columns| memory::zeros(n, columns, "a sparse LU");
         Ok(Box::new(Factor {
@@ -126,7 +126,7 @@ impl<T: Real> LinearSolver<T> for Lu {
 /// factor of AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8, 1987).
 fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usize>) -> Result<usize> {
     let n = pattern.ncols();
-    let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU" };
+    let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU", bytes: None };
     let transposed = pattern.transpose().to_col_major().map_err(|_| no_memory())?;
     let scratch = qr::col_etree_scratch::<usize>(n, n)
         .or(qr::postorder_scratch::<usize>(n))
@@ -268,7 +268,7 @@ impl<T: Real> Factor<T> {
                 let order = symbolic.col_perm().arrays().0;
                 Ok(order.get(index).copied().unwrap_or(0))
             }
-            LuError::Generic(_) => Err(Error::OutOfMemory { what: "a sparse LU" }),
+            LuError::Generic(_) => Err(Error::OutOfMemory { what: "a sparse LU", bytes: None }),
         })
     }
 
@@ -359,7 +359,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
         let count = rhs.len().checked_div(size).unwrap_or(0);
         if count > self.room {
             self.memory = MemBuffer::try_new(T::lu_scratch(&self.symbolic, count))
-                .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch" })?;
+                .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch", bytes: None })?;
             self.room = count;
         }
         let Self { symbolic, numeric, rows, columns, memory, .. } = self;

@@ -19,5 +19,5 @@ pub(super) fn minimum_degree<I: Index>(pattern: SymbolicSparseColMatRef<'_, I>) 
 }
 
 pub(super) fn out_of_memory<E>(_: E) -> Error {
-    Error::OutOfMemory { what: "a sparse Cholesky factor" }
+    Error::OutOfMemory { what: "a sparse Cholesky factor", bytes: None }
 }

@@ -83,7 +83,7 @@ pub(crate) fn symbolic_cholesky(
         _ => {}
     }
     // A pattern that is not symmetric has no graph: entries that are zero to rounding stand on one side alone.
-    let Some(quotient) = Quotient::new(pattern, last) else {
+    let Some(quotient) = Quotient::new(pattern, last)? else {
         return with_order(pattern, &moved_last(&minimum_degree(pattern)?, last));
     };
     let best = match ordering {

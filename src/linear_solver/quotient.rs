@@ -4,6 +4,7 @@
 pub(super) mod patterns;
 
 use super::graph::{Graph, NONE, number};
+use crate::error::Result;
 use crate::sparse::scattered;
 use faer::sparse::SymbolicSparseColMatRef;
 
@@ -21,12 +22,12 @@ pub(super) struct Quotient {
 
 impl Quotient {
     /// Nothing if the pattern is not symmetric, or too large for 32 bits.
-    pub(super) fn new(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Option<Self> {
+    pub(super) fn new(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<Option<Self>> {
         let n = pattern.nrows();
         if n.max(pattern.row_idx().len()) >= NONE as usize {
-            return None;
+            return Ok(None);
         }
-        let keys = keys(pattern, last)?;
+        let Some(keys) = keys(pattern, last) else { return Ok(None) };
         // The vertex of each dof, and the dofs of each vertex.
         let mut vertex = vec![NONE; n];
         let (mut dofs, mut starts) = (Vec::with_capacity(n), vec![0]);
@@ -48,7 +49,7 @@ impl Quotient {
         let vertices = starts.len() - 1;
         let first = |vertex: usize| dofs[starts[vertex]];
         let entries = (0..vertices).map(|vertex| pattern.row_idx_of_col_raw(first(vertex)).len()).sum::<usize>();
-        let mut graph = Graph::with_capacity(vertices, entries * vertices / n.max(1));
+        let mut graph = Graph::with_capacity(vertices, entries * vertices / n.max(1))?;
         let mut seen = vec![NONE; vertices];
         for name in 0..vertices {
             seen[name] = number(name);
@@ -60,7 +61,7 @@ impl Quotient {
             graph.close(number(starts[name + 1] - starts[name]));
         }
         let last = (0..vertices).map(|vertex| last.binary_search(&first(vertex)).is_ok()).collect();
-        Some(Self { graph, dofs, starts, last })
+        Ok(Some(Self { graph, dofs, starts, last }))
     }
 
     /// Number of dofs.
@@ -118,10 +119,10 @@ mod tests {
     fn dofs_of_a_node_are_one_vertex() {
         let (n, pairs) = cube(4);
         let pattern = pattern(n, &pairs);
-        let whole = Quotient::new(pattern.as_ref(), &[]).unwrap();
+        let whole = Quotient::new(pattern.as_ref(), &[]).unwrap().unwrap();
         assert_eq!((whole.graph.size(), whole.graph.total()), (64, 192));
         // A node of which one dof is eliminated last, and one of which all are.
-        let parts = Quotient::new(pattern.as_ref(), &[0, 3, 4, 5]).unwrap();
+        let parts = Quotient::new(pattern.as_ref(), &[0, 3, 4, 5]).unwrap().unwrap();
         assert_eq!((parts.graph.size(), parts.graph.total()), (65, 192));
         let last: Vec<_> = (0..65).filter(|&vertex| parts.is_last(vertex)).map(|vertex| parts.dofs(vertex)).collect();
         assert_eq!(last, [&[0][..], &[3, 4, 5]]);
@@ -138,7 +139,7 @@ mod tests {
                 near[j].insert(i);
             }
             let last: Vec<usize> = (0..n).step_by(4).collect();
-            let quotient = Quotient::new(pattern(n, &pairs).as_ref(), &last).unwrap();
+            let quotient = Quotient::new(pattern(n, &pairs).as_ref(), &last).unwrap().unwrap();
             let mut vertex = vec![NONE; n];
             for name in 0..number(quotient.graph.size()) {
                 quotient.dofs(name).iter().for_each(|&dof| vertex[dof] = name);
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn one_sided_patterns_have_no_graph() {
         let one_sided = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 3], None, vec![0, 1, 1]);
-        assert!(Quotient::new(one_sided.as_ref(), &[]).is_none());
+        assert!(Quotient::new(one_sided.as_ref(), &[]).unwrap().is_none());
         // As many entries above the diagonal as below, in all rows and columns.
         let rows = (0..5).flat_map(|j: usize| {
             let mut rows = [j, (j + 1) % 5];
@@ -167,6 +168,6 @@ mod tests {
             rows
         });
         let circle = SymbolicSparseColMat::new_checked(5, 5, vec![0, 2, 4, 6, 8, 10], None, rows.collect());
-        assert!(Quotient::new(circle.as_ref(), &[]).is_none());
+        assert!(Quotient::new(circle.as_ref(), &[]).unwrap().is_none());
     }
 }

@@ -43,6 +43,6 @@ pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)
     }
     let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
         .to_owned()
-        .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix" })?;
+        .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix", bytes: None })?;
     Ok(SparseColMat::new(pattern, values))
 }

@@ -415,7 +415,9 @@ fn lower<T: Real>(mass: SparseColMatRef<'_, usize, T>, layers: &Layers) -> Resul
     pointers.push(0);
     for place in 0..places {
         for (other, value) in row(place) {
-            columns.push(u32::try_from(other).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits" })?);
+            columns.push(
+                u32::try_from(other).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits", bytes: None })?,
+            );
             values.push(value);
         }
         pointers.push(columns.len());

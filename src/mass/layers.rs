@@ -35,7 +35,7 @@ impl Layers {
         left_out: &[usize],
     ) -> Result<Self> {
         let dofs = matrix.ncols();
-        let count = u32::try_from(dofs).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits" })?;
+        let count = u32::try_from(dofs).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits", bytes: None })?;
         let mut places = vec![NONE; dofs];
         // (A place that no layer has, until the dofs left out lose it again.)
         for &dof in left_out {

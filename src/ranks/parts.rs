@@ -45,7 +45,7 @@ pub fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, count: usize) -> Resul
     if expected != found {
         return Err(Error::Dimension { what: "the pattern to cut", expected, found });
     }
-    linear_solver::parts(pattern, count).ok_or(Error::Incompatible {
+    linear_solver::parts(pattern, count)?.ok_or(Error::Incompatible {
         part: "the pattern to cut".into(),
         reason: "it is not symmetric, or has too many entries for numbers of 32 bits",
     })

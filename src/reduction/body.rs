@@ -111,7 +111,8 @@ fn scalars<T: Real>(values: &[f64]) -> Vec<T> {
 }
 
 fn owned<T: Real>(a: SparseColMatRef<'_, usize, T>) -> Result<SparseColMat<usize, T>> {
-    let pattern = a.symbolic().to_owned().map_err(|_| Error::OutOfMemory { what: "the mass of the parent" })?;
+    let pattern =
+        a.symbolic().to_owned().map_err(|_| Error::OutOfMemory { what: "the mass of the parent", bytes: None })?;
     Ok(SparseColMat::new(pattern, a.val().to_vec()))
 }
 

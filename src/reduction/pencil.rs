@@ -105,7 +105,7 @@ pub(super) fn part<T: Real>(
         }
     }
     SparseColMat::try_new_from_triplets(free.len(), columns.len(), &entries)
-        .map_err(|_| Error::OutOfMemory { what: "the free part of a matrix" })
+        .map_err(|_| Error::OutOfMemory { what: "the free part of a matrix", bytes: None })
 }
 
 impl Pencil {

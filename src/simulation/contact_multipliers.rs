@@ -9,6 +9,7 @@ use crate::contact::Measure;
 use crate::contact_solver::{ContactFailure, ContactProblem};
 use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::real::Real;
 use crate::state::Motion;
 
@@ -151,8 +152,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let (y, tolerance, weight, enabled) = (&rows.y, &rows.tolerance, &rows.weight, &rows.enabled);
             let (compliance, shift, in_problem) = (&mut rows.compliance, &mut rows.shift, &mut rows.in_problem);
             let (problem, offset, problem_tolerance) = (&rows.problem, &rows.offset, &rows.problem_tolerance);
-            let (own, scale, versions, reserved) =
-                (&mut rows.own, &mut rows.scale, &mut rows.versions, &mut rows.reserved);
+            let (own, scale, versions) = (&mut rows.own, &mut rows.scale, &mut rows.versions);
+            let (reserved, most) = (&mut rows.reserved, &mut rows.most);
             let (sets, multipliers, known, forces) =
                 (&rows.sets, &mut rows.multipliers, &mut rows.known, rows.curved.forces(g));
             let guess = |problem: &[usize], multipliers: &mut Vec<T>| {
@@ -175,9 +176,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 let (mut iterations, mut first_set) = (0, 0);
                 for group in 0..operator.groups().len() {
                     let range = operator.groups().range(group);
-                    if range.len() > *reserved {
-                        *reserved = range.len().next_power_of_two();
-                        solver.reserve(*reserved);
+                    if range.len() > *most {
+                        // (Beside W solvers take two matrices as large, and cannot return that there is no memory.)
+                        let rows = if range.len() > *reserved { range.len().next_power_of_two() } else { range.len() };
+                        memory::probe::<T>(rows, 3 * rows, "the contact solver")?;
+                        *most = rows;
+                        if rows > *reserved {
+                            *reserved = rows;
+                            solver.reserve(rows);
+                        }
                     }
                     let own = &problem[range.clone()];
                     let is_known = |row: &usize| weight[*row] == T::zero();

@@ -74,6 +74,8 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) sorted: Vec<usize>,
     /// Rows for which the contact solver has memory.
     pub(super) reserved: usize,
+    /// Rows for which it is known that there was memory when they were first to be solved for; a few take little.
+    pub(super) most: usize,
     /// Number of Delassus operators assembled so far: the newest version.
     pub(super) versions: u64,
     pub(super) offset: Vec<T>,
@@ -116,6 +118,7 @@ impl<T: Real> ContactRowsWork<T> {
             scale: Vec::new(),
             sorted: Vec::new(),
             reserved: rows.min(FORESEEN),
+            most: FORESEEN,
             versions: 0,
             offset: Vec::new(),
             problem_tolerance: Vec::new(),

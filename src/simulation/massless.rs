@@ -44,16 +44,9 @@ impl<T: Real> Columns<T> {
             free[dof] = false;
         }
         let mut columns = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
-        let entries = system.pattern().row_idx().len();
-        if entries > 0 {
-            let mut values = vec![T::zero(); entries];
+        if !system.pattern().row_idx().is_empty() {
             let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
-            system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
-            let k = SparseColMatRef::new(system.pattern(), &values);
-            for &dof in dofs {
-                columns.push(k.row_idx_of_col_raw(dof).iter().copied().zip(k.val_of_col(dof).iter().copied()), &free);
-            }
-            return Ok(columns);
+            return Self::of_tangent(system, dofs, at, weights, &free);
         }
         let mut force = vec![T::zero(); system.dofs()];
         let (mut moved, mut u) = (force.clone(), at.u.clone());
@@ -74,6 +67,30 @@ impl<T: Real> Columns<T> {
                 if known { difference / step } else { T::zero() }
             });
             columns.push(differences.enumerate(), &free);
+        }
+        Ok(columns)
+    }
+
+    /// Columns of C, from the tangent.
+    pub(super) fn of_damping(system: &mut dyn System<T>, dofs: &[usize], at: &Motion<T>) -> Result<Self> {
+        let weights = TangentWeights { stiffness: T::zero(), damping: T::one() };
+        let free = vec![true; system.dofs()];
+        Self::of_tangent(system, dofs, at, weights, &free)
+    }
+
+    fn of_tangent(
+        system: &mut dyn System<T>,
+        dofs: &[usize],
+        at: &Motion<T>,
+        weights: TangentWeights<T>,
+        free: &[bool],
+    ) -> Result<Self> {
+        let mut columns = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
+        let mut values = vec![T::zero(); system.pattern().row_idx().len()];
+        system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
+        let sum = SparseColMatRef::new(system.pattern(), &values);
+        for &dof in dofs {
+            columns.push(sum.row_idx_of_col_raw(dof).iter().copied().zip(sum.val_of_col(dof).iter().copied()), free);
         }
         Ok(columns)
     }

@@ -9,6 +9,7 @@ use crate::contact::{Candidates, ContactJacobian};
 use crate::contact_solver::{ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
+use crate::linear_solver::Factorization;
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
@@ -137,6 +138,41 @@ pub(super) fn balance_start<T: Real>(
         }
     }
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: worst })
+}
+
+/// Gives dofs without mass that damping acts on the velocities that their balance asks for, f_b(t, u, v) = 0, by
+/// Newton's method: their displacements are initial values, their velocities are not. With others the damping force of
+/// the start would not be in balance, and accelerate those with mass as nothing inside of a body does. They are left as
+/// they were given where their part of C is not symmetric positive definite, or no balance is found.
+pub(super) fn balance_rates<T: Real>(system: &mut dyn System<T>, dofs: &[usize], motion: &mut Motion<T>) -> Result<()> {
+    if dofs.is_empty() || system.pattern().row_idx().is_empty() || !is_damped(system, dofs)? {
+        return Ok(());
+    }
+    let given = motion.v.clone();
+    let mut residual = vec![T::zero(); given.len()];
+    for _ in 0..ITERATIONS {
+        system.force(motion.t, &motion.u, &motion.v, &mut residual)?;
+        let columns = Columns::of_damping(system, dofs, motion)?;
+        match Embedded::factorized(&columns, dofs, &[]) {
+            Ok(mut factor) => factor.solve(&mut residual)?,
+            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => break,
+            Err(other) => return Err(other),
+        }
+        let (mut size, mut scale) = (T::zero(), T::zero());
+        for &dof in dofs {
+            motion.v[dof] += residual[dof];
+            size = size.max(residual[dof].abs());
+            scale = scale.max(motion.v[dof].abs());
+        }
+        if !T::all_finite(&motion.v) {
+            break;
+        }
+        if size <= T::of(1e3) * T::epsilon() * scale {
+            return Ok(());
+        }
+    }
+    motion.v = given;
+    Ok(())
 }
 
 /// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns

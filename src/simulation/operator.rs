@@ -17,6 +17,8 @@ use crate::system::{Linearity, System, TangentWeights};
 use delassus::Delassus;
 use faer::sparse::SparseColMatRef;
 
+const VALUES: &str = "the values of the effective matrix";
+
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
 /// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A solve has two
@@ -151,9 +153,9 @@ impl<T: Real> Operator<T> {
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
         let Self { weights, tangent, linearity, combination, factor, part, end: at_end, values, .. } = self;
         check_sources(&*system, *tangent, combination)?;
-        values.resize(combination.len(), T::zero());
+        memory::grow(values, combination.len(), 1, VALUES)?;
         if *tangent == Tangent::Present {
-            part.resize(system.pattern().row_idx().len(), T::zero());
+            memory::grow(part, system.pattern().row_idx().len(), 1, VALUES)?;
             let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
             match at.of {
                 TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
@@ -165,7 +167,7 @@ impl<T: Real> Operator<T> {
                     // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which that of the middle
                     // term counts half: ⅔ K in the middle and ⅓ K at the end.
                     let third = weights.stiffness / T::of(3.0);
-                    at_end.resize(part.len(), T::zero());
+                    memory::grow(at_end, part.len(), 1, VALUES)?;
                     let of_end = TangentWeights { stiffness: third, damping: T::zero() };
                     system.tangent(at.t, end, at.v, of_end, at_end)?;
                     let of_middle = TangentWeights { stiffness: third + third, ..weights };

@@ -4,6 +4,7 @@ use super::scheme::Scheme;
 use crate::analysis::{self, ZeroStability};
 use crate::error::{Error, Result};
 use crate::mass::InverseMass;
+use crate::memory;
 use crate::ranks::Together;
 use crate::real::Real;
 use crate::sparse::{self, Product, Symmetry};
@@ -226,7 +227,7 @@ impl<'s, T: Real> Stiffness<'s, T> {
         let dofs = system.dofs();
         let entries = system.pattern().row_idx().len();
         if entries > 0 {
-            let mut values = vec![T::zero(); entries];
+            let mut values = memory::zeros(entries, 1, "the stiffness, whose highest frequency is sought")?;
             let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
             system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
             let k = SparseColMatRef::new(system.pattern(), &values[..]);

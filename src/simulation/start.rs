@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::finite::check_state;
-use super::massless_start::{Balanced, StartAdjustment, balance_start};
+use super::massless_start::{Balanced, StartAdjustment, balance_rates, balance_start};
 use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
@@ -192,6 +192,11 @@ impl<T: Real> Start<'_, T> {
                 contacts.reset(&constraints.ids, constraints.tangents());
                 touching = touching_contacts(constraints, g, (&motion, missed), h, violation, &mut contacts)?;
             }
+        }
+
+        let acts = |row: usize| touching[row] || contacts.gap[row] <= T::zero();
+        if !(0..constraints.len()).any(|row| acts(row) && g.acts_on(row, massless)) {
+            balance_rates(&mut **system, massless, &mut motion)?;
         }
 
         // Accelerations without contact: M a = f − M a_p on free dofs.

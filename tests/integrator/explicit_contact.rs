@@ -87,6 +87,29 @@ fn contact_on_velocities_leaves_the_rest_of_the_step_of_the_impact() {
     }
 }
 
+/// A rigid mass that Moreau and Jean's scheme stops on a floor, for any θ: (1 − θ − φ) h v below it where the impact is
+/// in the first half of a step, (2 − θ − φ) h v in the second (negative: above).
+#[test]
+fn moreau_and_jean_leave_what_theta_says() {
+    let (h, speed) = (1e-2, 3.0);
+    for theta in [0.5, 0.6, 0.75, 1.0] {
+        for phase in (0..10).map(|i| 0.05 + 0.1 * f64::from(i)) {
+            let gap = (4.0 + phase) * h * speed;
+            let mut run = Simulation::builder(free(&[2.0]), MoreauJean::new(theta).unwrap(), h)
+                .velocity(vec![-speed])
+                .constraint(LinearRows::new().unilateral(&[(0, 1.0)], gap))
+                .build()
+                .unwrap();
+            for _ in 0..20 {
+                run.step().unwrap();
+            }
+            let depth = if phase <= 0.5 { 1.0 - theta - phase } else { 2.0 - theta - phase };
+            let kept = -run.gaps()[0] / (h * speed);
+            assert!((kept - depth).abs() < 1e-12, "θ = {theta}, φ = {phase}: {kept}, not {depth}");
+        }
+    }
+}
+
 /// A step from an open gap goes no deeper than its own way, one from a closed gap no deeper than it began: penetrations
 /// do not add up, however many impacts there are.
 #[test]

@@ -364,6 +364,36 @@ fn damping_at_such_dofs_does_not_ring() {
     }
 }
 
+/// A free mass (dof 1) with a foot (dof 0) on a spring k and a damper c side by side moves on: the foot follows by
+/// c ḋ + k d = 0, whatever velocity it was given.
+#[test]
+fn a_damped_foot_in_the_air_does_not_move_its_mass() {
+    const BETA: f64 = 0.05;
+    let (pressed, mut schemes) = (0.01, 0);
+    for listed in all() {
+        for told in [0.0, 7.0, SPEED - pressed / BETA] {
+            let system = spring_and_mass().rayleigh(0.0, BETA).unwrap();
+            let built = Simulation::builder(system, (listed.make)(), 1e-3)
+                .displacement(vec![pressed, 0.0])
+                .velocity(vec![told, SPEED])
+                .build();
+            let Ok(mut run) = built else { break };
+            let start = run.state().velocity()[0];
+            assert!((start - (SPEED - pressed / BETA)).abs() < 1e-13, "{}: {start}", listed.name());
+            for _ in 0..100 {
+                run.step().unwrap();
+                let v = run.state().velocity()[1];
+                assert!((v - SPEED).abs() < 1e-12, "{}, told {told}: {v} at {}", listed.name(), run.time());
+            }
+            let [foot, mass] = [0, 1].map(|dof| run.state().displacement()[dof]);
+            let way = pressed * (-run.time() / BETA).exp();
+            assert!((foot - mass - way).abs() < 0.02 * pressed, "{}: {} {way}", listed.name(), foot - mass);
+            schemes += 1;
+        }
+    }
+    assert!(schemes >= 45, "{schemes}");
+}
+
 const RUBBER: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
 
 /// Lumped masses of a plane solid whose bottom nodes have none, and these nodes.

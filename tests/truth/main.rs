@@ -5,5 +5,6 @@
 
 mod friction;
 mod laws;
+mod newton;
 mod rigid;
 mod sweep;

@@ -6,6 +6,8 @@ use crate::options::{Options, Target};
 use crate::scene;
 use contact_dynamics::Checkpoint;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// What is in the file, behind [`MAGIC`].
@@ -43,9 +45,8 @@ impl Saved {
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(postcard::to_stdvec(self)?);
-        let unfinished = path.with_extension("unfinished");
-        std::fs::write(&unfinished, bytes)?;
-        Ok(std::fs::rename(&unfinished, path)?)
+        replace(path, |file| file.write_all(&bytes))
+            .map_err(|error| format!("the checkpoint {} cannot be written: {error}", path.display()).into())
     }
 
     pub fn read(path: &Path) -> Result<Self> {
@@ -65,6 +66,22 @@ impl Saved {
     }
 }
 
+/// Puts a file in the place of one that there may be, once it is written whole: if that fails, on a full disk for
+/// instance, the old one is as it was, and nothing is left beside it.
+fn replace(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    let unfinished = path.with_extension("unfinished");
+    let written = File::create(&unfinished).and_then(|mut file| {
+        write(&mut file)?;
+        file.sync_all()
+    });
+    let replaced = written.and_then(|()| std::fs::rename(&unfinished, path));
+    if replaced.is_err() {
+        // (It is of no use to anybody; the first error is the one to tell.)
+        _ = std::fs::remove_file(&unfinished);
+    }
+    replaced
+}
+
 /// A number for the content of each mesh file (FNV-1a).
 fn prints(options: &Options) -> Result<Vec<u64>> {
     let mut paths = vec![scene::part(options)];
@@ -79,4 +96,54 @@ fn prints(options: &Options) -> Result<Vec<u64>> {
             .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)))
     };
     paths.iter().map(print).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder with an old file in it.
+    fn folder(name: &str) -> (std::path::PathBuf, std::path::PathBuf) {
+        let folder = std::env::temp_dir().join(format!("drop-test-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("checkpoint.bin");
+        std::fs::write(&path, "old").unwrap();
+        (folder, path)
+    }
+
+    fn files(folder: &Path) -> Vec<std::ffi::OsString> {
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect()
+    }
+
+    #[test]
+    fn a_disk_that_is_full_after_any_byte_leaves_the_old_file() {
+        let (folder, path) = folder("any-byte");
+        let bytes = b"a checkpoint of some length";
+        for room in 0..bytes.len() {
+            let error = replace(&path, |file| {
+                file.write_all(&bytes[..room])?;
+                Err(io::ErrorKind::StorageFull.into())
+            });
+            assert_eq!(error.unwrap_err().kind(), io::ErrorKind::StorageFull);
+            assert_eq!(std::fs::read(&path).unwrap(), b"old");
+            assert_eq!(files(&folder), ["checkpoint.bin"]);
+        }
+        replace(&path, |file| file.write_all(bytes)).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
+        assert_eq!(files(&folder), ["checkpoint.bin"]);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    /// The device that is always full in the place of the unfinished file.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_device_leaves_the_old_file() {
+        let (folder, path) = folder("full-device");
+        std::os::unix::fs::symlink("/dev/full", path.with_extension("unfinished")).unwrap();
+        let error = replace(&path, |file| file.write_all(b"new")).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(files(&folder), ["checkpoint.bin"]);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

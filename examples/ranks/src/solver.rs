@@ -57,7 +57,7 @@ struct Factor {
 fn failed(what: &'static str) -> impl Fn(Failed) -> Error {
     move |failed| match failed {
         // INFOG(1) of MUMPS: memory that cannot be had.
-        Failed(-5 | -7 | -8 | -9 | -13 | -19, _) => Error::OutOfMemory { what: "the factor of MUMPS" },
+        Failed(-5 | -7 | -8 | -9 | -13 | -19, _) => Error::OutOfMemory { what: "the factor of MUMPS", bytes: None },
         Failed(-10, _) => Error::Singular { matrix: "effective matrix", dof: 0 },
         other => Error::Host { callback: what, source: other.into() },
     }

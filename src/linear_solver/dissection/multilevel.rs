@@ -99,7 +99,7 @@ fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, 
     if pairs.len() * 20 > n * 19 {
         return None;
     }
-    let mut joined = Graph::with_capacity(pairs.len(), graph.entries() / 2);
+    let mut joined = Graph::smaller();
     let mut place = vec![(NONE, 0); pairs.len()];
     for (name, &(one, other)) in (0_u32..).zip(&pairs) {
         let both = if one == other { &[one][..] } else { &[one, other][..] };

@@ -3,6 +3,7 @@
 
 use super::multilevel;
 use super::separator::BETWEEN;
+use crate::error::Result;
 use crate::linear_solver::graph::{Graph, NONE, number};
 
 /// Pieces for each part. Pieces are compact, and neighbors in the tree are neighbors in space as a rule; so parts are
@@ -10,12 +11,12 @@ use crate::linear_solver::graph::{Graph, NONE, number};
 const PIECES: i64 = 32;
 
 /// The part of each vertex.
-pub(super) fn parts(graph: &Graph, count: usize) -> Vec<usize> {
+pub(super) fn parts(graph: &Graph, count: usize) -> Result<Vec<usize>> {
     let many = i64::try_from(count).unwrap_or(i64::MAX);
     let mut pieces = Pieces { largest: graph.total() / many.saturating_mul(PIECES), order: Vec::new() };
     let mut whole = graph.clone();
     whole.weigh_edges();
-    pieces.cut(&whole, &(0..number(graph.size())).collect::<Vec<_>>());
+    pieces.cut(&whole, &(0..number(graph.size())).collect::<Vec<_>>())?;
     let (total, mut before) = (graph.total() as f64, 0.0);
     let mut parts = vec![0; graph.size()];
     for vertex in pieces.order {
@@ -26,7 +27,7 @@ pub(super) fn parts(graph: &Graph, count: usize) -> Vec<usize> {
         parts[vertex as usize] = part.min(count - 1);
         before += weight;
     }
-    parts
+    Ok(parts)
 }
 
 struct Pieces {
@@ -38,10 +39,10 @@ struct Pieces {
 
 impl Pieces {
     /// Cuts a part of the graph, whose vertices have these names, into halves, and those again.
-    fn cut(&mut self, part: &Graph, names: &[u32]) {
+    fn cut(&mut self, part: &Graph, names: &[u32]) -> Result<()> {
         if part.total() <= self.largest || part.size() < 2 {
             self.order.extend(names);
-            return;
+            return Ok(());
         }
         let mut local = vec![NONE; part.size()];
         let mut sides = part.components();
@@ -51,7 +52,7 @@ impl Pieces {
             if sides.iter().any(Vec::is_empty) {
                 // All vertices are neighbors.
                 self.order.extend(names);
-                return;
+                return Ok(());
             }
             // What is between belongs to the lighter side.
             let [one, other, _] = separator.weights;
@@ -59,8 +60,9 @@ impl Pieces {
         }
         for side in sides {
             let names: Vec<u32> = side.iter().map(|&vertex| names[vertex as usize]).collect();
-            self.cut(&part.part(&side, &mut local), &names);
+            self.cut(&part.part(&side, &mut local)?, &names)?;
         }
+        Ok(())
     }
 }
 
@@ -91,10 +93,10 @@ mod tests {
         let cases =
             [(size, cube), (500, chain(500)), (90, two), (400, strewn(400, 900, 3)), (60, vec![]), (3, chain(3))];
         for (n, pairs) in cases {
-            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
+            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().unwrap().graph;
             let heaviest = (0..number(graph.size())).map(|vertex| i64::from(graph.weight(vertex))).max().unwrap();
             for count in [1, 2, 3, 5, 8] {
-                let parts = parts(&graph, count);
+                let parts = parts(&graph, count).unwrap();
                 assert!(parts.iter().all(|&part| part < count));
                 let even = graph.total() / i64::try_from(count).unwrap();
                 let weights = weights(&graph, &parts, count);
@@ -108,16 +110,16 @@ mod tests {
     #[test]
     fn few_edges_join_parts() {
         for count in [2, 3, 7] {
-            let graph = Quotient::new(pattern(700, &chain(700)).as_ref(), &[]).unwrap().graph;
-            let cut = cut(&graph, &parts(&graph, count));
+            let graph = Quotient::new(pattern(700, &chain(700)).as_ref(), &[]).unwrap().unwrap().graph;
+            let cut = cut(&graph, &parts(&graph, count).unwrap());
             assert!(cut >= count - 1 && cut <= 5 * count, "{cut} for {count} parts");
         }
         // Slabs of a cube: a plane of edges, nine for each of its nodes (but at the rim), times the cuts.
         for (side, count) in [(8, 2), (12, 2), (12, 3), (12, 4), (12, 8)] {
             let (n, pairs) = cube(side);
-            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().graph;
+            let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().unwrap().graph;
             let plane = (3 * side - 2_usize).pow(2);
-            let cut = cut(&graph, &parts(&graph, count));
+            let cut = cut(&graph, &parts(&graph, count).unwrap());
             let slabs = (count - 1) * plane;
             let most = if count.is_power_of_two() { slabs } else { 2 * slabs };
             assert!(cut <= most, "{cut} edges are cut of {side}³ nodes in {count} parts, {plane} by a plane");

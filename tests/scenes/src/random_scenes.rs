@@ -3,17 +3,21 @@
 //!
 //! Scenes of surfaces are in `by_chance`. `cargo run --release --example random_scenes` goes through both.
 
+mod apart;
 mod bodies;
 mod build;
 mod contacts;
 mod draw;
+mod nonlinear;
 mod recipe;
+mod rubber;
 mod run;
 mod shrink;
 mod twins;
 mod watch;
 
 pub use draw::KINDS;
+pub(crate) use nonlinear::Nonlinear;
 pub use recipe::{Precision, Recipe, Twin};
 pub use run::{Finding, Verdict};
 pub use shrink::shrunk;

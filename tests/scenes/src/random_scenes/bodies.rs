@@ -1,6 +1,7 @@
 //! Bodies of random scenes: masses and the springs or elements between them.
 
-use super::recipe::Element;
+use super::recipe::{Element, Rubber};
+use super::rubber;
 use crate::by_chance::{decades, pick};
 use crate::random::Congruential;
 use crate::solids::{Material, Solid};
@@ -106,7 +107,13 @@ impl Bodies {
         let of = |node: usize, sign: f64| direction.iter().enumerate().map(move |(a, d)| (axes * node + a, sign * d));
         let terms: Vec<_> = of(one, 1.0).chain(of(other, -1.0)).collect();
         let stiffness = terms.iter().flat_map(|x| terms.iter().map(move |y| k * x.1 * y.1)).collect();
-        Element { dofs: terms.iter().map(|term| term.0).collect(), stiffness, shared_mass: 0.0, hardening: 0.0 }
+        Element {
+            dofs: terms.iter().map(|term| term.0).collect(),
+            stiffness,
+            shared_mass: 0.0,
+            hardening: 0.0,
+            rubber: None,
+        }
     }
 
     /// Boxes on each other: a mass with two dofs each.
@@ -133,10 +140,59 @@ impl Bodies {
         for (i, j, k) in entries(&solid.stiffness()) {
             stiffness[n * i + j] = k;
         }
-        let element = Element { dofs: (0..n).collect(), stiffness, shared_mass: 0.0, hardening: 0.0 };
+        let element = Element { dofs: (0..n).collect(), stiffness, shared_mass: 0.0, hardening: 0.0, rubber: None };
         let below = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][D - 1] < 1e-9);
         let outside = below.flat_map(|node| (0..D).map(move |axis| D * node + axis)).collect();
         Self { mass: solid.lumped_mass(), elements: vec![element], axes: D, outside }
+    }
+
+    /// A plate of triangles in the plane, each square of a grid cut in two, its nodes moved a little. Edges are about
+    /// one long; outside are the dofs of all nodes.
+    pub(super) fn rubber(spread: Spread, random: &mut Congruential) -> Self {
+        let [columns, rows] = [pick(&[1, 2, 3, 4], random), pick(&[1, 1, 2], random)];
+        let node = |i: usize, j: usize| (columns + 1) * j + i;
+        let mut places = Vec::new();
+        for j in 0..=rows {
+            places.extend((0..=columns).map(|i| [i as f64 + 0.2 * random.signed(), j as f64 + 0.2 * random.signed()]));
+        }
+        let (mu, density) = (spread.stiffness(random), spread.mass(random));
+        let lambda = mu * decades(-1.0, 1.0, random);
+        let (mut mass, mut elements) = (vec![0.0; 2 * places.len()], Vec::new());
+        for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
+            let corners = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            for nodes in [[0, 1, 2], [0, 2, 3]].map(|places| places.map(|place: usize| corners[place])) {
+                let [x, y, z] = nodes.map(|node| places[node]);
+                let twice = (y[0] - x[0]) * (z[1] - x[1]) - (z[0] - x[0]) * (y[1] - x[1]);
+                let gradient = |b: [f64; 2], c: [f64; 2]| [(b[1] - c[1]) / twice, (c[0] - b[0]) / twice];
+                let gradients = [gradient(y, z), gradient(z, x), gradient(x, y)];
+                let material = Rubber { gradients, lambda: 0.5 * twice * lambda, mu: 0.5 * twice * mu };
+                let dofs = nodes.iter().flat_map(|node| [2 * node, 2 * node + 1]).collect();
+                let stiffness = rubber::stiffness(&material, &[0.0; 6]).concat();
+                let rubber = Some(material);
+                elements.push(Element { dofs, stiffness, shared_mass: 0.0, hardening: 0.0, rubber });
+                nodes.iter().for_each(|node| (0..2).for_each(|axis| mass[2 * node + axis] += density * twice / 6.0));
+            }
+        }
+        let outside = (0..mass.len()).collect();
+        Self { mass, elements, axes: 2, outside }
+    }
+
+    /// Two grids of masses in space that move along one axis each, large enough that threads share them.
+    pub(super) fn lattices(spread: Spread, random: &mut Congruential) -> Self {
+        let (mut mass, mut elements) = (Vec::new(), Vec::new());
+        for _ in 0..2 {
+            let cells: [usize; 3] = cells(random, &[17, 18, 20]);
+            let (first, k) = (mass.len(), spread.stiffness(random));
+            mass.extend(vec![spread.mass(random); cells.iter().product()]);
+            let mut step = 1;
+            for count in cells {
+                let inner = (first..mass.len()).filter(|node| (node - first) / step % count + 1 < count);
+                elements.extend(inner.map(|node| Element::spring(node, node + step, k)));
+                step *= count;
+            }
+        }
+        let outside = vec![0, mass.len() / 3, mass.len() / 2, mass.len() - 2, mass.len() - 1];
+        Self { mass, elements, axes: 1, outside }
     }
 
     /// The highest frequency is below this.

@@ -1,15 +1,16 @@
 //! From a recipe to a simulation.
 
+use super::nonlinear::Nonlinear;
 use super::recipe::{Contacting, Control, Element, Recipe, Row, Solving, Support, Tangent};
+use super::rubber::Triangle;
 use crate::combinations::Correction;
 use crate::schemes;
 use crate::sparse::{element, matrix};
 use contact_dynamics::contact::{ContactLaw, GapOffset};
 use contact_dynamics::contact_solver::{ContactSolver, GaussSeidel, Lemke, Pivoting, ProjectedGradient};
-use contact_dynamics::faer::sparse::SymbolicSparseColMatRef;
 use contact_dynamics::{
-    Cholesky, ConjugateGradients, DampingForce, LinearRows, LinearSolver, LinearSystem, Linearity, Lu, Mass, Newton,
-    Real, Result, Simulation, SimulationBuilder, StepControl, System, TangentWeights, Tridiagonal,
+    ByBody, Cholesky, ConjugateGradients, LinearRows, LinearSolver, LinearSystem, Lu, Newton, Real, Result, Simulation,
+    SimulationBuilder, StepControl, System, Tridiagonal,
 };
 
 /// The time of a wave through an element, over the nominal step.
@@ -54,6 +55,7 @@ impl Recipe {
         }
         let solver: Option<Box<dyn LinearSolver<T>>> = match self.linear_solver {
             Solving::Default => None,
+            Solving::ByBody => Some(Box::new(ByBody::default())),
             Solving::Cholesky => Some(Box::new(Cholesky::default())),
             Solving::Lu => Some(Box::new(Lu)),
             Solving::ConjugateGradients => Some(Box::new(ConjugateGradients::default())),
@@ -120,12 +122,15 @@ impl Recipe {
             };
         }
         let hardening = self.elements.iter().filter(|element| element.hardening > 0.0);
-        let springs: Vec<_> =
-            hardening.map(|e| (e.dofs[0], e.dofs[1], T::of(e.hardening * unit / (length * length)))).collect();
-        if springs.is_empty() {
+        let springs: Vec<_> = hardening
+            .map(|e| ([e.dofs[0], e.dofs[1]].map(Some), T::of(e.hardening * unit / (length * length))))
+            .collect();
+        let rubber = self.elements.iter().filter_map(|e| Some((&e.dofs[..], e.rubber.as_ref()?, &e.stiffness[..])));
+        let triangles: Vec<_> = rubber.map(|rubber| Triangle::new(rubber, [length, unit])).collect();
+        if springs.is_empty() && triangles.is_empty() {
             return Ok(Box::new(system));
         }
-        Ok(Box::new(Hardening::new(system, springs)))
+        Ok(Box::new(Nonlinear::new(system, springs, triangles)))
     }
 
     fn contact<T: Real>(&self) -> LinearRows<'static, T> {
@@ -187,84 +192,4 @@ fn entries(element: &Element, unit: f64) -> impl Iterator<Item = (usize, usize, 
     let dofs = element.dofs.iter().enumerate();
     let pairs = dofs.flat_map(|(i, &row)| element.dofs.iter().enumerate().map(move |(j, &column)| (i, row, j, column)));
     pairs.map(move |(i, row, j, column)| (row, column, unit * element.stiffness[element.dofs.len() * i + j]))
-}
-
-/// A linear system with springs whose force grows with the cube of their extension besides.
-struct Hardening<T: Real> {
-    linear: LinearSystem<'static, T>,
-    /// Both dofs and k₃.
-    springs: Vec<(usize, usize, T)>,
-    /// Where (i, i), (j, j), (i, j) and (j, i) of each spring are among the values of the tangent.
-    places: Vec<[usize; 4]>,
-}
-
-impl<T: Real> Hardening<T> {
-    fn new(linear: LinearSystem<'static, T>, springs: Vec<(usize, usize, T)>) -> Self {
-        let pattern = linear.pattern();
-        let place = |row: usize, column: usize| {
-            let range = pattern.col_range(column);
-            let found = pattern.row_idx()[range.clone()].iter().position(|&i| i == row);
-            range.start + found.expect("a spring is in the pattern")
-        };
-        let of_spring =
-            |&(i, j, _): &(usize, usize, T)| [(i, i), (j, j), (i, j), (j, i)].map(|(row, column)| place(row, column));
-        let places = springs.iter().map(of_spring).collect();
-        Self { places, linear, springs }
-    }
-}
-
-impl<T: Real> System<T> for Hardening<T> {
-    fn dofs(&self) -> usize {
-        self.linear.dofs()
-    }
-    fn linearity(&self) -> Linearity {
-        Linearity::Nonlinear
-    }
-    fn mass(&self) -> Mass<'_, T> {
-        self.linear.mass()
-    }
-    fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
-        self.linear.force(t, u, v, out)?;
-        for &(i, j, k) in &self.springs {
-            let d = u[i] - u[j];
-            let force = k * d * d * d;
-            out[i] -= force;
-            out[j] += force;
-        }
-        Ok(())
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.linear.pattern()
-    }
-    fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()> {
-        self.linear.tangent(t, u, v, weights, out)?;
-        for (&(i, j, k), places) in self.springs.iter().zip(&self.places) {
-            let d = u[i] - u[j];
-            let slope = weights.stiffness * T::of(3.0) * k * d * d;
-            for (place, sign) in places.iter().zip([1.0, 1.0, -1.0, -1.0]) {
-                out[*place] += T::of(sign) * slope;
-            }
-        }
-        Ok(())
-    }
-    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
-        self.linear.damping_force()
-    }
-    fn potential_energy(&mut self, u: &[T]) -> Option<T> {
-        let springs = self.springs.iter().map(|&(i, j, k)| {
-            let d = u[i] - u[j];
-            T::of(0.25) * k * d * d * d * d
-        });
-        let cubic: T = springs.sum();
-        self.linear.potential_energy(u).map(|linear| linear + cubic)
-    }
-    fn external_load(&mut self, t: f64, out: &mut [T]) -> Result<()> {
-        self.linear.external_load(t, out)
-    }
-    fn prescribed(&self) -> &[usize] {
-        self.linear.prescribed()
-    }
-    fn prescribed_motion(&mut self, t: f64, out: &mut [[T; 3]]) -> Result<()> {
-        self.linear.prescribed_motion(t, out)
-    }
 }

@@ -10,7 +10,11 @@ use crate::schemes::{self, Listed};
 use contact_dynamics::ContactLaw;
 
 /// What scenes are drawn as.
-pub const KINDS: [&str; 7] = ["bars", "plate", "cloud", "pile", "block", "hardening bars", "squeeze"];
+pub const KINDS: [&str; 9] =
+    ["bars", "plate", "cloud", "pile", "block", "hardening bars", "squeeze", "rubber", "lattices"];
+
+/// Of so many scenes one is of lattices, which take a thousand times as long as others.
+const LARGE: f64 = 4000.0;
 
 impl Recipe {
     /// The recipe of a seed.
@@ -19,13 +23,15 @@ impl Recipe {
         let mut random = Congruential(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5eed);
         (0..4).for_each(|_| _ = random.unit());
         let random = &mut random;
-        let kind = pick(&KINDS, random);
+        let kind = if random.unit() * LARGE < 1.0 { "lattices" } else { pick(&KINDS[..KINDS.len() - 1], random) };
         let spread = Spread::new(random);
         let bodies = match kind {
             "plate" => Bodies::plate(spread, random),
             "cloud" => Bodies::cloud(spread, random),
             "pile" => Bodies::pile(spread, random),
             "block" => Bodies::block(spread, random),
+            "rubber" => Bodies::rubber(spread, random),
+            "lattices" => Bodies::lattices(spread, random),
             _ => Bodies::chains(spread, random),
         };
         let all = schemes::all();
@@ -66,7 +72,7 @@ impl Recipe {
         let rows = match kind {
             "pile" => setting.stacked(n / 2, random),
             "squeeze" => setting.levers(n, random),
-            "block" if !free && pick(&[true, true, false], random) => setting.floor(&bodies, random),
+            "block" | "rubber" if !free && pick(&[true, true, false], random) => setting.floor(&bodies, random),
             _ => setting.rows(&bodies, random),
         };
         extras(kind, way, &mut bodies, random);
@@ -119,7 +125,7 @@ impl Recipe {
             linear_solver: linear_solver(kind, random),
             tangent: pick(&[Tangent::Full, Tangent::Modified, Tangent::LineSearch], random),
             h,
-            steps: pick(&[8, 24, 24, 60], random),
+            steps: if kind == "lattices" { 6 } else { pick(&[8, 24, 24, 60], random) },
             control: control(way, random),
             changes: Vec::new(),
             balance: pick(&[true, false], random),
@@ -164,6 +170,18 @@ fn extras(kind: &str, way: f64, bodies: &mut Bodies, random: &mut Congruential) 
         for element in bodies.elements.iter_mut().filter(|element| element.dofs.len() == 2) {
             element.hardening = element.stiffness[0] * decades(-2.0, 1.0, random) / (way * way);
         }
+    }
+    if kind == "rubber" {
+        // Edges are some ways long.
+        let length = way * decades(0.5, 3.0, random);
+        for rubber in bodies.elements.iter_mut().filter_map(|element| element.rubber.as_mut()) {
+            rubber.gradients.as_flattened_mut().iter_mut().for_each(|x| *x /= length);
+            rubber.lambda *= length * length;
+            rubber.mu *= length * length;
+        }
+    }
+    if kind == "lattices" {
+        return;
     }
     if pick(&[true, false, false, false, false], random) {
         // Some dofs lose their mass; those that nothing holds are refused.
@@ -215,9 +233,12 @@ fn contact_solver(random: &mut Congruential) -> Contacting {
 }
 
 fn linear_solver(kind: &str, random: &mut Congruential) -> Solving {
-    use Solving::{Cholesky, ConjugateGradients, Default, Lu, Tridiagonal};
-    let last = if kind == "bars" { Tridiagonal } else { Default };
-    pick(&[Default, Default, Default, Default, Cholesky, Lu, ConjugateGradients, last], random)
+    use Solving::{ByBody, Cholesky, ConjugateGradients, Default, Lu, Tridiagonal};
+    match kind {
+        "lattices" => pick(&[Default, Cholesky, ByBody, ConjugateGradients], random),
+        "bars" => pick(&[Default, Default, Default, Default, Cholesky, Lu, ConjugateGradients, Tridiagonal], random),
+        _ => pick(&[Default, Default, Default, ByBody, Cholesky, Lu, ConjugateGradients, Default], random),
+    }
 }
 
 fn control(way: f64, random: &mut Congruential) -> Control {
@@ -257,13 +278,16 @@ fn twin(recipe: &Recipe, random: &mut Congruential) -> Twin {
     let is_unique = (recipe.rows.len() == 1 || count(|row| row.friction.is_some()) == 0)
         && count(|row| row.law == ContactLaw::Equality) <= 1
         && count(|row| row.law != ContactLaw::Equality && row.gap == 0.0) == 0;
+    if recipe.kind == "lattices" {
+        return Twin::Threaded;
+    }
     if !is_direct || !is_unique {
-        return pick(&[Twin::Repeated, Twin::Resumed, Twin::PowersOfTwo(two)], random);
+        return pick(&[Twin::Repeated, Twin::Resumed, Twin::Filed, Twin::PowersOfTwo(two)], random);
     }
     let choices = [
         Twin::Repeated,
         Twin::Resumed,
-        Twin::Resumed,
+        Twin::Filed,
         Twin::PowersOfTwo(two),
         Twin::PowersOfTwo(two),
         Twin::Permuted,

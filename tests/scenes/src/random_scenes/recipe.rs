@@ -55,6 +55,10 @@ pub enum Twin {
     Repeated,
     /// It begins at a state in the middle of the first one.
     Resumed,
+    /// The same by files, as text and as bytes. (Without the feature `whole` of this package as `Resumed`.)
+    Filed,
+    /// By three threads, the first one by one. (Without the feature `whole` as `Repeated`.)
+    Threaded,
     /// Units are powers of two times as large.
     PowersOfTwo([i32; 3]),
     /// Dofs and rows have other places.
@@ -74,17 +78,29 @@ pub struct Element {
     /// Of two dofs: the mass that they share, as that of a bar, and k₃ of the force k₃ d³ between them.
     pub shared_mass: f64,
     pub hardening: f64,
+    /// What makes it nonlinear; K is then that of no displacement.
+    pub rubber: Option<Rubber>,
+}
+
+/// A triangle of a hyperelastic material in the plane: W = ½ μ (F:F − 2 J) + ½ λ (J − 1)².
+#[derive(Clone, Debug)]
+pub struct Rubber {
+    /// Derivatives of the shape functions of its three nodes.
+    pub gradients: [[f64; 2]; 3],
+    /// Times its volume.
+    pub lambda: f64,
+    pub mu: f64,
 }
 
 impl Element {
     /// Between two dofs.
     pub(super) fn spring(i: usize, j: usize, k: f64) -> Self {
-        Self { dofs: vec![i, j], stiffness: vec![k, -k, -k, k], shared_mass: 0.0, hardening: 0.0 }
+        Self { dofs: vec![i, j], stiffness: vec![k, -k, -k, k], shared_mass: 0.0, hardening: 0.0, rubber: None }
     }
 
     /// To the ground.
     pub(super) fn ground(i: usize, k: f64) -> Self {
-        Self { dofs: vec![i], stiffness: vec![k], shared_mass: 0.0, hardening: 0.0 }
+        Self { dofs: vec![i], stiffness: vec![k], shared_mass: 0.0, hardening: 0.0, rubber: None }
     }
 
     /// Without one of its dofs, which is held: the others are named anew.
@@ -96,7 +112,9 @@ impl Element {
         let dofs: Vec<usize> = kept.iter().map(|&i| self.dofs[i]).map(|d| d - usize::from(d > dof)).collect();
         let whole = dofs.len() == n;
         let [shared_mass, hardening] = [self.shared_mass, self.hardening].map(|x| if whole { x } else { 0.0 });
-        (!dofs.is_empty()).then_some(Self { dofs, stiffness, shared_mass, hardening })
+        // (What is left of a triangle is linear.)
+        let rubber = self.rubber.clone().filter(|_| whole);
+        (!dofs.is_empty()).then_some(Self { dofs, stiffness, shared_mass, hardening, rubber })
     }
 }
 
@@ -141,6 +159,7 @@ pub enum Contacting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solving {
     Default,
+    ByBody,
     Cholesky,
     Lu,
     ConjugateGradients,

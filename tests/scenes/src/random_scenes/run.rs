@@ -1,5 +1,6 @@
 //! Runs of a recipe, and what came of them.
 
+use super::apart::{by_files, on_threads};
 use super::recipe::{Precision, Recipe, Twin};
 use super::twins::{self, Trace};
 use super::watch::Watch;
@@ -55,9 +56,12 @@ impl<'a, T: Real> Run<'a, T> {
 
     /// One that goes on from where this one is.
     pub(super) fn resumed(&self) -> Result<Self> {
-        let (state, history) = (self.run.state().clone(), self.run.history().clone());
         let h = if self.recipe.changes.is_empty() { self.recipe.step_size() } else { self.run.step_size() };
-        let run = self.recipe.builder(h)?.resume(state, history).build()?;
+        let builder = self.recipe.builder(h)?;
+        let run = match self.recipe.twin {
+            Twin::Filed => by_files(&self.run, builder)?,
+            _ => builder.resume(self.run.state().clone(), self.run.history().clone()).build()?,
+        };
         Ok(Self { run, ..*self })
     }
 
@@ -98,9 +102,12 @@ impl Recipe {
 
     fn examined<T: Real>(&self) -> Verdict {
         let mut verdict = Verdict::default();
-        let traces = self.watched::<T>(&mut verdict);
+        let threaded = self.twin == Twin::Threaded;
+        let watched = |verdict: &mut Verdict| self.watched::<T>(verdict);
+        let traces = if threaded { on_threads(1, || watched(&mut verdict)) } else { watched(&mut verdict) };
         if verdict.finding.is_none() {
-            verdict.finding = twins::compare::<T>(self, &traces, &mut verdict);
+            let compare = |verdict: &mut Verdict| twins::compare::<T>(self, &traces, verdict);
+            verdict.finding = if threaded { on_threads(3, || compare(&mut verdict)) } else { compare(&mut verdict) };
         }
         verdict
     }
@@ -146,7 +153,7 @@ impl Recipe {
 
     /// Whether the second run has the same bits.
     pub(super) fn is_exact(&self) -> bool {
-        matches!(self.twin, Twin::Repeated | Twin::Resumed | Twin::PowersOfTwo(_))
+        matches!(self.twin, Twin::Repeated | Twin::Resumed | Twin::Filed | Twin::Threaded | Twin::PowersOfTwo(_))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::correct::TRANSIT;
 use super::{Scene, Truth};
 use crate::combinations::Correction;
-use contact_dynamics::{Result, Simulation, State, TimeIntegrator};
+use contact_dynamics::{Newton, Result, Simulation, State, TimeIntegrator};
 
 /// Where two runs differ most, over the size of what is compared.
 #[derive(Clone, Debug, Default)]
@@ -62,6 +62,8 @@ pub fn compare(
         .velocity(scene.v.clone())
         .constraint(scene.contact())
         .start_up(scene.start_up);
+    // (As far as rounding lets it.)
+    let builder = builder.newton(Newton::full().tolerances(1e-12, 1e-10)?.iterations(40)?);
     let builder = match correction {
         Correction::None => builder.uncorrected(),
         _ => builder.correctors(correction.correctors(TRANSIT * scene.h)?),

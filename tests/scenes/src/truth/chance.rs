@@ -35,12 +35,14 @@ pub struct Setting {
     pub mixed: bool,
     /// Whether dofs are those of nodes in the plane, and contacts rub.
     pub rubs: bool,
+    /// Whether springs harden; nothing is damped then.
+    pub hardens: bool,
 }
 
 impl Setting {
     /// Rigid contacts without friction.
     pub fn rigid(kind: Kind, critical: Option<f64>) -> Self {
-        Self { kind, critical, law: ContactLaw::Rigid, mixed: false, rubs: false }
+        Self { kind, critical, law: ContactLaw::Rigid, mixed: false, rubs: false, hardens: false }
     }
 
     /// The scene of a seed.
@@ -50,7 +52,7 @@ impl Setting {
         (0..4).for_each(|_| _ = random.unit());
         let n = if self.rubs { 4 + 2 * (seed % 2) as usize } else { 3 + (seed % 4) as usize };
         let [mass, stiffness] = bodies(n, self.rubs, kind, seed % 3 == 1, &mut random);
-        let damping = (seed % 2 == 1 && kind != Kind::Flight).then(|| {
+        let damping = (seed % 2 == 1 && kind != Kind::Flight && !self.hardens).then(|| {
             let (alpha, beta) = (random.within(0.0, 0.3), random.within(0.0005, 0.003));
             let entry = |i: usize, j: usize| alpha * mass[i][j] + beta * stiffness[i][j];
             (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
@@ -64,6 +66,7 @@ impl Setting {
             mass,
             damping,
             stiffness,
+            cubic: Vec::new(),
             constant: vec![0.0; n],
             amplitude: vec![0.0; n],
             frequency: random.within(0.02, 0.2) / h,
@@ -76,6 +79,9 @@ impl Setting {
         };
         self.put_rows(&mut scene, &mut random);
         self.put_motion(&mut scene, &mut random);
+        if self.hardens {
+            self.put_cubic(&mut scene, &mut random);
+        }
         if kind == Kind::Flight && seed.is_multiple_of(2) {
             // All contacts close where a step ends: they touch without pressure, and some let go of others.
             for row in &mut scene.rows {
@@ -128,6 +134,23 @@ impl Setting {
                 (random.within(0.1, 0.8), tangent)
             });
             scene.rows.push(Row { g, offset, law, friction });
+        }
+    }
+
+    /// Springs between neighbors, and to the ground where there are others, that are up to twice as stiff at the ways
+    /// that bodies go: as far as a unit of velocity is stopped in.
+    fn put_cubic(&self, scene: &mut Scene, random: &mut Congruential) {
+        let stride = if self.rubs { 2 } else { 1 };
+        let way = |k: f64, m: f64| (m / k).sqrt();
+        for i in 0..scene.dofs() {
+            let (k, m) = (scene.stiffness[i][i], scene.mass[i][i]);
+            if self.kind != Kind::Flight && k > 0.0 {
+                scene.cubic.push(([Some(i), None], random.within(0.03, 0.3) * k / way(k, m).powi(2)));
+            }
+            if i >= stride && k > 0.0 {
+                let k3 = random.within(0.03, 0.3) * k / way(k, m).powi(2);
+                scene.cubic.push(([i, i - stride].map(Some), k3));
+            }
         }
     }
 

@@ -1,10 +1,11 @@
 //! Scenes of a few dofs, and the parts of the crate that they make.
 
 use super::dense::{Matrix, dot, size, solve};
+use crate::random_scenes::Nonlinear;
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::tableau::StartUp;
-use contact_dynamics::{ContactLaw, LinearRows, LinearSystem};
+use contact_dynamics::{ContactLaw, LinearRows, LinearSystem, System};
 
 /// g0 + amplitude sin(frequency t).
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,6 +42,8 @@ pub struct Scene {
     pub mass: Matrix,
     pub damping: Option<Matrix>,
     pub stiffness: Matrix,
+    /// Springs between two dofs (or a dof and the ground) that pull with k d³ besides.
+    pub cubic: Vec<([Option<usize>; 2], f64)>,
     /// f = constant + amplitude sin(frequency t), dof by dof.
     pub constant: Vec<f64>,
     pub amplitude: Vec<f64>,
@@ -84,13 +87,35 @@ impl Scene {
         self.drive.map(|(dof, motion)| (dof, motion.at(t)))
     }
 
-    /// f(t) − K u − C v.
+    /// f(t) − K u − C v, less the forces of the cubic springs.
     pub fn force(&self, t: f64, u: &[f64], v: &[f64]) -> Vec<f64> {
         let mut f = self.load(t);
         for (i, f) in f.iter_mut().enumerate() {
             *f -= dot(&self.stiffness[i], u) + self.damping.as_ref().map_or(0.0, |c| dot(&c[i], v));
         }
+        for (ends, k) in &self.cubic {
+            let d = length(*ends, u);
+            for (end, sign) in ends.iter().zip([1.0, -1.0]) {
+                if let Some(dof) = end {
+                    f[*dof] -= sign * k * d * d * d;
+                }
+            }
+        }
         f
+    }
+
+    /// The derivative of the internal force by u.
+    pub fn stiffness_at(&self, u: &[f64]) -> Matrix {
+        let mut k = self.stiffness.clone();
+        for (ends, cubic) in &self.cubic {
+            let slope = 3.0 * cubic * length(*ends, u) * length(*ends, u);
+            let terms = ends.iter().zip([1.0, -1.0]).filter_map(|(end, sign)| Some(((*end)?, sign)));
+            let terms: Vec<(usize, f64)> = terms.collect();
+            for &(i, x) in &terms {
+                terms.iter().for_each(|&(j, y)| k[i][j] += slope * x * y);
+            }
+        }
+        k
     }
 
     /// M⁻¹ f on the dofs that are free.
@@ -139,7 +164,15 @@ impl Scene {
     }
 
     /// The system of the crate.
-    pub fn system(&self) -> LinearSystem<'static, f64> {
+    pub fn system(&self) -> Box<dyn System<f64>> {
+        let linear = self.linear();
+        match self.cubic.is_empty() {
+            true => Box::new(linear),
+            false => Box::new(Nonlinear::new(linear, self.cubic.clone(), Vec::new())),
+        }
+    }
+
+    fn linear(&self) -> LinearSystem<'static, f64> {
         let mass = &self.mass;
         let is_diagonal = mass.iter().enumerate().all(|(i, row)| {
             let beside = row.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x.abs()).sum::<f64>();
@@ -181,6 +214,12 @@ impl Scene {
             }
         })
     }
+}
+
+/// How much longer a spring is.
+fn length(ends: [Option<usize>; 2], u: &[f64]) -> f64 {
+    let [one, other] = ends.map(|end| end.map_or(0.0, |dof| u[dof]));
+    one - other
 }
 
 fn sparse(a: &Matrix) -> SparseColMat<usize, f64> {

@@ -78,7 +78,7 @@ pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Conta
         add(&mut new[0].known, 1.0, &shift);
         add(&mut balance[0].known, stage.balance.u.z / stage.recovery.u.z, &shift);
     }
-    let (matrix, free) = balanced(scene, &balance, t_balance);
+    let (mut matrix, free) = balanced(scene, &balance, t_balance, &vec![0.0; scene.dofs()]);
     let target = target(stage, past, scene, place.t);
     let mut work = Stage { scene, place, past, new, balance, target, t_balance, t_new, free };
     if let (Correction::Stabilized | Correction::StabilizedClosed, None) = (correction, &work.target.forecast) {
@@ -88,36 +88,49 @@ pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Conta
         correction,
         Correction::Splitting | Correction::Implicit | Correction::Stabilized | Correction::StabilizedClosed
     );
-    let forms = work.forms(by_way);
-    let responses: Vec<Vec<f64>> = scene
-        .axes()
-        .iter()
-        .map(|axis| {
-            let (mut a, mut f) = (matrix.clone(), axis.to_vec());
-            scene.hold(&mut a, &mut f);
-            solve_dense(a, f).expect("an effective matrix that is regular")
-        })
-        .collect();
-    let raw = work.multipliers(forms.clone(), &responses);
-    let mut z = work.free.clone();
-    raw.iter().zip(&responses).for_each(|(r, response)| add(&mut z, *r, response));
-    work.finish(&forms, &z, raw, matrix)
+    let (mut z, mut steps) = (vec![0.0; scene.dofs()], 0);
+    // Newton's method, with the contacts found anew in each iteration: one of them where nothing is cubic.
+    loop {
+        let forms = work.forms(by_way);
+        let responses: Vec<Vec<f64>> = scene
+            .axes()
+            .iter()
+            .map(|axis| {
+                let (mut a, mut f) = (matrix.clone(), axis.to_vec());
+                scene.hold(&mut a, &mut f);
+                solve_dense(a, f).expect("an effective matrix that is regular")
+            })
+            .collect();
+        let raw = work.multipliers(forms.clone(), &responses);
+        let before = std::mem::replace(&mut z, work.free.clone());
+        raw.iter().zip(&responses).for_each(|(r, response)| add(&mut z, *r, response));
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let mut moved = z.clone();
+        add(&mut moved, -1.0, &before);
+        steps += 1;
+        if scene.cubic.is_empty() || largest(&moved) <= 4.0 * f64::EPSILON * largest(&z) || steps == 40 {
+            return work.finish(&forms, &z, raw, matrix);
+        }
+        (matrix, work.free) = balanced(scene, &work.balance, t_balance, &z);
+    }
 }
 
-/// The effective matrix, and z without contact.
-fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], t: f64) -> (Matrix, Vec<f64>) {
+/// The effective matrix about some z, and z without contact.
+fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], t: f64, z: &[f64]) -> (Matrix, Vec<f64>) {
     let n = scene.dofs();
-    let mut f = scene.force(t, &u.known, &v.known);
-    add(&mut f, -1.0, &product(&scene.mass, &a.known));
+    let mut f = scene.force(t, &u.at(z), &v.at(z));
+    add(&mut f, -1.0, &product(&scene.mass, &a.at(z)));
+    let stiffness = scene.stiffness_at(&u.at(z));
     let mut matrix = zeros(n, n);
     for (i, row) in matrix.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
             let damping = scene.damping.as_ref().map_or(0.0, |c| c[i][j]);
-            *entry = scene.stiffness[i][j] * u.weight[j] + damping * v.weight[j] + scene.mass[i][j] * a.weight[j];
+            *entry = stiffness[i][j] * u.weight[j] + damping * v.weight[j] + scene.mass[i][j] * a.weight[j];
         }
     }
     scene.hold(&mut matrix, &mut f);
-    let free = solve_dense(matrix.clone(), f).expect("an effective matrix that is regular");
+    let mut free = solve_dense(matrix.clone(), f).expect("an effective matrix that is regular");
+    add(&mut free, 1.0, z);
     (matrix, free)
 }
 
@@ -129,11 +142,13 @@ fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool],
         u[dof] = there;
     }
     let rows: Vec<usize> = (0..scene.rows.len())
-        .filter(|&i| scene.rows[i].law == ContactLaw::Rigid && (correction == Correction::Stabilized || closed[i]))
+        .filter(|&i| matches!(scene.rows[i].law, ContactLaw::Rigid | ContactLaw::Equality))
+        .filter(|&i| correction == Correction::Stabilized || closed[i])
         .collect();
+    let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
     let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
     let problem = Problem {
-        contacts: rows.iter().map(|_| Contact { held: false, friction: None }).collect(),
+        contacts: rows.iter().map(|&i| Contact { held: held(i), friction: None }).collect(),
         w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
         q: rows.iter().map(|&i| scene.gap(i, t, &u)).collect(),
         noise: rows.iter().map(|&i| scene.rounding(i, t, &u)).collect(),

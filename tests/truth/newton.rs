@@ -1,0 +1,33 @@
+//! Springs that harden, by Newton's method: every scheme with every correction, on rigid contact, with friction and
+//! without. Nothing is damped: what is refused with damping alone runs.
+
+use crate::rigid;
+use crate::sweep::{ALONG_PATHS, Sweep};
+use contact_dynamics::ContactLaw;
+use contact_dynamics_scenes::combinations::Correction;
+
+#[test]
+fn runs_by_newtons_method_are_those_of_the_truth() {
+    for rubs in [false, true] {
+        let sweep = Sweep {
+            corrections: &Correction::ALL,
+            law: ContactLaw::Rigid,
+            mixed: false,
+            rubs,
+            hardens: true,
+            seeds: 3,
+        };
+        let swept = sweep.run();
+        println!("{}largest difference {:.0e}", swept.table, swept.worst);
+        let linear = rigid::TABLE.lines().filter(|line| !line.ends_with(ALONG_PATHS));
+        for (line, linear) in swept.table.lines().zip(linear) {
+            if !rubs {
+                assert_eq!(line.replace('u', "+"), linear.replace('u', "+"));
+            }
+        }
+        for pair in &swept.pairs {
+            let counts = [pair.long(), pair.sum(|run| run.closings), pair.sum(|run| run.closed)];
+            assert!(counts.iter().zip([2, 6, 40]).all(|(count, least)| *count >= least), "{}: {counts:?}", pair.name);
+        }
+    }
+}
