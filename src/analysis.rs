@@ -15,7 +15,7 @@ mod stability;
 
 pub use local_error::{LocalError, local_error};
 pub use massless::massless_factor;
-pub(crate) use massless::massless_follow;
+pub(crate) use massless::{massless_follow, steps_by_means};
 pub use order::{Order, order};
 pub use overshoot::{Overshoot, overshoot, overshoot_growth};
 pub use period::period_elongation;

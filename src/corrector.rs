@@ -11,6 +11,7 @@ mod persistency;
 mod prediction;
 mod release;
 mod rubbing_problem;
+mod work_balance;
 mod zero_acceleration;
 
 pub(crate) use crate::contact::{ErasedGaps, Gaps, rounding};
@@ -27,6 +28,7 @@ pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
 pub(crate) use rubbing_problem::{Block, Rubbing, slides};
+pub use work_balance::WorkBalance;
 pub use zero_acceleration::ZeroAcceleration;
 
 use crate::error::Result;
@@ -102,6 +104,13 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         false
     }
 
+    /// Whether it corrects contacts on dofs without mass, and these alone; they leave no jumps. It is then called for
+    /// every step in which one of them closes or opens, also where a scheme imposes other contacts on velocities.
+    /// Default: it does not.
+    fn corrects_massless(&self) -> bool {
+        false
+    }
+
     /// Whether [`predict`](Self::predict) does anything; memory for it is reserved only then.
     fn predicts(&self) -> bool {
         false
@@ -155,6 +164,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn leaves_smooth_motion(&self) -> bool {
         (**self).leaves_smooth_motion()
+    }
+    fn corrects_massless(&self) -> bool {
+        (**self).corrects_massless()
     }
     fn predicts(&self) -> bool {
         (**self).predicts()

@@ -1,6 +1,6 @@
 //! Schemes, masses and corrections that go together, by name.
 
-use crate::corrector::Corrector;
+use crate::corrector::{Corrector, WorkBalance};
 use crate::error::{Error, Result};
 use crate::integrator::{Bathe, CdLagrange, GeneralizedAlpha, TimeIntegrator};
 use crate::mass::{self, Redistribution};
@@ -89,9 +89,12 @@ impl Preset {
         }
     }
 
-    /// The corrections: so far none of the presets needs any.
+    /// The corrections: [`WorkBalance`] for the presets without dissipation, none for the other.
     pub fn correctors<T: Real>(&self) -> Vec<Box<dyn Corrector<T>>> {
-        Vec::new()
+        match self.0 {
+            Kind::Smooth => Vec::new(),
+            Kind::Conservative | Kind::Explicit => vec![Box::new(WorkBalance)],
+        }
     }
 
     /// The mass matrix, from the consistent one.

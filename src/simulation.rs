@@ -62,6 +62,7 @@ mod workspace;
 pub use builder::SimulationBuilder;
 pub use contact_output::ContactForce;
 pub use judge::StepControl;
+pub(crate) use massless::MasslessBlock;
 pub use massless_start::StartAdjustment;
 pub use newton::{Iteration, Newton};
 pub(crate) use operator::Operator;

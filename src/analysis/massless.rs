@@ -43,3 +43,54 @@ pub(crate) fn massless_follow(tableau: &Tableau) -> bool {
         stage.recovery.u.z == 0.0 && stage.balance.u == stage.recovery.u && (stage.load - stage.end).abs() < 1e-12
     })
 }
+
+/// Whether every stage of a scheme changes v by the mean of two accelerations, and u by that of two velocities but for a
+/// multiple of the change of a, the same in all stages; the balance holds at these states. The energy that such a scheme
+/// conserves changes by the work of the mean force of contact over each stage (theory, section 15.1).
+pub(crate) fn steps_by_means(tableau: &Tableau) -> bool {
+    // Each value is a combination of u, h v and h² a at the start of the step, and of the unknowns of its stages.
+    type Values = Vec<f64>;
+    let size = 3 + tableau.stages.len();
+    let unit = |i: usize| (0..size).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Values>();
+    let mut states: Vec<[Values; 3]> = vec![[unit(0), unit(1), unit(2)]];
+    let (mut multiple, mut before): (Option<f64>, f64) = (None, 0.0);
+    let is_small = |x: &f64| x.abs() < 1e-12;
+    for (s, stage) in tableau.stages.iter().enumerate() {
+        if stage.balance != stage.recovery || (stage.load - stage.end).abs() > 1e-12 {
+            return false;
+        }
+        let mut new = [const { Values::new() }; 3];
+        for (value, row) in new.iter_mut().zip(stage.recovery.each()) {
+            *value = unit(3 + s).iter().map(|x| row.z * x).collect();
+            for k in 0..row.depth() {
+                let past = row.past(k);
+                let Some(state) = states.iter().rev().nth(k) else {
+                    if past.iter().all(is_small) {
+                        continue;
+                    }
+                    return false;
+                };
+                for (field, c) in state.iter().zip(past) {
+                    value.iter_mut().zip(field).for_each(|(value, x)| *value += c * x);
+                }
+            }
+        }
+        let (old, length) = (&states[s], stage.end - before);
+        let change = |field: usize, i: usize| new[field][i] - old[field][i];
+        let mean = |field: usize, i: usize| 0.5 * length * (new[field][i] + old[field][i]);
+        if !(0..size).all(|i| is_small(&(change(1, i) - mean(2, i)))) {
+            return false;
+        }
+        let Some(largest) = (0..size).max_by(|&i, &j| change(2, i).abs().total_cmp(&change(2, j).abs())) else {
+            return false;
+        };
+        let ratio = (change(0, largest) - mean(1, largest)) / change(2, largest);
+        let agrees = multiple.is_none_or(|multiple| is_small(&(multiple - ratio)));
+        if !agrees || !(0..size).all(|i| is_small(&(change(0, i) - mean(1, i) - ratio * change(2, i)))) {
+            return false;
+        }
+        (multiple, before) = (Some(ratio), stage.end);
+        states.push(new);
+    }
+    true
+}

@@ -2,6 +2,7 @@
 
 use super::group_problem::GroupProblem;
 use super::rubbing_problem::Rubbing;
+use super::work_balance::Switching;
 use crate::contact::GapRates;
 use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::real::Real;
@@ -48,11 +49,14 @@ pub(crate) struct Buffers<T> {
     pub(super) change: Vec<T>,
     pub(super) damping: Vec<T>,
     pub(super) before: Vec<T>,
+    /// Contacts on dofs without mass that close or open.
+    pub(crate) switching: Switching<T>,
 }
 
 impl<T: Real> Buffers<T> {
-    /// Room for `rows` contacts, and for velocity changes of `damped` dofs (0 without damping).
-    pub(crate) fn new(rows: usize, damped: usize) -> Self {
+    /// Room for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), and for those of `switching`
+    /// dofs by contacts without mass, if these are corrected.
+    pub(crate) fn new(rows: usize, damped: usize, switching: Option<usize>) -> Self {
         let reals = |n| Vec::with_capacity(n);
         Self {
             closed: Vec::with_capacity(rows),
@@ -77,6 +81,7 @@ impl<T: Real> Buffers<T> {
             change: vec![T::zero(); damped],
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
+            switching: Switching::new(rows, switching),
         }
     }
 
@@ -84,6 +89,7 @@ impl<T: Real> Buffers<T> {
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.rates.resize(rows, GapRates::default());
         self.gaps.resize(rows, T::zero());
+        self.switching.make_room(rows);
         let Self {
             closed,
             engaged,
@@ -122,6 +128,11 @@ impl<T: Real> Buffers<T> {
 
     /// Whether the last stage had contacts to correct.
     pub(crate) fn has_touched(&self) -> bool {
+        self.has_jumps() || self.switching.is_pending()
+    }
+
+    /// Whether there are, or were, contacts that leave jumps.
+    pub(super) fn has_jumps(&self) -> bool {
         !self.closed.is_empty() || !self.opened.is_empty() || !self.released.is_empty()
     }
 

@@ -12,7 +12,7 @@ use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::Operator;
+use crate::simulation::{MasslessBlock, Operator};
 use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Linearity, System};
 
@@ -67,6 +67,8 @@ pub struct Correction<'a, T: Real> {
     pub(crate) projection: &'a mut JumpProjection<T>,
     /// The factorized effective matrix of the stage.
     pub(crate) operator: &'a mut Operator<T>,
+    /// Of dofs without mass that follow statically.
+    pub(crate) block: Option<&'a mut MasslessBlock<T>>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
     pub(crate) system: Erased<'a, T>,
     pub(crate) constraints: ErasedGaps<'a, T>,
@@ -101,6 +103,8 @@ pub(crate) struct Scheme<'a> {
     /// This stage, from 0, and the number of stages of a step.
     pub(crate) stage: usize,
     pub(crate) stages: usize,
+    /// The length of this stage, a fraction of the step.
+    pub(crate) length: f64,
 }
 
 impl Scheme<'_> {
@@ -146,6 +150,11 @@ impl<T: Real> std::fmt::Debug for Erased<'_, T> {
 }
 
 impl<T: Real> Correction<'_, T> {
+    /// Whether there is something for a corrector of contacts without mass, or for one of jumps.
+    pub(crate) fn concerns(&self, of_massless: bool) -> bool {
+        if of_massless { self.buffers.switching.is_pending() } else { self.buffers.has_jumps() }
+    }
+
     /// Whether a row is pressed: its jumps vanish both ways.
     fn is_pressed(&self, row: usize) -> bool {
         self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row).is_equality()
@@ -288,8 +297,8 @@ impl<T: Real> Correction<'_, T> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
         }
-        let Self { buffers, contacts, projection, new, g, scheme, system, energy, .. } = self;
-        let Buffers { jump, rates, change, damping, before, .. } = &mut **buffers;
+        let Self { buffers, contacts, projection, new, g, scheme, energy, .. } = self;
+        let Buffers { jump, rates, change, .. } = &mut **buffers;
         jump.clear();
         jump.extend(rows.iter().map(|&row| g.product(row, &new.v)));
         projection.push(g, (rows, impulses), T::one(), &mut new.v)?;
@@ -314,23 +323,39 @@ impl<T: Real> Correction<'_, T> {
         if !change.is_empty() {
             change.fill(T::zero());
             projection.push(g, (rows, impulses), T::one(), change)?;
-            // The change of v makes a change of damping forces; forces that are not linear in v are asked for twice.
-            let linearity = system.0.linearity();
-            let Some(force) = system.0.damping_force() else { return Ok(()) };
-            match linearity {
-                Linearity::Linear => force.evaluate(&new.u, change, damping)?,
-                Linearity::Nonlinear => {
-                    force.evaluate(&new.u, &new.v, damping)?;
-                    for (change, &v) in change.iter_mut().zip(&new.v) {
-                        *change = v - *change;
-                    }
-                    force.evaluate(&new.u, change, before)?;
-                    T::axpy(-T::one(), before, damping);
-                }
-            }
-            self.accelerate_by_damping()?;
+            self.damp()?;
         }
         Ok(())
+    }
+
+    /// Adds to a what the damping forces make that a change of v has changed.
+    pub(super) fn damp_change(&mut self, change: &[T]) -> Result<()> {
+        if self.buffers.change.is_empty() {
+            return Ok(());
+        }
+        self.buffers.change.copy_from_slice(change);
+        self.damp()
+    }
+
+    /// [`damp_change`](Self::damp_change) of the change in the buffer for it, which is not kept.
+    fn damp(&mut self) -> Result<()> {
+        let Self { buffers, new, system, .. } = self;
+        let Buffers { change, damping, before, .. } = &mut **buffers;
+        let linearity = system.0.linearity();
+        let Some(force) = system.0.damping_force() else { return Ok(()) };
+        match linearity {
+            Linearity::Linear => force.evaluate(&new.u, change, damping)?,
+            // Forces that are not linear in v are asked for twice.
+            Linearity::Nonlinear => {
+                force.evaluate(&new.u, &new.v, damping)?;
+                for (change, &v) in change.iter_mut().zip(&new.v) {
+                    *change = v - *change;
+                }
+                force.evaluate(&new.u, change, before)?;
+                T::axpy(-T::one(), before, damping);
+            }
+        }
+        self.accelerate_by_damping()
     }
 
     /// Adds to a what the change of damping forces in `damping` makes.

@@ -8,7 +8,7 @@ use super::massless::MasslessBlock;
 use super::massless_start::Balanced;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
-    check_corrections, check_lagged_damping, check_massless, check_path, is_correctable, local_error,
+    check_corrections, check_lagged_damping, check_massless, check_path, is_balanceable, is_correctable, local_error,
 };
 use super::path::PathWork;
 use super::program::{Compiler, Program};
@@ -30,7 +30,7 @@ use crate::analysis;
 use crate::contact::ContactLaw;
 use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
-use crate::corrector::{Corrector, PersistencyCorrection};
+use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
@@ -431,6 +431,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let mut correctors = self.correctors;
         if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
             correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
+        }
+        if self.correction == DefaultCorrection::Wanted && is_balanceable(&scheme.tableau, &constraints, &massless) {
+            correctors.push(Box::new(WorkBalance));
         }
         let limit = match self.stability {
             Stability::Checked => {

@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::contact_rows::{Level, Part};
 use super::contact_step::{ContactStep, ContactWork};
-use crate::contact::{ContactJacobian, GapRates};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Buffers, Gaps, rounding, slides};
 use crate::error::Result;
 use crate::real::Real;
@@ -83,7 +83,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     buffers.released.push(row);
                 }
             }
-            if closed && !was_closed && !closed_at_start[row] {
+            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && g.acts_on(row, massless);
+            if is_balanced {
+                buffers.switching.note(row, trial);
+            }
+            // (What a contact without mass has taken it may give back when it opens, or closes again.)
+            if closed && !was_closed && !closed_at_start[row] && !is_balanced {
                 trial.dissipated[row] = T::zero();
             }
             if raw != T::zero() {

@@ -13,12 +13,13 @@ use crate::system::{Linearity, System, TangentWeights};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat};
 
 /// The dofs b without mass of a linear system, and their part of K.
-pub(super) struct MasslessBlock<T: Real> {
+#[derive(Debug)]
+pub(crate) struct MasslessBlock<T: Real> {
     /// Ascending.
     pub(super) dofs: Vec<usize>,
     pub(super) columns: Columns<T>,
     /// K_bb⁻¹, with its responses to contact.
-    pub(super) operator: Operator<T>,
+    pub(crate) operator: Operator<T>,
     /// The stage in which it is solved: d is the displacement itself.
     pub(super) stage: CompiledStage<T>,
     /// The dofs of the interface that have a mass, and their places there.
@@ -30,6 +31,7 @@ pub(super) struct MasslessBlock<T: Real> {
 }
 
 /// Columns of K, one a massless dof: its couplings to all free dofs.
+#[derive(Debug)]
 pub(super) struct Columns<T> {
     pointers: Vec<usize>,
     rows: Vec<usize>,
@@ -292,6 +294,31 @@ impl<T: Real> MasslessBlock<T> {
             places: dofs.iter().map(|dof| interface.binary_search(dof).unwrap_or(interface.len())).collect(),
             sorted: 0,
         })
+    }
+}
+
+impl<T: Real> MasslessBlock<T> {
+    /// Writes the velocities with which the dofs without mass follow those of the others, −K_bb⁻¹ K_bi v_i, without loads
+    /// and contact; the others keep theirs.
+    pub(crate) fn follow(&mut self, v: &[T], out: &mut [T]) -> Result<()> {
+        out.copy_from_slice(v);
+        for (j, &dof) in self.dofs.iter().enumerate() {
+            out[dof] = -self.columns.column(j).map(|(row, k)| k * v[row]).sum::<T>();
+        }
+        self.operator.solve(out)
+    }
+
+    /// Replaces forces on all dofs by those on the dofs with mass that are in balance with them: what acts on dofs
+    /// without mass goes on to their neighbors.
+    pub(crate) fn pass_on(&mut self, forces: &mut [T]) -> Result<()> {
+        self.operator.solve(forces)?;
+        for (j, &dof) in self.dofs.iter().enumerate() {
+            let d = std::mem::replace(&mut forces[dof], T::zero());
+            for (row, k) in self.columns.column(j) {
+                forces[row] -= k * d;
+            }
+        }
+        Ok(())
     }
 }
 

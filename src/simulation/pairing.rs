@@ -43,22 +43,21 @@ pub(super) fn check_corrections<T: Real>(
         let part = format!("the correction {} with {}", corrector.name(), integrator.name());
         Err(Error::Incompatible { part, reason })
     };
-    let Some(corrector) = correctors.first() else { return Ok(()) };
-    for stage in &tableau.stages {
-        let reason = match stage.contact {
-            ContactLevel::POSITION => continue,
-            ContactLevel::Position { .. } => {
-                "the scheme imposes contact ahead of the state, whose velocity still approaches"
-            }
-            ContactLevel::Velocity { .. } => {
-                "the scheme imposes contact on velocities, which leaves no jump to correct"
-            }
-        };
-        return refuse(&**corrector, reason);
-    }
+    let level = tableau.stages.iter().find_map(|stage| match stage.contact {
+        ContactLevel::POSITION => None,
+        ContactLevel::Position { .. } => {
+            Some("the scheme imposes contact ahead of the state, whose velocity still approaches")
+        }
+        ContactLevel::Velocity { .. } => {
+            Some("the scheme imposes contact on velocities, which leaves no jump to correct")
+        }
+    });
     let damped = system.damping_force().is_some();
     for corrector in correctors {
-        let mut checked = corrector.check(tableau);
+        let mut checked = match level {
+            Some(reason) if !corrector.corrects_massless() => Err(reason),
+            _ => corrector.check(tableau),
+        };
         if damped {
             checked = checked.and_then(|()| corrector.check_damping(tableau));
         }
@@ -124,4 +123,11 @@ pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constrain
         && constraints.may_press()
         && (constraints.len() == 0 || constraints.laws().iter().any(ContactLaw::is_plain))
         && constraints.interface().iter().any(has_mass)
+}
+
+/// Whether the work of contacts without mass is balanced by default: contact dofs have none, and the scheme conserves
+/// energy but for the steps in which contacts close or open.
+pub(super) fn is_balanceable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let has_none = |dof: &usize| massless.binary_search(dof).is_ok();
+    constraints.may_press() && constraints.interface().iter().any(has_none) && analysis::steps_by_means(tableau)
 }

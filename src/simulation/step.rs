@@ -211,6 +211,7 @@ impl<T: Real> Simulation<'_, T> {
             if let Some(projection) = &mut work.correction.projection {
                 refresh(projection, &mut work.correction.projected_rows, constraints.version());
                 work.correction.buffers.report(&work.contact.trial, stages_before == 0);
+                work.correction.buffers.switching.begin(&work.contact.trial, stages_before == 0);
                 if !work.correction.shifted.is_empty() {
                     let mut prediction = Prediction {
                         h: clock.h * stage.end,
@@ -272,6 +273,7 @@ impl<T: Real> Simulation<'_, T> {
                         g,
                         projection,
                         operator,
+                        block: work.block.as_mut(),
                         solver: &mut **contact_solver,
                         system: Erased(&mut **system),
                         constraints: ErasedGaps(constraints),
@@ -287,7 +289,9 @@ impl<T: Real> Simulation<'_, T> {
                         energy: &mut work.correction.energy,
                     };
                     for corrector in correctors.iter() {
-                        corrector.correct(&mut correction)?;
+                        if correction.concerns(corrector.corrects_massless()) {
+                            corrector.correct(&mut correction)?;
+                        }
                     }
                 }
             }
@@ -324,5 +328,6 @@ fn numbers<'s, T: Real>(
         read: &stage.read,
         stage: place,
         stages,
+        length: stage.end - stage.start,
     }
 }

@@ -83,6 +83,7 @@ impl<T: Real> Workspace<T> {
         let dofs = system.dofs();
         let &ContactSize { rows, entries, interface, may_press } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
+        let balances = may_press && correctors.iter().any(Corrector::corrects_massless);
         let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
         let room = |needed: bool| if needed && may_press { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
@@ -109,7 +110,7 @@ impl<T: Real> Workspace<T> {
             massless: Vec::new(),
             block: None,
             correction: CorrectionWork {
-                buffers: Buffers::new(rows, damped),
+                buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
                 projected_rows: 0,
                 shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],

@@ -127,6 +127,7 @@ impl<T: Real> ContactState<T> {
         if old.names.are(names) && self.names.are(names) {
             self.lambda.copy_from_slice(&old.lambda);
             self.lambda_raw.copy_from_slice(&old.lambda_raw);
+            self.gap.copy_from_slice(&old.gap);
             self.closed.copy_from_slice(&old.closed);
             self.dissipated.copy_from_slice(&old.dissipated);
             if !tangents.is_empty() {

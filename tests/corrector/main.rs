@@ -6,3 +6,4 @@ mod of_a_host;
 mod papers;
 mod persistency;
 mod release;
+mod work_balance;

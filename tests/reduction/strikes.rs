@@ -13,7 +13,7 @@ fn instants(impact: &Impact, h: f64, speed: f64) -> [Impact; 3] {
     [0.1, 0.4, 0.8].map(|phase| impact.clone().delayed(phase * h * speed))
 }
 
-/// The sum of the forces is what changes the momentum of each body, to rounding: the trapezoidal rule has it so.
+/// The impulses are what changes the momentum of each body, to rounding.
 fn assert_momenta(impact: &Impact, course: &Course, signs: &[f64]) {
     for ((part, after), sign) in impact.parts.iter().zip(&course.velocities).zip(signs) {
         let change = part.mass() * (after - part.speed);

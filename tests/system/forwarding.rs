@@ -265,6 +265,10 @@ impl Corrector<f64> for Remedy {
         self.0.note("leaves_smooth_motion");
         true
     }
+    fn corrects_massless(&self) -> bool {
+        self.0.note("corrects_massless");
+        false
+    }
     fn predicts(&self) -> bool {
         self.0.note("predicts");
         true

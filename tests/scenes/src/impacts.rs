@@ -165,6 +165,7 @@ impl Impact {
             let contacts = run.state().contacts();
             let force: f64 = contacts.forces().iter().sum();
             course.forces.push((run.time(), force));
+            course.impulse += contacts.impulses().iter().sum::<f64>();
             touched.iter_mut().zip(contacts.forces()).for_each(|(touched, force)| *touched |= *force > 0.0);
             if force > 0.0 {
                 course.last = run.time();
@@ -173,7 +174,6 @@ impl Impact {
         course.run = start.elapsed().as_secs_f64();
         course.steps = course.forces.len();
         course.touched = touched.iter().filter(|touched| **touched).count();
-        course.impulse = course.forces.iter().map(|(_, force)| h * force).sum();
         course.energy = run.energy().total() / before;
         Ok(())
     }
