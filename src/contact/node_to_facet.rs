@@ -5,7 +5,7 @@ mod passage;
 mod rows;
 
 use super::surface::{
-    Bounds, Facet, Kin, Neighborhood, Nodes, Point, Ramp, Reach, Shape, Surface, Thickness, add_scaled, overhang,
+    Bounds, Cones, Facet, Kin, NearestFirst, Nodes, Point, Ramp, Reach, Shape, Surface, Thickness, add_scaled, overhang,
 };
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use rows::Rows;
 #[derive(Debug)]
 struct Pass {
     nodes: Vec<usize>,
-    neighborhood: Neighborhood,
+    lists: NearestFirst,
     /// For each node a distance that it has from the surface at least, at the last search.
     clearance: Vec<f64>,
     /// The boxes of the facets at the last search, of which each node looks at many.
@@ -27,7 +27,7 @@ struct Pass {
 impl Pass {
     fn new(nodes: Vec<usize>) -> Self {
         let clearance = vec![0.0; nodes.len()];
-        Self { clearance, nodes, neighborhood: Neighborhood::default(), boxes: Vec::new() }
+        Self { clearance, nodes, lists: NearestFirst::default(), boxes: Vec::new() }
     }
 }
 
@@ -140,6 +140,8 @@ pub struct NodeToFacet<T: Real> {
     thickness: Thickness,
     reach: Reach,
     rebuilds: usize,
+    /// The cones of the normals of both surfaces at the last search.
+    cones: [Cones; 2],
     rows: Rows<T>,
     /// What the search under way finds.
     found: Rows<T>,
@@ -252,6 +254,7 @@ impl<T: Real> NodeToFacet<T> {
             friction: 0.0,
             thickness: Thickness::default(),
             rebuilds: 0,
+            cones: [Cones::default(), Cones::default()],
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
         }

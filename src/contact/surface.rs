@@ -2,10 +2,12 @@
 
 mod behind;
 mod closed;
+mod cones;
 mod dent;
 mod exact;
 mod facet;
 mod kin;
+mod nearest_first;
 mod nodes;
 mod offsets;
 mod outer;
@@ -23,8 +25,10 @@ mod sharp;
 mod slide;
 
 pub(crate) use behind::{Behind, Side, is_far_side};
+pub(crate) use cones::Cones;
 pub use facet::Facet;
 pub(crate) use kin::Kin;
+pub(crate) use nearest_first::{Kept, NearestFirst};
 pub(crate) use nodes::{Nodes, points};
 pub(crate) use offsets::{Offsets, Thickness};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
@@ -374,13 +378,17 @@ impl Surface {
     /// The facets around a node, with the vertex that it is of each; none if it is no node of the surface.
     fn corners_around(&self, node: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let found = self.nodes.binary_search(&node);
-        found.into_iter().flat_map(|place| self.around[self.starts[place]..self.starts[place + 1]].iter().copied())
+        found.into_iter().flat_map(|place| self.corners_at(place).iter().copied())
+    }
+
+    /// The same of the node at a place among those of the surface.
+    fn corners_at(&self, place: usize) -> &[(usize, usize)] {
+        &self.around[self.starts[place]..self.starts[place + 1]]
     }
 
     /// The facets around the k-th vertex of a facet, itself among them.
     pub(crate) fn facets_at(&self, facet: usize, k: usize) -> impl Iterator<Item = usize> + '_ {
-        let place = self.places[facet][k];
-        self.around[self.starts[place]..self.starts[place + 1]].iter().map(|&(facet, _)| facet)
+        self.corners_at(self.places[facet][k]).iter().map(|&(facet, _)| facet)
     }
 
     /// The facets around a node.

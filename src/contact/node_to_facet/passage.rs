@@ -65,12 +65,14 @@ impl<T: Real> NodeToFacet<T> {
                     continue;
                 }
                 // Lists know what a node may meet, unless it was faster than its velocity promised.
-                let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.reach.listed());
+                let lists = Some(&list.lists).filter(|_| row.is_some() && way <= self.reach.listed());
                 let [start, end] = [0, 1].map(|k| Ground {
                     nodes: &list.nodes,
-                    neighborhood,
+                    lists,
+                    kept: None,
                     surface,
                     boxes: None,
+                    cones: [None; 2],
                     own,
                     kin: self.kin.as_ref(),
                     positions: &ends[k],
