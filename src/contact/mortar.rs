@@ -4,6 +4,7 @@ mod bonds;
 mod dual;
 mod integrals;
 mod pairs;
+mod parts;
 mod passage;
 mod points;
 mod rates;
@@ -426,7 +427,7 @@ impl<T: Real> Mortar<T> {
 
     fn integrate(&mut self, t: f64) {
         let Self { integrals, slave, master, nodes, pairs, thickness, multiplier, .. } = self;
-        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, |facet| pairs.of(facet));
+        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, pairs);
     }
 }
 
@@ -469,10 +470,11 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         if boxes[0].inflated(range).intersects(&boxes[1]) {
             self.find_pairs(t, range);
             self.integrate(t);
-            let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.thickness.ramp.at(t), u };
+            let (rubs, factor) = (self.tangents() > 0, self.thickness.ramp.at(t));
+            let made = Made { rubs, nodes: &self.nodes, slave: &self.slave, factor, u };
             let is_bonded = |place: usize| self.bonds.as_ref().is_some_and(|bonds| bonds.hold(place));
             for place in (0..self.slave.nodes().len()).filter(|&place| !is_bonded(place)) {
-                self.found.push(place, &self.integrals, &made);
+                self.found.push(place, &mut self.integrals, &made);
             }
         }
         let Self { bonds, slave, .. } = self;
@@ -503,7 +505,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let near = self.rows.places.iter().all(is_covered)
             || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
         let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
-        let made = Made { rubs: count > 0, nodes, factor: thickness.ramp.at(t), u };
+        let made = Made { rubs: count > 0, nodes, slave, factor: thickness.ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, &made) {
                 continue;

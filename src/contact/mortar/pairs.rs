@@ -6,8 +6,10 @@ use crate::contact::surface::{Base, Behind, Bounds, Neighborhood, Point, Side, S
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     lists: Neighborhood,
-    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets.
+    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets, and the
+    /// normals of the slave's, for which their neighbors ask.
     masters: Vec<(Bounds, Option<Point>)>,
+    normals: Vec<Option<Point>>,
     starts: Vec<usize>,
     near: Vec<usize>,
 }
@@ -36,14 +38,15 @@ impl Pairs {
     ) {
         self.clear();
         self.starts.push(0);
-        let Self { lists, masters, starts, near } = self;
-        let normals = master.facets().iter().map(|facet| facet.normal(positions));
+        let Self { lists, masters, normals, starts, near } = self;
         masters.clear();
-        masters.extend(master.boxes(positions).zip(normals));
+        masters.extend(master.boxes(positions).zip(master.facets().iter().map(|facet| facet.normal(positions))));
+        normals.clear();
+        normals.extend(slave.facets().iter().map(|facet| facet.normal(positions)));
         for (index, facet) in slave.facets().iter().enumerate() {
             let listed = lists.of(index);
             if let Some(mut base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
-                base.see_beside(slave, index, positions);
+                base.see_beside(slave, index, (positions, normals));
                 let around = Bounds::of_corners(&base.shape).inflated(range);
                 let own = Side { surface: slave, behind: &behind[0], facet: index };
                 near.extend(listed.iter().copied().filter(|&partner| {

@@ -135,7 +135,8 @@ impl Ground<'_> {
         self.kin.is_some_and(|kin| {
             let p = self.positions[self.nodes[place]];
             let direction = || self.direction(place, facet, p, projected);
-            let is_behind = |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal());
+            let is_behind =
+                |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal());
             projected.1.distance > kin.depth(place, facet) && direction().is_some_and(is_behind)
         })
     }
