@@ -74,7 +74,7 @@ impl Blend {
     }
 
     /// Makes what nodes add to the rows of a facet's corners that of its weights.
-    pub(super) fn weigh(&self, all: &mut [[Column; 4]]) {
+    pub(super) fn weigh<'a>(&self, all: impl Iterator<Item = &'a mut [Column; 4]>) {
         for columns in all {
             let found = *columns;
             let area = found[..self.count]
@@ -90,7 +90,7 @@ impl Blend {
         }
     }
 
-    /// Calls `act` with what the corners add by which the whole of the facet grows, that the covered area is a share of.
+    /// Calls `act` with what corners add because the whole of the facet grows, which the covered area is a share of.
     pub(super) fn each_of_whole(&self, base: &Base, facet: &Facet, mut act: impl FnMut(usize, [Column; 4])) {
         if self.by_area.iter().flatten().all(|x| *x == 0.0) {
             return;

@@ -147,7 +147,7 @@ pub(super) struct Integrals {
     points: Points,
     /// The row that was asked for last, and memory for it.
     row: Vec<Entry>,
-    heads: Vec<(usize, usize, usize)>,
+    heads: Vec<[usize; 3]>,
 }
 
 /// What is summed over one slave facet.
@@ -173,7 +173,7 @@ impl Integrals {
     pub(super) fn row(&mut self, around: &[(usize, usize)]) -> &[Entry] {
         let Self { parts, row, heads, .. } = self;
         row.clear();
-        parts.each_of_row(around, heads, |node, [x, y, z, p, q, r, share, _]| {
+        parts.each_of_row(around, heads, |node, &[x, y, z, p, q, r, share, _]| {
             row.push(Entry { node, moment: [x, y, z], area: [p, q, r], share });
         });
         row
@@ -239,7 +239,7 @@ impl Integrals {
                     Sums::end(&mut self.sums, &places[..base.count()], &own);
                 }
             }
-            self.parts.end_facet();
+            self.parts.end_facet(facet.nodes().len());
         }
     }
 

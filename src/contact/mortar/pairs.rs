@@ -12,6 +12,8 @@ pub(super) struct Pairs {
     normals: Vec<Option<Point>>,
     starts: Vec<usize>,
     near: Vec<usize>,
+    /// What these were before.
+    before: [Vec<usize>; 2],
 }
 
 impl Pairs {
@@ -27,18 +29,20 @@ impl Pairs {
     }
 
     /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// do not belong to facets behind sharp edges, and are no far sides of both bodies. (The result does not depend on
-    /// the age of the lists.)
+    /// do not belong to facets behind sharp edges, and are no far sides of both bodies; says whether they are others
+    /// than before. (The result does not depend on the age of the lists.)
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
         behind: &[Behind; 2],
         positions: &[Point],
         (range, depth): (f64, f64),
-    ) {
+    ) -> bool {
+        std::mem::swap(&mut self.starts, &mut self.before[0]);
+        std::mem::swap(&mut self.near, &mut self.before[1]);
         self.clear();
         self.starts.push(0);
-        let Self { lists, masters, normals, starts, near } = self;
+        let Self { lists, masters, normals, starts, near, before } = self;
         masters.clear();
         masters.extend(master.boxes(positions).zip(master.facets().iter().map(|facet| facet.normal(positions))));
         normals.clear();
@@ -62,6 +66,7 @@ impl Pairs {
             }
             starts.push(near.len());
         }
+        before[0] != *starts || before[1] != *near
     }
 
     /// The master facets near a slave facet, ascending.

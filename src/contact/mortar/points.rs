@@ -52,7 +52,7 @@ impl Points {
         self.shares.is_empty()
     }
 
-    /// Adds that the rim of the master moves over the slave facet, whose gaps are smaller by `offset` than the distance.
+    /// Adds that the rim of the master moves over the slave facet, whose gaps are the distance less `offset`.
     pub(super) fn push_rim(&mut self, sample: &RimSample, offset: f64) {
         let RimSample { length, slave, master, gap: distance, outward } = *sample;
         let [moment, area] = [length * (distance - offset), length].map(|x| outward.map(|along| x * along));
@@ -87,7 +87,8 @@ pub(super) fn take_other(sums: &mut [Addends; 4], corner: usize) -> [Column; 4] 
     sums.each_mut().map(|sums| std::mem::take(&mut sums[OTHERS + corner]))
 }
 
-/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its normal.
+/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its
+/// normal.
 pub(super) fn own(sums: &mut [Addends; 4], base: &Base) -> [[Column; 4]; 4] {
     let (count, length) = (base.count(), norm(base.product));
     // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.

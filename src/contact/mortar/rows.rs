@@ -62,8 +62,8 @@ impl<T: Real> Rows<T> {
         let sums = integrals.sums[place];
         let Some(normal) = sums.normal().filter(|_| sums.is_covered()) else { return false };
         let entries = integrals.row(slave.corners_at(place));
-        let weights = entries.iter().flat_map(|entry| on_axes(nodes, entry, entry.weight(&sums)));
-        self.affine.push(sums.gap(), weights, u);
+        let vectors = entries.iter().map(|entry| (nodes.places(entry.node), entry.weight(&sums)));
+        self.affine.push_vectors(sums.gap(), vectors, u);
         self.places.push(place);
         let (position, offset) = (sums.position(), sums.offset());
         self.spots.push(Spot { position, normal, area: sums.area, offset, factor });

@@ -67,7 +67,7 @@ impl Excess {
 }
 
 impl Shares {
-    /// Calls `act` with the nodes of a facet of second order, and what they add to the rows of the slave facet's corners.
+    /// Calls `act` with the nodes of a facet of second order, and what they add to the rows of a slave facet's corners.
     pub(super) fn each_column(&self, facet: &Facet, normal: Point, mut act: impl FnMut(usize, [Column; 4])) {
         if facet.whole.is_none() {
             return;

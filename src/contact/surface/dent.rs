@@ -64,8 +64,8 @@ impl Ground<'_> {
         length.abs() <= self.rounding * self.surface.facets()[facet].shape(self.positions).size()
     }
 
-    /// Whether a facet that rises from a vertex of that of a stand makes a dent with it: that one rises from it too, and
-    /// so does the point that the node stands on, where its facet has this normal.
+    /// Whether a facet that rises from a vertex of that of a stand makes a dent with it: that one rises from it too,
+    /// and so does the point that the node stands on, where its facet has this normal.
     fn is_dent(
         &self,
         (stand, normal): (&Stand, Point),

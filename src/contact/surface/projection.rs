@@ -176,7 +176,7 @@ impl Ground<'_> {
         let most = |facet: usize| if is_even { 0.0 } else { self.offsets.most(node, &surface.facets()[facet]) };
         let mut best: Option<(usize, (Shape, Foot), f64)> = None;
         let look_at = |facet: usize, best: &mut Option<(usize, (Shape, Foot), f64)>| {
-            let limit = best.map_or(reach, |(.., depth)| depth) + most(facet);
+            let limit = best.as_ref().map_or(reach, |(.., depth)| *depth) + most(facet);
             let bounds = match self.boxes {
                 Some(boxes) => boxes[facet],
                 None => Bounds::of_corners(&surface.facets()[facet].shape(positions)),
@@ -188,11 +188,11 @@ impl Ground<'_> {
             let depth = self.height(place, facet, &projected.1);
             // (Of two that share the point the one that comes first.)
             let foot = Foot { distance: depth, ..projected.1 };
-            let is_better = |&(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
-                let best = Foot { distance: depth, ..best };
-                foot.is_better_than(&best) || (facet < other && !best.is_better_than(&foot))
+            let is_better = |(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
+                let best = Foot { distance: *depth, ..*best };
+                foot.is_better_than(&best) || (facet < *other && !best.is_better_than(&foot))
             };
-            if depth > reach || best.is_some_and(|best| !is_better(&best)) {
+            if depth > reach || best.as_ref().is_some_and(|best| !is_better(best)) {
                 return;
             }
             let is_met = || {
@@ -210,7 +210,7 @@ impl Ground<'_> {
         let first = likely.filter(is_listed);
         first.into_iter().for_each(|facet| look_at(facet, &mut best));
         for (distance, facet) in self.by_distance(place).filter(|&(_, facet)| Some(facet) != first) {
-            if distance - slack > best.map_or(reach, |(.., depth)| depth) {
+            if distance - slack > best.as_ref().map_or(reach, |(.., depth)| *depth) {
                 break;
             }
             look_at(facet, &mut best);

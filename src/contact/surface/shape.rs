@@ -205,7 +205,8 @@ impl Shape {
     }
 
     /// The outward unit normal where the shape functions are `weights`; none if the facet is degenerate there.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always)] // at each point of quadrature
     pub(crate) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
         let [first, second] = self.tangents_at(weights);
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
@@ -235,7 +236,8 @@ impl Shape {
     }
 
     /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always)] // at each point of quadrature
     pub(crate) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
         match self.count {
             2 => [self.side(0), [0.0; 3]],
