@@ -5,7 +5,7 @@ mod passage;
 mod rows;
 
 use super::surface::{
-    Bounds, Cones, Facet, Kin, NearestFirst, Nodes, Point, Ramp, Reach, Shape, Surface, Thickness, add_scaled, overhang,
+    Bounds, Cones, Facet, NearestFirst, Nodes, Point, Shape, Surface, Vicinity, add_scaled, overhang,
 };
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
 use crate::error::{Error, Result};
@@ -131,14 +131,10 @@ pub struct NodeToFacet<T: Real> {
     surface: Surface,
     /// Facets that the nodes belong to, if known.
     own_surface: Option<Surface>,
-    /// What nodes do not meet of a surface against itself, and by how many rings it was found.
-    kin: Option<Kin>,
-    rings: usize,
     passes: Vec<Pass>,
     law: ContactLaw,
     friction: f64,
-    thickness: Thickness,
-    reach: Reach,
+    vicinity: Vicinity,
     rebuilds: usize,
     /// The cones of the normals of both surfaces at the last search.
     cones: [Cones; 2],
@@ -244,15 +240,12 @@ impl<T: Real> NodeToFacet<T> {
         Self {
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
             nodes: mesh,
-            reach: Reach::new(surface.typical()),
+            vicinity: Vicinity::new(surface.typical()),
             surface,
             own_surface: None,
-            kin: None,
-            rings: 0,
             passes: vec![Pass::new(nodes)],
             law: ContactLaw::Rigid,
             friction: 0.0,
-            thickness: Thickness::default(),
             rebuilds: 0,
             cones: [Cones::default(), Cones::default()],
             rows: Rows::with_capacity(0, 0),
@@ -303,8 +296,7 @@ impl<T: Real> NodeToFacet<T> {
         let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
         let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone());
         contact.own_surface = Some(surface);
-        contact.rings = 1;
-        contact.find_kin();
+        contact.vicinity.meet_itself(&contact.surface, &contact.nodes.coordinates);
         contact.prepare()?;
         Ok(contact)
     }
@@ -314,18 +306,8 @@ impl<T: Real> NodeToFacet<T> {
     /// two surfaces.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
-        self.rings = rings;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_rings(rings, &self.surface, &self.nodes.coordinates);
         self
-    }
-
-    fn find_kin(&mut self) {
-        let body = self.surface.nodes().to_vec();
-        let known = (self.reach.least(), self.thickness.overlap(&[body.clone(), body]));
-        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, known));
-        self.reach.forget();
     }
 
     /// The law of all rows.
@@ -391,26 +373,19 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.thickness.set(offsets, self.nodes.coordinates.len())?;
-        self.reach.forget();
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_offsets(offsets, &self.surface, &self.nodes.coordinates)?;
         Ok(self)
     }
 
     /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
     /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration, as
-    /// [`Mortar::ramp`](super::Mortar::ramp).
+    /// [`Mortar::ramp`](crate::contact::Mortar::ramp).
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.thickness.ramp = Ramp::new(times, factors)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_ramp((times, factors), &self.surface, &self.nodes.coordinates)?;
         Ok(self)
     }
 
@@ -421,10 +396,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach.set_least(reach)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_least(reach, &self.surface, &self.nodes.coordinates)?;
         Ok(self)
     }
 
@@ -435,7 +407,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.reach.set_skin(skin)?;
+        self.vicinity.reach.set_skin(skin)?;
         Ok(self)
     }
 
@@ -471,14 +443,14 @@ impl<T: Real> NodeToFacet<T> {
         body.extend(self.own_surface.iter().flat_map(Surface::nodes));
         body.sort_unstable();
         body.dedup();
-        match self.kin {
+        match self.vicinity.kin {
             None => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
             Some(_) => self.nodes.read_body(body),
         }
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        self.reach.forget();
+        self.vicinity.reach.forget();
         Ok(())
     }
 
@@ -539,11 +511,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
         let boxes = self.nodes.move_to(u)?;
-        let motions = self.reach.motions(&self.nodes);
+        let motions = self.vicinity.reach.motions(&self.nodes);
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
-        let [thick, growth] = self.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
-        let near = self.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
+        let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
+        let near = self.vicinity.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
         let range = near + thick;
         // Facets go on a little beyond the rim.
         let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
@@ -580,7 +552,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.thickness.ramp.at(t);
+        let factor = self.vicinity.thickness.ramp.at(t);
         for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
             *gap = gap_of(&self.rows, row, factor, u);
         }
@@ -596,7 +568,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let [x, speed] = self.moving(node, u, v);
             let [shape, velocity] = [0, 1].map(|k| Shape::new(corners.map(|corner| corner[k]), facet.count));
             let mut acceleration = stand.acceleration(x, speed, &shape, &velocity);
-            let (offsets, ramp) = (self.thickness.at(t), &self.thickness.ramp);
+            let (offsets, ramp) = (self.vicinity.thickness.at(t), &self.vicinity.thickness.ramp);
             let mut rate = 0.0;
             if !offsets.is_none() {
                 let [slides, bends] = stand.sliding(speed, (&shape, &velocity), offsets.at_corners(facet));

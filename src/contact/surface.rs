@@ -25,13 +25,14 @@ mod second_order;
 mod shape;
 mod sharp;
 mod slide;
+mod vicinity;
 
 pub(crate) use behind::{Behind, Side, is_far_side};
 pub(crate) use cones::Cones;
 pub use facet::Facet;
 pub(crate) use kin::Kin;
 pub(crate) use nearest_first::{Kept, NearestFirst};
-pub(crate) use nodes::{Nodes, points};
+pub(crate) use nodes::Nodes;
 pub(crate) use offsets::{Offsets, Thickness};
 pub(crate) use overlap::{Base, RimSample, Sample, middle};
 pub(crate) use projection::{Ground, Stand};
@@ -41,6 +42,7 @@ pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use second_difference::SecondDifference;
 pub(crate) use second_order::ByNode;
 pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, norm, sub, unit};
+pub(crate) use vicinity::Vicinity;
 
 use shape::{RIM, Rim};
 
