@@ -427,10 +427,10 @@ impl<T: Real> Mortar<T> {
         if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
             self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
-        if let Some(behind) = &self.behind {
-            if self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth)) {
-                self.known = None;
-            }
+        if let Some(behind) = &self.behind
+            && self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth))
+        {
+            self.known = None;
         }
     }
 

@@ -208,7 +208,9 @@ impl Ground<'_> {
         // The first one decides which of the others are too far by their boxes.
         let is_listed = |likely: &usize| self.by_distance(place).any(|(_, facet)| facet == *likely);
         let first = likely.filter(is_listed);
-        first.into_iter().for_each(|facet| look_at(facet, &mut best));
+        if let Some(facet) = first {
+            look_at(facet, &mut best);
+        }
         for (distance, facet) in self.by_distance(place).filter(|&(_, facet)| Some(facet) != first) {
             if distance - slack > best.as_ref().map_or(reach, |(.., depth)| *depth) {
                 break;
