@@ -2,7 +2,7 @@
 #![cfg(feature = "search")]
 
 use super::mortar::shaken;
-use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar, NodeToFacet, Surface};
+use contact_dynamics::contact::{ContactConstraint, Contacts, GapRates, Mortar, NodeToFacet, Surface};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
 
@@ -15,7 +15,7 @@ fn found(contact: &mut Made, (t, u, v): (f64, &[f64], &[f64])) -> Vec<(usize, u6
     let contacts = Contacts::of(&*contact);
     let mut gaps = vec![0.0; contacts.len()];
     contact.gaps(t, u, &mut gaps).unwrap();
-    let mut rates = vec![Default::default(); contacts.len()];
+    let mut rates = vec![GapRates::default(); contacts.len()];
     contact.rates(t, u, v, &mut rates).unwrap();
     let mut found = Vec::new();
     for (row, (gap, rate)) in gaps.iter().zip(&rates).enumerate() {
