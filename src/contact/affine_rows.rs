@@ -29,14 +29,33 @@ impl<T: Real> AffineRows<T> {
 
     /// Appends a row by its (place, weight) pairs; zeros are left out.
     pub(super) fn push(&mut self, gap: f64, entries: impl Iterator<Item = (usize, f64)>, u: &[T]) {
-        for (place, weight) in entries {
-            let weight = T::of(weight);
-            if weight != T::zero() {
-                self.jacobian.dofs.push(place);
-                self.jacobian.weights.push(weight);
-                self.displacements.push(u[place]);
-            }
+        entries.for_each(|(place, weight)| self.add(place, weight, u));
+        self.end_row(gap);
+    }
+
+    /// Appends a row by the vectors of its nodes, with the places of their dofs; zeros are left out.
+    pub(super) fn push_vectors<'a>(
+        &mut self,
+        gap: f64,
+        vectors: impl Iterator<Item = (&'a [usize], [f64; 3])>,
+        u: &[T],
+    ) {
+        for (places, vector) in vectors {
+            places.iter().zip(vector).for_each(|(&place, weight)| self.add(place, weight, u));
         }
+        self.end_row(gap);
+    }
+
+    fn add(&mut self, place: usize, weight: f64, u: &[T]) {
+        let weight = T::of(weight);
+        if weight != T::zero() {
+            self.jacobian.dofs.push(place);
+            self.jacobian.weights.push(weight);
+            self.displacements.push(u[place]);
+        }
+    }
+
+    fn end_row(&mut self, gap: f64) {
         self.jacobian.pointers.push(self.jacobian.dofs.len());
         self.gaps.push(gap);
     }

@@ -6,7 +6,7 @@ mod pairs;
 mod passage;
 mod rows;
 
-use super::surface::{Facet, Kin, Neighborhood, Nodes, Offsets, Point, Ramp, Reach, Surface, Thickness, add_scaled};
+use super::surface::{Facet, Kin, Neighborhood, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -113,9 +113,7 @@ pub struct EdgeToEdge<T: Real> {
     nodes: Nodes,
     surfaces: [Surface; 2],
     edges: [Vec<Edge>; 2],
-    /// What edges do not meet of a surface against itself, and by how many rings it was found.
-    kin: Option<Kin>,
-    rings: usize,
+    vicinity: Vicinity,
     /// Nodes of the edges, by edge.
     ends_of: [Vec<[usize; 2]>; 2],
     /// For each dof whether an edge has it.
@@ -124,8 +122,6 @@ pub struct EdgeToEdge<T: Real> {
     finest: f64,
     law: ContactLaw,
     friction: f64,
-    thickness: Thickness,
-    reach: Reach,
     /// Edges of the second surface near each of the first.
     neighborhood: Neighborhood,
     /// Positions at the start and at the end of a step, by node.
@@ -204,8 +200,7 @@ impl<T: Real> EdgeToEdge<T> {
         let nodes = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, 3, &nodes.coordinates)?;
         let mut contact = Self::between(nodes, [surface.clone(), surface]);
-        contact.rings = 1;
-        contact.find_kin();
+        contact.vicinity.meet_itself(&contact.surfaces[0], &contact.nodes.coordinates);
         contact.find_edges(SHARP)?;
         Ok(contact)
     }
@@ -215,17 +210,14 @@ impl<T: Real> EdgeToEdge<T> {
         Self {
             ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
             nodes,
-            reach: Reach::new(surfaces[0].typical().max(surfaces[1].typical())),
+            vicinity: Vicinity::new(surfaces[0].typical().max(surfaces[1].typical())),
             surfaces,
             edges: [Vec::new(), Vec::new()],
-            kin: None,
-            rings: 0,
             ends_of: [Vec::new(), Vec::new()],
             acts: Vec::new(),
             finest: f64::INFINITY,
             law: ContactLaw::Rigid,
             friction: 0.0,
-            thickness: Thickness::default(),
             neighborhood: Neighborhood::default(),
             rows: Rows::new(),
             found: Rows::new(),
@@ -236,18 +228,8 @@ impl<T: Real> EdgeToEdge<T> {
     /// [its own surface](Self::of_itself), as [`NodeToFacet::rings`](super::NodeToFacet::rings). By default 1.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
-        self.rings = rings;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_rings(rings, &self.surfaces[0], &self.nodes.coordinates);
         self
-    }
-
-    fn find_kin(&mut self) {
-        let body = self.surfaces[0].nodes().to_vec();
-        let known = (self.reach.least(), self.thickness.overlap(&[body.clone(), body]));
-        self.kin = Some(Kin::new(&self.surfaces[0], self.rings, &self.nodes.coordinates, known));
-        self.reach.forget();
     }
 
     /// Rounds the edges: how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh,
@@ -279,11 +261,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.thickness.set(offsets, self.nodes.coordinates.len())?;
-        self.reach.forget();
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_offsets(offsets, &self.surfaces[0], &self.nodes.coordinates)?;
         Ok(self)
     }
 
@@ -293,10 +271,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.thickness.ramp = Ramp::new(times, factors)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_ramp((times, factors), &self.surfaces[0], &self.nodes.coordinates)?;
         Ok(self)
     }
 
@@ -322,10 +297,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach.set_least(reach)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
+        self.vicinity.set_least(reach, &self.surfaces[0], &self.nodes.coordinates)?;
         Ok(self)
     }
 
@@ -336,7 +308,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.reach.set_skin(skin)?;
+        self.vicinity.reach.set_skin(skin)?;
         Ok(self)
     }
 
@@ -374,7 +346,7 @@ impl<T: Real> EdgeToEdge<T> {
             body.sort_unstable();
             body.dedup();
         }
-        match (&self.kin, bodies) {
+        match (&self.vicinity.kin, bodies) {
             (None, bodies) => nodes.read_bodies(bodies)?,
             (Some(_), [body, _]) => nodes.read_body(body),
         }
@@ -384,28 +356,29 @@ impl<T: Real> EdgeToEdge<T> {
         for &[from, to] in self.ends_of.iter().flatten() {
             nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
         }
-        self.reach.forget();
+        self.vicinity.reach.forget();
         self.rows.clear();
         Ok(())
     }
 
     /// The edges at t.
     fn sides(&self, t: f64) -> Sides<'_> {
-        let Self { edges, surfaces, kin, thickness, .. } = self;
+        let Self { edges, surfaces, vicinity: Vicinity { kin, thickness, .. }, .. } = self;
         Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) }
     }
 
     /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
     fn update_lists(&mut self, range: f64) {
-        let motions = self.reach.motions(&self.nodes);
-        let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) else { return };
+        let motions = self.vicinity.reach.motions(&self.nodes);
+        let Some(listed) = self.vicinity.reach.renew(&motions, range, &self.nodes.positions) else { return };
         let [one, other] =
             self.edges.each_ref().map(|edges| edges.iter().map(|edge| edge.bounds(&self.nodes.positions)));
         self.neighborhood.build(one, other, listed);
     }
 
     fn find_rows(&mut self, (t, u, v): (f64, &[T], &[T]), ahead: f64) {
-        let Self { nodes, edges, surfaces, kin, thickness, neighborhood, found, reach, law, .. } = self;
+        let Self { nodes, edges, surfaces, vicinity, neighborhood, found, law, .. } = self;
+        let Vicinity { kin, thickness, reach, .. } = &*vicinity;
         let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
         let [thick, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
         let at = |node: usize| nodes.positions[node];
@@ -507,8 +480,8 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
         if self.edges.iter().all(|edges| !edges.is_empty()) {
-            let [thick, growth] = self.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
-            let range = self.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
+            let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
+            let range = self.vicinity.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
                 self.update_lists(range);
                 self.find_rows((t, u, v), ahead);
@@ -526,7 +499,8 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         if self.rows.pairs.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
-        let Self { nodes, edges, surfaces, kin, thickness, rows, found, .. } = self;
+        let Self { nodes, edges, surfaces, vicinity, rows, found, .. } = self;
+        let Vicinity { kin, thickness, .. } = &*vicinity;
         let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
         let at = |node: usize| nodes.positions[node];
         found.clear();
@@ -549,7 +523,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let now = self.thickness.ramp.at(t);
+        let now = self.vicinity.thickness.ramp.at(t);
         for ((row, gap), (radius, then)) in gaps.iter_mut().enumerate().zip(&self.rows.rounding) {
             *gap = self.rows.affine.gap(row, u) - T::of((now - then) * radius);
         }
@@ -558,7 +532,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
         let Rows { pairs, crossings, .. } = &self.rows;
-        let (sides, ramp) = (self.sides(t), &self.thickness.ramp);
+        let (sides, ramp) = (self.sides(t), &self.vicinity.thickness.ramp);
         let [change, bend] = [ramp.rate(t), ramp.acceleration(t)];
         for (rates, (&index, crossing)) in rates.iter_mut().zip(pairs.iter().zip(crossings)) {
             let pair = sides.pair(index);

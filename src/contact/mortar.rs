@@ -4,6 +4,7 @@ mod bonds;
 mod dual;
 mod integrals;
 mod pairs;
+mod parts;
 mod passage;
 mod points;
 mod rates;
@@ -120,6 +121,9 @@ pub struct Mortar<T: Real> {
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
     integrals: Integrals,
+    /// Of which positions, by how often nodes had moved, and by which factor of offsets (its bits) the integrals of the
+    /// pairs are, if any are known.
+    known: Option<(usize, u64)>,
     rows: Rows<T>,
     /// What the search under way finds.
     found: Rows<T>,
@@ -165,6 +169,7 @@ impl<T: Real> Mortar<T> {
             behind: None,
             searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
+            known: None,
             rows: Rows::new(),
             found: Rows::new(),
             look: passage::Look::default(),
@@ -273,6 +278,7 @@ impl<T: Real> Mortar<T> {
         self.thickness.set(offsets, self.nodes.coordinates.len())?;
         self.reach.forget();
         self.behind = None;
+        self.known = None;
         self.with_fitting_bonds()
     }
 
@@ -290,6 +296,7 @@ impl<T: Real> Mortar<T> {
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.thickness.ramp = Ramp::new(times, factors)?;
         self.behind = None;
+        self.known = None;
         Ok(self)
     }
 
@@ -341,6 +348,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Incompatible`] with [bonds](Self::bonded), whose rows have N.
     pub fn dual(mut self) -> Result<Self> {
         self.multiplier = Multiplier::Dual;
+        self.known = None;
         self.with_fitting_bonds()
     }
 
@@ -419,14 +427,23 @@ impl<T: Real> Mortar<T> {
         if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
             self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
-        if let Some(behind) = &self.behind {
-            self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth));
+        if let Some(behind) = &self.behind
+            && self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth))
+        {
+            self.known = None;
         }
     }
 
+    /// Integrates where the nodes are now, unless that is where integrals are from: a step begins where the rows of the
+    /// last one were made, as a rule.
     fn integrate(&mut self, t: f64) {
+        let present = Some((self.nodes.moves(), self.thickness.ramp.at(t).to_bits()));
+        if self.known == present {
+            return;
+        }
+        self.known = present;
         let Self { integrals, slave, master, nodes, pairs, thickness, multiplier, .. } = self;
-        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, |facet| pairs.of(facet));
+        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, pairs);
     }
 }
 
@@ -465,15 +482,18 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             places.extend(body.iter().map(|&node| self.nodes.positions[node]));
         }
         self.found.clear();
-        self.pairs.clear();
         if boxes[0].inflated(range).intersects(&boxes[1]) {
             self.find_pairs(t, range);
             self.integrate(t);
-            let made = Made { rubs: self.tangents() > 0, nodes: &self.nodes, factor: self.thickness.ramp.at(t), u };
+            let (rubs, factor) = (self.tangents() > 0, self.thickness.ramp.at(t));
+            let made = Made { rubs, nodes: &self.nodes, slave: &self.slave, factor, u };
             let is_bonded = |place: usize| self.bonds.as_ref().is_some_and(|bonds| bonds.hold(place));
             for place in (0..self.slave.nodes().len()).filter(|&place| !is_bonded(place)) {
-                self.found.push(place, &self.integrals, &made);
+                self.found.push(place, &mut self.integrals, &made);
             }
+        } else {
+            self.pairs.clear();
+            self.known = None;
         }
         let Self { bonds, slave, .. } = self;
         let tied = match bonds {
@@ -503,7 +523,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let near = self.rows.places.iter().all(is_covered)
             || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
         let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
-        let made = Made { rubs: count > 0, nodes, factor: thickness.ramp.at(t), u };
+        let made = Made { rubs: count > 0, nodes, slave, factor: thickness.ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, &made) {
                 continue;

@@ -1,23 +1,24 @@
 //! Contact of the nodes of one deforming surface with the facets of another.
 
 mod candidates;
+mod constraint;
 mod passage;
 mod rows;
+mod settings;
 
-use super::surface::{
-    Bounds, Facet, Kin, Neighborhood, Nodes, Point, Ramp, Reach, Shape, Surface, Thickness, add_scaled, overhang,
-};
-use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local, check_nodes};
+#[cfg(doc)]
+use super::ContactConstraint;
+use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, Surface, Vicinity, add_scaled};
+use super::{ContactLaw, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use candidates::{gap_of, pass_of};
 use rows::Rows;
 
 /// One direction of contact: nodes against a surface.
 #[derive(Debug)]
 struct Pass {
     nodes: Vec<usize>,
-    neighborhood: Neighborhood,
+    lists: NearestFirst,
     /// For each node a distance that it has from the surface at least, at the last search.
     clearance: Vec<f64>,
     /// The boxes of the facets at the last search, of which each node looks at many.
@@ -27,7 +28,7 @@ struct Pass {
 impl Pass {
     fn new(nodes: Vec<usize>) -> Self {
         let clearance = vec![0.0; nodes.len()];
-        Self { clearance, nodes, neighborhood: Neighborhood::default(), boxes: Vec::new() }
+        Self { clearance, nodes, lists: NearestFirst::default(), boxes: Vec::new() }
     }
 }
 
@@ -131,15 +132,13 @@ pub struct NodeToFacet<T: Real> {
     surface: Surface,
     /// Facets that the nodes belong to, if known.
     own_surface: Option<Surface>,
-    /// What nodes do not meet of a surface against itself, and by how many rings it was found.
-    kin: Option<Kin>,
-    rings: usize,
     passes: Vec<Pass>,
     law: ContactLaw,
     friction: f64,
-    thickness: Thickness,
-    reach: Reach,
+    vicinity: Vicinity,
     rebuilds: usize,
+    /// The cones of the normals of both surfaces at the last search.
+    cones: [Cones; 2],
     rows: Rows<T>,
     /// What the search under way finds.
     found: Rows<T>,
@@ -242,16 +241,14 @@ impl<T: Real> NodeToFacet<T> {
         Self {
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
             nodes: mesh,
-            reach: Reach::new(surface.typical()),
+            vicinity: Vicinity::new(surface.typical()),
             surface,
             own_surface: None,
-            kin: None,
-            rings: 0,
             passes: vec![Pass::new(nodes)],
             law: ContactLaw::Rigid,
             friction: 0.0,
-            thickness: Thickness::default(),
             rebuilds: 0,
+            cones: [Cones::default(), Cones::default()],
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
         }
@@ -300,156 +297,9 @@ impl<T: Real> NodeToFacet<T> {
         let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
         let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone());
         contact.own_surface = Some(surface);
-        contact.rings = 1;
-        contact.find_kin();
+        contact.vicinity.meet_itself(&contact.surface, &contact.nodes.coordinates);
         contact.prepare()?;
         Ok(contact)
-    }
-
-    /// How many rings of facets around a node it does not meet, of [its own surface](Self::of_itself): 0 are the facets
-    /// that have the node, 1 those that share a node with one of them, and so on. By default 1. It has no meaning for
-    /// two surfaces.
-    #[must_use]
-    pub fn rings(mut self, rings: usize) -> Self {
-        self.rings = rings;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
-        self
-    }
-
-    fn find_kin(&mut self) {
-        let body = self.surface.nodes().to_vec();
-        let known = (self.reach.least(), self.thickness.overlap(&[body.clone(), body]));
-        self.kin = Some(Kin::new(&self.surface, self.rings, &self.nodes.coordinates, known));
-        self.reach.forget();
-    }
-
-    /// The law of all rows.
-    #[must_use]
-    pub fn with_law(mut self, law: ContactLaw) -> Self {
-        self.law = law;
-        self
-    }
-
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of a node against the point of the facet
-    /// that it stands on: bodies that turn together do not slip.
-    ///
-    /// ```
-    /// use contact_dynamics::contact::{Contacts, NodeToFacet};
-    /// use contact_dynamics::ContactConstraint;
-    ///
-    /// // A node in the middle of a segment, and touching it.
-    /// let coordinates = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]];
-    /// let dofs = [[0, 1], [2, 3], [4, 5]];
-    /// let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[1, 0]])?.friction(0.3);
-    /// contact.search(0.0, &[0.0; 6], &[0.0; 6], 0.0)?;
-    /// let contacts = Contacts::of(&contact);
-    /// assert_eq!((contacts.friction(0), contacts.tangents(0).len()), (0.3, 1));
-    /// let v = [5.0, 0.0, 5.0, 0.0, 5.0, 0.0];
-    /// let slip: f64 = contacts.tangents(0)[0].iter().map(|&(place, weight)| weight * v[place]).sum();
-    /// assert_eq!(slip, 0.0); // all of them move along the segment
-    /// # Ok::<(), contact_dynamics::Error>(())
-    /// ```
-    #[must_use]
-    pub fn friction(mut self, coefficient: f64) -> Self {
-        self.friction = coefficient;
-        self
-    }
-
-    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh, and of nodes that
-    /// belong to no facet how thick they are: half the thickness of a shell whose facets are its middle surface, the
-    /// thickness of a coating, the radius of a cable; negative if they lie inside. Between nodes the shape functions
-    /// interpolate. The gap is the distance less the offsets of the node and of the closest point of the facet, and a
-    /// node meets the facet whose surface is closest. What a varying offset changes by as the closest point slides is
-    /// in the rows: forces then have a share along the facet, and keep linear and angular momentum.
-    ///
-    /// Forces act on nodes and facets: that a friction force acts at a distance from the middle surface is left out. In
-    /// dents sides are found that share a vertex with the closest facet: so in a dent of 90° with an offset of no more
-    /// than a facet's length. [Of itself](Self::of_itself) a body meets what is near beyond its [rings](Self::rings),
-    /// so a fold tighter than its offset is inside of itself.
-    ///
-    /// ```
-    /// use contact_dynamics::ContactConstraint;
-    /// use contact_dynamics::contact::NodeToFacet;
-    ///
-    /// // The middle surfaces of two sheets, 0.1 apart, of which each is 0.06 thick.
-    /// let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.1], [1.0, 0.1]];
-    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-    /// let mut contact = NodeToFacet::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])?.offsets(&[0.03; 4])?;
-    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
-    /// let mut gaps = [0.0; 2];
-    /// contact.gaps(0.0, &[0.0; 8], &mut gaps)?;
-    /// assert!(gaps.iter().all(|gap: &f64| (gap - 0.04).abs() < 1e-15));
-    /// # Ok::<(), contact_dynamics::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
-    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.thickness.set(offsets, self.nodes.coordinates.len())?;
-        self.reach.forget();
-        if self.kin.is_some() {
-            self.find_kin();
-        }
-        Ok(self)
-    }
-
-    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
-    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration, as
-    /// [`Mortar::ramp`](super::Mortar::ramp).
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless all are finite and the second time is later.
-    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.thickness.ramp = Ramp::new(times, factors)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
-        Ok(self)
-    }
-
-    /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the
-    /// facets. What the velocities bring near within a step is found as well, so that no reach must fit the speed.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach.set_least(reach)?;
-        if self.kin.is_some() {
-            self.find_kin();
-        }
-        Ok(self)
-    }
-
-    /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built
-    /// anew; if not given, half of what is searched. It changes the cost, not the result.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.reach.set_skin(skin)?;
-        Ok(self)
-    }
-
-    /// Tells the facets that the nodes belong to: a node then meets only facets turned against its own normal, which is
-    /// the mean of its facets' normals (refused: an angle of less than 60° between the two).
-    ///
-    /// This keeps a node from the far side of a thin body, and from facets that it comes to from behind.
-    ///
-    /// # Errors
-    ///
-    /// As those of [`one_pass`](Self::one_pass) about facets.
-    pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
-        let own = Surface::of_facets(facets, self.nodes.dimension, &self.nodes.coordinates)?;
-        self.own_surface = Some(own);
-        self.passes.truncate(1);
-        self.prepare()?;
-        Ok(self)
     }
 
     /// Index of the facet that a row of the last search stands on, in the list of its pass.
@@ -468,14 +318,14 @@ impl<T: Real> NodeToFacet<T> {
         body.extend(self.own_surface.iter().flat_map(Surface::nodes));
         body.sort_unstable();
         body.dedup();
-        match self.kin {
+        match self.vicinity.kin {
             None => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
             Some(_) => self.nodes.read_body(body),
         }
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        self.reach.forget();
+        self.vicinity.reach.forget();
         Ok(())
     }
 
@@ -500,109 +350,5 @@ impl<T: Real> NodeToFacet<T> {
     fn moving(&self, node: usize, u: &[T], v: &[T]) -> [Point; 2] {
         let moved = self.nodes.vector(node, u);
         [add_scaled(self.nodes.coordinates[node], 1.0, moved), self.nodes.vector(node, v)]
-    }
-}
-
-impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
-    fn dofs(&self) -> &[usize] {
-        self.nodes.dofs()
-    }
-
-    fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { identities, stands, affine, .. } = &self.rows;
-        for (row, (&(node, candidate), stand)) in identities.iter().zip(stands).enumerate() {
-            let pass = pass_of(candidate);
-            let position = self.nodes.positions[node];
-            let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
-            let mut contact = contacts.push_row((node, candidate), self.law, (&affine.jacobian, row));
-            contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
-            if self.friction == 0.0 {
-                continue;
-            }
-            contact.friction(self.friction);
-            let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
-            let vertices = surface.facets()[stand.facet].nodes();
-            for tangent in self.nodes.tangents(stand.normal) {
-                let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
-                let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
-                    let dofs = self.nodes.places(node);
-                    dofs.iter().zip(tangent).map(move |(&dof, along)| (dof, T::of(share * along)))
-                });
-                contact.tangent_entries(entries);
-            }
-        }
-    }
-
-    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
-        check_local(u.len(), self.nodes.dofs().len())?;
-        let boxes = self.nodes.move_to(u)?;
-        let motions = self.reach.motions(&self.nodes);
-        let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
-        self.found.clear();
-        let [thick, growth] = self.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
-        let near = self.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
-        let range = near + thick;
-        // Facets go on a little beyond the rim.
-        let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
-        for pass in &mut self.passes {
-            pass.clearance.fill(near);
-        }
-        if boxes[0].inflated(wide).intersects(&boxes[1]) {
-            self.update_lists(&motions, range);
-            for pass in 0..self.passes.len() {
-                self.find_rows(pass, &boxes[1 - pass].inflated(wide), (t, u, v), (&speeds, ahead));
-            }
-        }
-        let (rows, found) = (&self.rows, &self.found);
-        let same = rows.identities == found.identities && rows.affine.jacobian == found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
-    }
-
-    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
-        check_local(u.len(), self.nodes.dofs().len())?;
-        // A trial state that is not finite: the gaps say so.
-        if self.nodes.move_to(u).is_err() {
-            return Ok(Candidates::Unchanged);
-        }
-        self.found.clear();
-        self.move_rows(t, u)?;
-        let same = self.rows.affine.jacobian == self.found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
-    }
-
-    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        self.look_at(step)
-    }
-
-    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.thickness.ramp.at(t);
-        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
-            *gap = gap_of(&self.rows, row, factor, u);
-        }
-        Ok(())
-    }
-
-    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        let Rows { identities, stands, .. } = &self.rows;
-        for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(stands) {
-            let surface = self.own_surface.as_ref().filter(|_| pass_of(candidate) > 0).unwrap_or(&self.surface);
-            let facet = &surface.facets()[stand.facet];
-            let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
-            let [x, speed] = self.moving(node, u, v);
-            let [shape, velocity] = [0, 1].map(|k| Shape::new(corners.map(|corner| corner[k]), facet.count));
-            let mut acceleration = stand.acceleration(x, speed, &shape, &velocity);
-            let (offsets, ramp) = (self.thickness.at(t), &self.thickness.ramp);
-            let mut rate = 0.0;
-            if !offsets.is_none() {
-                let [slides, bends] = stand.sliding(speed, (&shape, &velocity), offsets.at_corners(facet));
-                rate = -ramp.rate(t) * stand.offset;
-                acceleration -=
-                    offsets.factor * bends + 2.0 * ramp.rate(t) * slides + ramp.acceleration(t) * stand.offset;
-            }
-            *out = GapRates { rate: T::of(rate), acceleration: T::of(acceleration) };
-        }
-        Ok(Rates::Given)
     }
 }

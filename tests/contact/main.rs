@@ -22,6 +22,7 @@ mod offsets;
 mod passing_through;
 mod pounding;
 mod rate_laws;
+mod searches;
 mod second_order;
 #[cfg(feature = "search")]
 mod shapes;

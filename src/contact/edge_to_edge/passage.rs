@@ -44,7 +44,7 @@ impl<T: Real> EdgeToEdge<T> {
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
         let others = swept(&self.nodes.bodies()[1]);
         // Lists know what an edge may meet, unless it was faster than its velocity promised.
-        let listed = longest <= self.reach.listed();
+        let listed = longest <= self.vicinity.reach.listed();
         for (first, edge) in self.edges[0].iter().enumerate() {
             let bounds = swept(&edge.nodes);
             if !bounds.intersects(&others) {

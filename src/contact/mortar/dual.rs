@@ -8,7 +8,8 @@
 //! in N: it is found with N, and made that of the weights by B = I + c (A − I). Derivatives have besides
 //! δB = c′ (A − I) δκ.
 
-use super::integrals::{Entry, Sums};
+use super::integrals::Sums;
+use super::points::{Column, column};
 use crate::contact::surface::{Base, Facet, add_scaled, middle, norm};
 
 /// The shape functions that gaps are weighted with.
@@ -72,36 +73,38 @@ impl Blend {
         Self { count, matrix, by_area, covered }
     }
 
-    /// Makes a facet's entries, found by node and of each for all its corners, those of its weights.
-    pub(super) fn weigh(&self, entries: &mut [Entry]) {
-        for entries in entries.chunks_exact_mut(self.count) {
-            let mut found = [Entry::new(0, 0, [0.0; 3], 0.0); 4];
-            found[..self.count].copy_from_slice(entries);
-            let area = found.iter().fold([0.0; 3], |sum, found| add_scaled(sum, 1.0, found.area));
-            for (entry, (row, by_area)) in entries.iter_mut().zip(self.matrix.iter().zip(self.by_area)) {
+    /// Makes what nodes add to the rows of a facet's corners that of its weights.
+    pub(super) fn weigh<'a>(&self, all: impl Iterator<Item = &'a mut [Column; 4]>) {
+        for columns in all {
+            let found = *columns;
+            let area = found[..self.count]
+                .iter()
+                .fold([0.0; 3], |sum, &[_, _, _, p, q, r, ..]| add_scaled(sum, 1.0, [p, q, r]));
+            for (into, (row, by_area)) in columns[..self.count].iter_mut().zip(self.matrix.iter().zip(self.by_area)) {
                 let [moment, of_area] = by_area.map(|by_area| area.map(|x| by_area * x));
-                (entry.moment, entry.area, entry.share) = (moment, of_area, 0.0);
-                row.iter().zip(&found).for_each(|(share, found)| entry.add_scaled(*share, found));
+                *into = column(moment, of_area, 0.0);
+                for (share, found) in row[..self.count].iter().zip(&found) {
+                    into.iter_mut().zip(found).for_each(|(into, x)| *into += share * x);
+                }
             }
         }
     }
 
-    /// Entries by which the whole of the facet grows, that the covered area is a share of.
-    pub(super) fn of_whole<'s>(
-        &'s self,
-        base: &Base,
-        places: &'s [usize],
-        facet: &'s Facet,
-    ) -> impl Iterator<Item = Entry> + 's {
+    /// Calls `act` with what corners add because the whole of the facet grows, which the covered area is a share of.
+    pub(super) fn each_of_whole(&self, base: &Base, facet: &Facet, mut act: impl FnMut(usize, [Column; 4])) {
+        if self.by_area.iter().flatten().all(|x| *x == 0.0) {
+            return;
+        }
         let by_corner = base.turned(&middle(self.count), base.normal).map(|x| x.map(|x| factor(self.count) * x));
-        let is_still = self.by_area.iter().flatten().all(|x| *x == 0.0);
-        let nodes = if is_still { &[] } else { facet.nodes() };
-        nodes.iter().zip(by_corner).flat_map(move |(&node, growth)| {
-            places.iter().zip(self.by_area).map(move |(&row, by_area)| {
-                let [moment, area] = by_area.map(|by_area| growth.map(|x| -self.covered * by_area * x));
-                Entry { area, ..Entry::new(row, node, moment, 0.0) }
-            })
-        })
+        for (&node, growth) in facet.nodes().iter().zip(by_corner) {
+            act(
+                node,
+                self.by_area.map(|by_area| {
+                    let [moment, area] = by_area.map(|by_area| growth.map(|x| -self.covered * by_area * x));
+                    column(moment, area, 0.0)
+                }),
+            );
+        }
     }
 }
 

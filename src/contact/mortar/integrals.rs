@@ -15,7 +15,9 @@
 //! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
 
 use super::dual::{self, Blend, Multiplier};
-use super::points::{self, Addends, Column, Points, column};
+use super::pairs::Pairs;
+use super::parts::Parts;
+use super::points::{self, Addends, Column, NORMAL, OTHERS, OWN, Points, column};
 use super::second_order::{Pair, Shares};
 use crate::contact::surface::{Base, Facet, Offsets, Point, RimSample, Sample, Surface, add_scaled, dot};
 
@@ -120,8 +122,6 @@ impl Sums {
 /// What a row has of a node, before it is divided by the covered area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// Place of the slave node whose row it is, and the node.
-    pub(super) row: usize,
     pub(super) node: usize,
     /// The derivatives of ∫N g dA and of ∫N dA by the position of the node.
     pub(super) moment: Point,
@@ -131,37 +131,23 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// One that does not change the area.
-    pub(super) fn new(row: usize, node: usize, moment: Point, share: f64) -> Self {
-        Self { row, node, moment, area: [0.0; 3], share }
-    }
-
     /// The derivative of the mean gap.
     pub(super) fn weight(&self, sums: &Sums) -> Point {
         add_scaled(self.moment, -sums.gap(), self.area).map(|x| x / sums.area)
     }
-
-    pub(super) fn add_scaled(&mut self, factor: f64, other: &Self) {
-        self.moment = add_scaled(self.moment, factor, other.moment);
-        self.area = add_scaled(self.area, factor, other.area);
-        self.share += factor * other.share;
-    }
 }
 
-/// Sums by place of the slave node, and the entries of their rows, ascending by row and node.
+/// Sums by place of the slave node, and what rows are made of.
 #[derive(Debug, Default)]
 pub(super) struct Integrals {
     pub(super) sums: Vec<Sums>,
-    entries: Vec<Entry>,
+    parts: Parts,
     /// Nodes of master facets over one slave facet, and what they add to the rows of its corners.
     others: Vec<(usize, [Column; 4])>,
     points: Points,
-    merged: Vec<Entry>,
-    /// Where the merged entries of each row begin.
-    starts: Vec<usize>,
-    /// (node, place among the entries) by row, and where each row begins there.
-    sorted: Vec<(usize, usize)>,
-    begins: Vec<usize>,
+    /// The row that was asked for last, and memory for it.
+    row: Vec<Entry>,
+    heads: Vec<[usize; 3]>,
 }
 
 /// What is summed over one slave facet.
@@ -181,29 +167,26 @@ fn add_to(others: &mut Vec<(usize, [Column; 4])>, node: usize, columns: &[Column
     }
 }
 
-/// Makes entries of what rows have of nodes, all rows of a node after each other.
-fn push_all(entries: &mut Vec<Entry>, rows: &[usize], columns: impl Iterator<Item = (usize, [Column; 4])>) {
-    for (node, columns) in columns {
-        for (&row, &[x, y, z, p, q, r, share, _]) in rows.iter().zip(&columns) {
-            entries.push(Entry { row, node, moment: [x, y, z], area: [p, q, r], share });
-        }
-    }
-}
-
 impl Integrals {
-    /// The entries of a row.
-    pub(super) fn row(&self, place: usize) -> &[Entry] {
-        &self.merged[self.starts[place]..self.starts[place + 1]]
+    /// The entries of the row of a slave node, around which there are these facets (with the corner that it is of
+    /// each), ascending by node.
+    pub(super) fn row(&mut self, around: &[(usize, usize)]) -> &[Entry] {
+        let Self { parts, row, heads, .. } = self;
+        row.clear();
+        parts.each_of_row(around, heads, |node, &[x, y, z, p, q, r, share, _]| {
+            row.push(Entry { node, moment: [x, y, z], area: [p, q, r], share });
+        });
+        row
     }
 
     /// Integrates as [`integrate`](Self::integrate) does, without what derivatives need: areas and gaps.
-    pub(super) fn sum<'p>(
+    pub(super) fn sum(
         &mut self,
         [slave, master]: [&Surface; 2],
         positions: &[Point],
         offsets: Offsets<'_>,
         multiplier: Multiplier,
-        partners: impl Fn(usize) -> &'p [usize],
+        pairs: &Pairs,
     ) {
         let sums = &mut self.sums;
         sums.clear();
@@ -211,11 +194,11 @@ impl Integrals {
         for (index, facet) in slave.facets().iter().enumerate() {
             let Some(base) = Base::new(facet, positions) else { continue };
             let places = Sums::begin(sums, slave, index, &base);
-            if partners(index).is_empty() {
+            if pairs.of(index).is_empty() {
                 continue;
             }
             let mut own = [Sums::default(); 4];
-            for other in partners(index).iter().map(|&partner| &master.facets()[partner]) {
+            for other in pairs.of(index).iter().map(|&partner| &master.facets()[partner]) {
                 let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
                 base.each_sample(other, positions, &mut |sample: &Sample| {
                     let offset = outside.at(&sample.slave, &sample.master);
@@ -236,43 +219,57 @@ impl Integrals {
     }
 
     /// Integrates over all facets of the slave surface what the master facets listed for each cover.
-    pub(super) fn integrate<'p>(
+    pub(super) fn integrate(
         &mut self,
         [slave, master]: [&Surface; 2],
         positions: &[Point],
         offsets: Offsets<'_>,
         multiplier: Multiplier,
-        partners: impl Fn(usize) -> &'p [usize],
+        pairs: &Pairs,
     ) {
         self.sums.clear();
         self.sums.resize(slave.nodes().len(), Sums::default());
-        self.entries.clear();
+        self.parts.clear();
         for (index, facet) in slave.facets().iter().enumerate() {
-            let Some(base) = Base::new(facet, positions) else { continue };
-            let places = *Sums::begin(&mut self.sums, slave, index, &base);
-            if partners(index).is_empty() {
-                continue;
+            if let Some(base) = Base::new(facet, positions) {
+                let places = *Sums::begin(&mut self.sums, slave, index, &base);
+                if !pairs.of(index).is_empty() {
+                    let own =
+                        self.integrate_facet((&base, facet), master, (positions, offsets), pairs.of(index), multiplier);
+                    Sums::end(&mut self.sums, &places[..base.count()], &own);
+                }
             }
-            let (places, first) = (&places[..base.count()], self.entries.len());
-            let mut own = Own::default();
-            self.others.clear();
-            for &partner in partners(index) {
-                let other = (&master.facets()[partner], master.open_sides(partner));
-                self.integrate_pair((&base, facet), other, (positions, offsets), places, &mut own);
-            }
-            if own.is_touched {
-                let columns = facet.nodes().iter().copied().zip(points::own(own.addends, &base));
-                push_all(&mut self.entries, places, columns.chain(self.others.drain(..)));
-                self.entries.extend(own.shares.entries(places, facet, base.normal));
-            }
-            if multiplier == Multiplier::Dual {
-                let blend = Blend::of(&base, &mut own.sums);
-                blend.weigh(&mut self.entries[first..]);
-                self.entries.extend(blend.of_whole(&base, places, facet));
-            }
-            Sums::end(&mut self.sums, places, &own.sums);
+            self.parts.end_facet(facet.nodes().len());
         }
-        self.merge();
+    }
+
+    /// Adds what master facets cover of a slave facet to its parts; returns its sums.
+    fn integrate_facet(
+        &mut self,
+        (base, facet): (&Base, &Facet),
+        master: &Surface,
+        (positions, offsets): (&[Point], Offsets<'_>),
+        partners: &[usize],
+        multiplier: Multiplier,
+    ) -> [Sums; 4] {
+        let mut own = Own::default();
+        self.others.clear();
+        for &partner in partners {
+            let other = (&master.facets()[partner], master.open_sides(partner));
+            self.integrate_pair((base, facet), other, (positions, offsets), &mut own);
+        }
+        if own.is_touched {
+            let columns = points::own(&mut own.addends, base);
+            facet.nodes().iter().zip(columns).for_each(|(&node, columns)| self.parts.push(node, columns));
+            self.others.drain(..).for_each(|(node, columns)| self.parts.push(node, columns));
+            own.shares.each_column(facet, base.normal, |node, columns| self.parts.push(node, columns));
+        }
+        if multiplier == Multiplier::Dual {
+            let blend = Blend::of(base, &mut own.sums);
+            blend.weigh(self.parts.of_facet_mut());
+            blend.each_of_whole(base, facet, |node, columns| self.parts.push(node, columns));
+        }
+        own.sums
     }
 
     /// Adds what a master facet covers.
@@ -281,12 +278,12 @@ impl Integrals {
         (base, facet): (&Base, &Facet),
         (other, open): (&Facet, [bool; 4]),
         (positions, offsets): (&[Point], Offsets<'_>),
-        places: &[usize],
         own: &mut Own,
     ) {
         let Own { sums, addends, shares, is_touched } = own;
         let (outside, curved) = (offsets.between(facet, other), Pair::new(facet, other, positions));
-        let (points, mut shares_onto) = (&mut self.points, Shares::default());
+        let points = &mut self.points;
+        let mut shares_onto = curved.is_some().then(Shares::default);
         base.each_sample(other, positions, &mut |sample: &Sample| {
             let Sample { area, slave, master, gap: distance, direction: mut normal } = *sample;
             let mut point = base.shape.point(&slave);
@@ -298,7 +295,7 @@ impl Integrals {
                 point = add_scaled(point, 1.0, excess.off);
                 apart = excess.apart;
                 for (a, share) in slave.iter().enumerate().take(base.count()) {
-                    excess.add(a, area * share, [&mut *shares, &mut shares_onto]);
+                    excess.add(a, area * share, [Some(&mut *shares), shares_onto.as_mut()]);
                 }
             }
             let mut direction = normal;
@@ -314,14 +311,16 @@ impl Integrals {
             }
             let (product, stretched) = base.stretch(&slave);
             let omega = area / dot(base.normal, product);
-            let own = std::array::from_fn(|k| {
+            let addends = points.push(slave);
+            for k in 0..4 {
                 let (grown, share) = (stretched[k].map(|x| omega * x), area * slave[k]);
-                column(add_scaled(direction.map(|x| -share * x), gap, grown), grown, share)
-            });
-            let others = master.map(|share| column(direction.map(|x| area * share * x), [0.0; 3], -area * share));
+                addends[OWN + k] = column(add_scaled(direction.map(|x| -share * x), gap, grown), grown, share);
+                let share = area * master[k];
+                addends[OTHERS + k] = column(direction.map(|x| share * x), [0.0; 3], -share);
+            }
             let grown = product.map(|x| omega * x);
             let turned = add_scaled(grown.map(|x| gap * x), -area * distance, direction);
-            points.push(slave, &points::addends(own, others, column(add_scaled(turned, area, apart), grown, 0.0)));
+            addends[NORMAL] = column(add_scaled(turned, area, apart), grown, 0.0);
         });
         if points.is_empty() {
             return;
@@ -338,44 +337,8 @@ impl Integrals {
         for (corner, &node) in other.nodes().iter().enumerate() {
             add_to(&mut self.others, node, &points::take_other(addends, corner));
         }
-        self.entries.extend(shares_onto.entries(places, other, base.normal));
-    }
-
-    /// Sums entries of a row that belong to one node, in the order in which they were found.
-    ///
-    /// (Rows are told apart by counting: a sort of all entries of a large surface takes as long as finding them.)
-    fn merge(&mut self) {
-        let Self { sums, entries, merged, starts, sorted, begins, .. } = self;
-        begins.clear();
-        begins.resize(sums.len() + 2, 0);
-        // Counted two places on, so that after the sums each row's place is where its next entry goes.
-        for entry in &*entries {
-            begins[entry.row + 2] += 1;
+        if let Some(shares_onto) = shares_onto {
+            shares_onto.each_column(other, base.normal, |node, columns| self.parts.push(node, columns));
         }
-        for row in 2..begins.len() {
-            begins[row] += begins[row - 1];
-        }
-        sorted.clear();
-        sorted.resize(entries.len(), (0, 0));
-        for (number, entry) in entries.iter().enumerate() {
-            let place = &mut begins[entry.row + 1];
-            sorted[*place] = (entry.node, number);
-            *place += 1;
-        }
-        merged.clear();
-        starts.clear();
-        for row in 0..sums.len() {
-            let first = merged.len();
-            starts.push(first);
-            let of_row = &mut sorted[begins[row]..begins[row + 1]];
-            of_row.sort_unstable();
-            for &(node, number) in &*of_row {
-                match merged[first..].last_mut() {
-                    Some(last) if last.node == node => last.add_scaled(1.0, &entries[number]),
-                    _ => merged.push(entries[number]),
-                }
-            }
-        }
-        starts.push(merged.len());
     }
 }

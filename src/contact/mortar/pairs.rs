@@ -6,10 +6,14 @@ use crate::contact::surface::{Base, Behind, Bounds, Neighborhood, Point, Side, S
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     lists: Neighborhood,
-    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets.
+    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets, and the
+    /// normals of the slave's, for which their neighbors ask.
     masters: Vec<(Bounds, Option<Point>)>,
+    normals: Vec<Option<Point>>,
     starts: Vec<usize>,
     near: Vec<usize>,
+    /// What these were before.
+    before: [Vec<usize>; 2],
 }
 
 impl Pairs {
@@ -25,25 +29,28 @@ impl Pairs {
     }
 
     /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// do not belong to facets behind sharp edges, and are no far sides of both bodies. (The result does not depend on
-    /// the age of the lists.)
+    /// do not belong to facets behind sharp edges, and are no far sides of both bodies; says whether they are others
+    /// than before. (The result does not depend on the age of the lists.)
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
         behind: &[Behind; 2],
         positions: &[Point],
         (range, depth): (f64, f64),
-    ) {
+    ) -> bool {
+        std::mem::swap(&mut self.starts, &mut self.before[0]);
+        std::mem::swap(&mut self.near, &mut self.before[1]);
         self.clear();
         self.starts.push(0);
-        let Self { lists, masters, starts, near } = self;
-        let normals = master.facets().iter().map(|facet| facet.normal(positions));
+        let Self { lists, masters, normals, starts, near, before } = self;
         masters.clear();
-        masters.extend(master.boxes(positions).zip(normals));
+        masters.extend(master.boxes(positions).zip(master.facets().iter().map(|facet| facet.normal(positions))));
+        normals.clear();
+        normals.extend(slave.facets().iter().map(|facet| facet.normal(positions)));
         for (index, facet) in slave.facets().iter().enumerate() {
             let listed = lists.of(index);
             if let Some(mut base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
-                base.see_beside(slave, index, positions);
+                base.see_beside(slave, index, (positions, normals));
                 let around = Bounds::of_corners(&base.shape).inflated(range);
                 let own = Side { surface: slave, behind: &behind[0], facet: index };
                 near.extend(listed.iter().copied().filter(|&partner| {
@@ -59,6 +66,7 @@ impl Pairs {
             }
             starts.push(near.len());
         }
+        before[0] != *starts || before[1] != *near
     }
 
     /// The master facets near a slave facet, ascending.

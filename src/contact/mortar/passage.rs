@@ -74,7 +74,7 @@ impl<T: Real> Mortar<T> {
                 pairs.take_near(surfaces, behind, positions, (reach, depth));
             }
             let offsets = self.thickness.at(step.t[0] + share * (step.t[1] - step.t[0]));
-            integrals.sum(surfaces, positions, offsets, self.multiplier, |facet| pairs.of(facet));
+            integrals.sum(surfaces, positions, offsets, self.multiplier, pairs);
             for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
                 if look == 0 {
                     // What is inside already comes out as it may.

@@ -8,11 +8,13 @@ use crate::real::Kernels;
 pub(super) type Column = [f64; 8];
 
 /// A column by its parts.
+#[inline]
 pub(super) fn column(moment: Point, area: Point, share: f64) -> Column {
     [moment[0], moment[1], moment[2], area[0], area[1], area[2], share, 0.0]
 }
 
 /// Adds a column to another one.
+#[inline]
 pub(super) fn add(sum: &mut Column, column: &Column) {
     sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
 }
@@ -22,44 +24,46 @@ pub(super) fn add(sum: &mut Column, column: &Column) {
 pub(super) type Addends = [Column; 9];
 
 /// Where the corners of the slave facet are among addends, those of the master facet, and n.
-const OWN: usize = 0;
-const OTHERS: usize = 4;
-const NORMAL: usize = 8;
-
-/// Addends by the parts that they have.
-pub(super) fn addends(own: [Column; 4], others: [Column; 4], normal: Column) -> Addends {
-    std::array::from_fn(|k| match k {
-        OWN..OTHERS => own[k],
-        OTHERS..NORMAL => others[k - OTHERS],
-        _ => normal,
-    })
-}
+pub(super) const OWN: usize = 0;
+pub(super) const OTHERS: usize = 4;
+pub(super) const NORMAL: usize = 8;
 
 /// Points of a pair of facets.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     /// The shape functions of the slave facet's corners, and what they are multiplied by.
     shares: Vec<[f64; 4]>,
+    /// As many as there were ever; those behind the last point have no meaning.
     addends: Vec<Addends>,
 }
 
 impl Points {
-    pub(super) fn push(&mut self, shares: [f64; 4], addends: &Addends) {
+    /// Takes a point, all of whose addends are to be written.
+    pub(super) fn push(&mut self, shares: [f64; 4]) -> &mut Addends {
+        let place = self.shares.len();
         self.shares.push(shares);
-        self.addends.push(*addends);
+        if place == self.addends.len() {
+            self.addends.push([[0.0; 8]; 9]);
+        }
+        &mut self.addends[place]
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.shares.is_empty()
     }
 
-    /// Adds that the rim of the master moves over the slave facet, whose gaps are smaller by `offset` than the distance.
+    /// Adds that the rim of the master moves over the slave facet, whose gaps are the distance less `offset`.
     pub(super) fn push_rim(&mut self, sample: &RimSample, offset: f64) {
         let RimSample { length, slave, master, gap: distance, outward } = *sample;
         let [moment, area] = [length * (distance - offset), length].map(|x| outward.map(|along| x * along));
         let column = column(moment, area, 0.0);
         let times = |share: f64| column.map(|x| share * x);
-        self.push(slave, &addends(slave.map(|share| times(-share)), master.map(times), times(-distance)));
+        let addends = self.push(slave);
+        for k in 0..4 {
+            addends[OWN + k] = times(-slave[k]);
+            addends[OTHERS + k] = times(master[k]);
+        }
+        addends[NORMAL] = times(-distance);
     }
 
     /// Adds all points to the sums of the slave facet's corners, and forgets them.
@@ -75,7 +79,6 @@ impl Points {
             (whole..self.shares.len()).for_each(|k| f64::add_all([self.shares[k][a]], [addends(k)], sums));
         }
         self.shares.clear();
-        self.addends.clear();
     }
 }
 
@@ -84,8 +87,9 @@ pub(super) fn take_other(sums: &mut [Addends; 4], corner: usize) -> [Column; 4] 
     sums.each_mut().map(|sums| std::mem::take(&mut sums[OTHERS + corner]))
 }
 
-/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its normal.
-pub(super) fn own(mut sums: [Addends; 4], base: &Base) -> [[Column; 4]; 4] {
+/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its
+/// normal.
+pub(super) fn own(sums: &mut [Addends; 4], base: &Base) -> [[Column; 4]; 4] {
     let (count, length) = (base.count(), norm(base.product));
     // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.
     let across = |x: Point| add_scaled(x, -dot(x, base.normal), base.normal).map(|x| x / length);

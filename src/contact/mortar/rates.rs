@@ -32,7 +32,7 @@ impl<T: Real> Mortar<T> {
             let is_known = time.to_bits() == t.to_bits() && all().all(is_there);
             if !is_known {
                 let offsets = thickness.at(time);
-                integrals.sum([&*slave, &*master], positions, offsets, *multiplier, |facet| pairs.of(facet));
+                integrals.sum([&*slave, &*master], positions, offsets, *multiplier, pairs);
             }
             let sums = if is_known { &known.sums } else { &integrals.sums };
             list.extend(rows.places.iter().map(|&place| sums[place].gap_if_covered()));

@@ -3,7 +3,7 @@
 use super::integrals::{Entry, Integrals};
 use crate::contact::ContactJacobian;
 use crate::contact::affine_rows::AffineRows;
-use crate::contact::surface::{Nodes, Point};
+use crate::contact::surface::{Nodes, Point, Surface};
 use crate::real::Real;
 
 /// The rows of a search, where they are linearized.
@@ -17,9 +17,11 @@ pub(super) struct Rows<T> {
     pub(super) tangents: ContactJacobian<T>,
 }
 
-/// What rows are made with: the nodes, whether there is friction, the factor of offsets, and the displacements.
+/// What rows are made with: the nodes, the slave, whether there is friction, the factor of offsets, and the
+/// displacements.
 pub(super) struct Made<'a, T> {
     pub(super) nodes: &'a Nodes,
+    pub(super) slave: &'a Surface,
     pub(super) rubs: bool,
     pub(super) factor: f64,
     pub(super) u: &'a [T],
@@ -55,13 +57,13 @@ impl<T: Real> Rows<T> {
     }
 
     /// Appends the row of a slave node, if it is covered; says whether it is.
-    pub(super) fn push(&mut self, place: usize, integrals: &Integrals, made: &Made<'_, T>) -> bool {
-        let Made { nodes, rubs, factor, u } = *made;
-        let sums = &integrals.sums[place];
+    pub(super) fn push(&mut self, place: usize, integrals: &mut Integrals, made: &Made<'_, T>) -> bool {
+        let Made { nodes, slave, rubs, factor, u } = *made;
+        let sums = integrals.sums[place];
         let Some(normal) = sums.normal().filter(|_| sums.is_covered()) else { return false };
-        let entries = integrals.row(place);
-        let weights = entries.iter().flat_map(|entry| on_axes(nodes, entry, entry.weight(sums)));
-        self.affine.push(sums.gap(), weights, u);
+        let entries = integrals.row(slave.corners_at(place));
+        let vectors = entries.iter().map(|entry| (nodes.places(entry.node), entry.weight(&sums)));
+        self.affine.push_vectors(sums.gap(), vectors, u);
         self.places.push(place);
         let (position, offset) = (sums.position(), sums.offset());
         self.spots.push(Spot { position, normal, area: sums.area, offset, factor });

@@ -5,7 +5,7 @@
 //! that of the parts and n·(c_m − c_s). Its derivative is n·(δc_m − δc_s) + δn·(c_m − c_s), and n·c_m changes as its
 //! foot moves on along the part: as with the offsets of `integrals.rs`, its slope s makes μ − s of μ.
 
-use super::integrals::Entry;
+use super::points::{Column, column};
 use crate::contact::surface::{Base, ByNode, Facet, Point, Sample, add_scaled, dot, sub};
 
 /// A pair of facets, one of which at least is a part of one of second order.
@@ -56,9 +56,10 @@ impl<'a> Pair<'a> {
 
 impl Excess {
     /// Adds a point of this weight to the shares of both facets for a corner of the slave facet.
-    pub(super) fn add(&self, corner: usize, weight: f64, [own, onto]: [&mut Shares; 2]) {
-        let add = |shares: &mut Shares, weight: f64, excess: &ByNode| {
-            shares.0[corner].iter_mut().zip(excess).for_each(|(share, excess)| *share += weight * excess);
+    pub(super) fn add(&self, corner: usize, weight: f64, [own, onto]: [Option<&mut Shares>; 2]) {
+        let add = |shares: Option<&mut Shares>, weight: f64, excess: &ByNode| {
+            let shares = shares.into_iter().flat_map(|shares| &mut shares.0[corner]);
+            shares.zip(excess).for_each(|(share, excess)| *share += weight * excess);
         };
         add(own, -weight, &self.slave);
         add(onto, weight, &self.master);
@@ -66,19 +67,13 @@ impl Excess {
 }
 
 impl Shares {
-    /// The entries of the rows of the slave facet's corners at the nodes of a facet of second order, all rows of a node
-    /// after each other.
-    pub(super) fn entries<'s>(
-        &'s self,
-        rows: &'s [usize],
-        facet: &'s Facet,
-        normal: Point,
-    ) -> impl Iterator<Item = Entry> + 's {
-        let nodes = facet.whole.is_some().then(|| facet.all_nodes().enumerate());
-        nodes.into_iter().flatten().flat_map(move |(k, node)| {
-            rows.iter()
-                .zip(&self.0)
-                .map(move |(&row, shares)| Entry::new(row, node, add_scaled([0.0; 3], shares[k], normal), shares[k]))
-        })
+    /// Calls `act` with the nodes of a facet of second order, and what they add to the rows of a slave facet's corners.
+    pub(super) fn each_column(&self, facet: &Facet, normal: Point, mut act: impl FnMut(usize, [Column; 4])) {
+        if facet.whole.is_none() {
+            return;
+        }
+        for (k, node) in facet.all_nodes().enumerate() {
+            act(node, self.0.map(|shares| column(add_scaled([0.0; 3], shares[k], normal), [0.0; 3], shares[k])));
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::rows::Rows;
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Kin, Offsets, Point, Stand, Surface};
+use crate::contact::surface::{Bounds, Ground, Kept, Kin, Offsets, Point, Stand, Surface, Vicinity};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -12,15 +12,17 @@ impl<T: Real> NodeToFacet<T> {
     /// as `range`.
     pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
         let positions = &self.nodes.positions;
-        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
+        let surfaces = [Some(&self.surface), self.own_surface.as_ref().filter(|_| self.vicinity.kin.is_none())];
+        for (cones, surface) in self.cones.iter_mut().zip(surfaces.into_iter().flatten()) {
+            cones.find(surface, positions);
+        }
         for (pass, surface) in self.passes.iter_mut().zip(surfaces.into_iter().flatten()) {
             pass.boxes.clear();
             pass.boxes.extend(surface.boxes(positions));
         }
-        let Some(listed) = self.reach.renew(motions, range, positions) else { return };
+        let Some(listed) = self.vicinity.reach.renew(motions, range, positions) else { return };
         for pass in &mut self.passes {
-            let points = pass.nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
-            pass.neighborhood.build(points, pass.boxes.iter().copied(), listed);
+            pass.lists.build(&pass.nodes, positions, &pass.boxes, listed);
         }
         self.rebuilds += 1;
     }
@@ -47,14 +49,19 @@ impl<T: Real> NodeToFacet<T> {
         (speeds, ahead): (&[Bounds; 2], f64),
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, found, .. } = self;
+        let Self { surface, own_surface, nodes, passes, vicinity, found, cones, .. } = self;
+        let Vicinity { kin, reach, thickness, .. } = &*vicinity;
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
         let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
         let [_, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
+        let [thick, _] = thickness.sizes(nodes.bodies(), [t; 2]);
+        let motions = reach.motions(nodes);
         let ground_of = |pass: usize| {
-            let ground = ground(pass, passes, surfaces, places, Self::rounding())?;
-            Some(Ground { boxes: Some(&passes[pass].boxes), ..ground })
+            let kept = Kept { reach, motion: motions[1 - pass], thick };
+            let ground = ground(pass, passes, surfaces, places, kept, Self::rounding())?;
+            let of = |other: usize| if kin.is_some() { Some(&cones[0]) } else { cones.get(other) };
+            Some(Ground { boxes: Some(&passes[pass].boxes), cones: [of(pass), of(1 - pass)], ..ground })
         };
         let Some(ground) = ground_of(pass) else { return };
         // What the facets' nodes stand on, if they are looked at: of two surfaces that is the other pass.
@@ -81,13 +88,19 @@ impl<T: Real> NodeToFacet<T> {
             if face_each_other && ground.is_second(&stand, pass) {
                 continue;
             }
-            let mut beside = ground.beside(&stand, way).peekable();
-            let first = if beside.peek().is_some() { ground.first_in_dent(stand) } else { stand };
-            let others = beside.map(|stand| (beside_of(pass, stand.facet), stand));
-            for (candidate, stand) in std::iter::once((pass, first)).chain(others) {
+            let mut push = |candidate: usize, stand: &Stand| {
                 let vertices = ground.surface.facets()[stand.facet].nodes();
-                let row = (stand, ground.slope(&stand));
+                let row = (stand, ground.slope(stand));
                 found.push((node, candidate), row, vertices, |node| nodes.places(node), u);
+            };
+            let mut beside = ground.beside(&stand, way);
+            let Some(next) = beside.next() else {
+                push(pass, &stand);
+                continue;
+            };
+            push(pass, &ground.first_in_dent(stand));
+            for stand in std::iter::once(next).chain(beside) {
+                push(beside_of(pass, stand.facet), &stand);
             }
         }
     }
@@ -96,7 +109,8 @@ impl<T: Real> NodeToFacet<T> {
     pub(super) fn move_rows(&mut self, t: f64, u: &[T]) -> Result<()> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
-        let Self { surface, own_surface, kin, nodes, passes, reach, thickness, rows, found, .. } = self;
+        let Self { surface, own_surface, nodes, passes, vicinity, rows, found, .. } = self;
+        let Vicinity { kin, reach, thickness, .. } = &*vicinity;
         let motions = reach.motions(nodes);
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
@@ -108,7 +122,8 @@ impl<T: Real> NodeToFacet<T> {
             let first = next;
             next += group.len();
             let stands = &rows.stands[first..next];
-            let ground = ground(pass, passes, surfaces, places, Self::rounding());
+            let kept = Kept { reach, motion: motions[1 - pass], thick };
+            let ground = ground(pass, passes, surfaces, places, kept, Self::rounding());
             // The list of the node has all facets whose surface is as near as this.
             let known = reach.known_around(node, positions[node], &motions[1 - pass]) - thick;
             let ground = ground.filter(|_| known > 0.0);
@@ -124,7 +139,7 @@ impl<T: Real> NodeToFacet<T> {
                 });
                 match stand {
                     Some((stand, slope, vertices)) => match old.followed_by(stand, t) {
-                        Some(stand) => found.push(group[k], (stand, slope), vertices, |node| nodes.places(node), u),
+                        Some(stand) => found.push(group[k], (&stand, slope), vertices, |node| nodes.places(node), u),
                         None => found.keep(rows, row),
                     },
                     // There is nothing near that it could press on.
@@ -166,10 +181,11 @@ fn ground<'a>(
     passes: &'a [Pass],
     (surface, own_surface, kin): (&'a Surface, Option<&'a Surface>, Option<&'a Kin>),
     (positions, offsets): (&'a [Point], Offsets<'a>),
+    kept: Kept<'a>,
     rounding: f64,
 ) -> Option<Ground<'a>> {
-    let Pass { nodes, neighborhood, .. } = passes.get(pass)?;
+    let Pass { nodes, lists, .. } = passes.get(pass)?;
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
-    let neighborhood = Some(neighborhood);
-    Some(Ground { nodes, neighborhood, surface, boxes: None, own, kin, positions, offsets, rounding })
+    let (lists, kept, cones) = (Some(lists), Some(kept), [None; 2]);
+    Some(Ground { nodes, lists, kept, surface, boxes: None, cones, own, kin, positions, offsets, rounding })
 }

@@ -65,16 +65,18 @@ impl<T: Real> NodeToFacet<T> {
                     continue;
                 }
                 // Lists know what a node may meet, unless it was faster than its velocity promised.
-                let neighborhood = Some(&list.neighborhood).filter(|_| row.is_some() && way <= self.reach.listed());
+                let lists = Some(&list.lists).filter(|_| row.is_some() && way <= self.vicinity.reach.listed());
                 let [start, end] = [0, 1].map(|k| Ground {
                     nodes: &list.nodes,
-                    neighborhood,
+                    lists,
+                    kept: None,
                     surface,
                     boxes: None,
+                    cones: [None; 2],
                     own,
-                    kin: self.kin.as_ref(),
+                    kin: self.vicinity.kin.as_ref(),
                     positions: &ends[k],
-                    offsets: self.thickness.at(step.t[k]),
+                    offsets: self.vicinity.thickness.at(step.t[k]),
                     rounding: Self::rounding(),
                 });
                 let likely = row.map(|row| self.rows.stands[row].facet);

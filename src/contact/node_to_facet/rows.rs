@@ -32,20 +32,19 @@ impl<T: Real> Rows<T> {
     pub(super) fn push<'a>(
         &mut self,
         (node, pass): (usize, usize),
-        (stand, slope): (Stand, Option<[Point; 5]>),
+        (stand, slope): (&Stand, Option<[Point; 5]>),
         vertices: &[usize],
         dofs: impl Fn(usize) -> &'a [usize],
         u: &[T],
     ) {
         let shares = std::iter::once((node, 1.0)).chain(vertices.iter().copied().zip(stand.weights.map(|w| -w)));
-        let entries = shares.enumerate().flat_map(|(k, (node, share))| {
+        let vectors = shares.enumerate().map(|(k, (node, share))| {
             let along = stand.normal.map(|component| share * component);
-            let along = slope.map_or(along, |slope| add_scaled(along, -stand.factor, slope[k]));
-            dofs(node).iter().copied().zip(along)
+            (dofs(node), slope.map_or(along, |slope| add_scaled(along, -stand.factor, slope[k])))
         });
-        self.affine.push(stand.gap, entries, u);
+        self.affine.push_vectors(stand.gap, vectors, u);
         self.identities.push((node, pass));
-        self.stands.push(stand);
+        self.stands.push(*stand);
     }
 
     /// Appends a row as another list has it.

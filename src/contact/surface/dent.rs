@@ -22,7 +22,9 @@ impl Ground<'_> {
         let nodes = surface.facets()[stand.facet].nodes();
         let shape = surface.facets()[stand.facet].shape(positions);
         let normal = shape.normal(&stand.weights);
-        let near = stand.gap.abs() <= way + NEAR * shape.size() && !self.is_around(stand);
+        let [cones, _] = self.cones;
+        let is_even = || cones.is_some_and(|cones| cones.is_even(surface, stand.facet, LEAST_SINE, (NEAR, way)));
+        let near = stand.gap.abs() <= way + NEAR * shape.size() && !self.is_around(stand) && !is_even();
         let corners = if near { nodes } else { &[] };
         corners.iter().enumerate().flat_map(move |(k, &vertex)| {
             // (What shares a side is met at the first of its two vertices.)
@@ -35,7 +37,8 @@ impl Ground<'_> {
                 move |facet| {
                     let other = surface.facets()[facet].shape(positions);
                     let (normal, beyond) = (normal?, NEAR + way / other.size());
-                    if other.is_turned_less(normal, LEAST_SINE, beyond) {
+                    let rises = dot(normal, sub(other.middle(), positions[vertex])) >= 0.0;
+                    if !rises || other.is_turned_less(normal, LEAST_SINE, beyond) {
                         return None;
                     }
                     let beside = self.on_plane(stand.place, facet, beyond)?;
@@ -61,8 +64,8 @@ impl Ground<'_> {
         length.abs() <= self.rounding * self.surface.facets()[facet].shape(self.positions).size()
     }
 
-    /// Whether two facets rise from a vertex that they share, each in front of the other, and so does the point that
-    /// the node stands on, where its facet has this normal.
+    /// Whether a facet that rises from a vertex of that of a stand makes a dent with it: that one rises from it too,
+    /// and so does the point that the node stands on, where its facet has this normal.
     fn is_dent(
         &self,
         (stand, normal): (&Stand, Point),
@@ -73,7 +76,6 @@ impl Ground<'_> {
     ) -> bool {
         let height = |normal: Point, x: Point| dot(normal, sub(x, vertex));
         norm(cross(normal, beside.normal)) >= LEAST_SINE
-            && height(normal, other.middle()) >= 0.0
             && height(beside.normal, shape.middle()) >= 0.0
             && height(beside.normal, shape.point(&stand.weights)) >= -self.rounding * other.size()
     }

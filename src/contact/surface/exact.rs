@@ -67,13 +67,24 @@ impl RulePoints {
 
     /// Changes weights until ∫ s t dA of both facets is what it is around the polygon.
     pub(super) fn correct(&mut self, [slave, master]: [&Flat; 2], polygon: &[[f64; 2]]) {
-        let points = &self.points[..self.count];
+        let count = self.count;
+        let points = &self.points[..count];
         let Some(first) = points.first().map(|point| point.at) else { return };
         let sum = |f: &Function, g: &Function| -> f64 {
             points.iter().zip(f.iter().zip(g)).map(|(point, (f, g))| point.weight * f * g).sum()
         };
+        // Makes a function orthogonal to another one, whose square has this sum. (Values behind the last point are not
+        // read.)
+        let leave_out = |function: &mut Function, other: &Function, square: f64| {
+            if square > 0.0 {
+                let share = sum(function, other) / square;
+                function[..count].iter_mut().zip(&other[..count]).for_each(|(x, other)| *x -= share * other);
+            }
+        };
         let of = |value: &dyn Fn(&RulePoint) -> f64| -> Function {
-            std::array::from_fn(|k| points.get(k).map_or(0.0, value))
+            let mut function = [0.0; MOST];
+            function.iter_mut().zip(points).for_each(|(x, point)| *x = value(point));
+            function
         };
         // What must stay, orthogonal to each other; then what is missing.
         let one = of(&|_| 1.0);
@@ -81,7 +92,7 @@ impl RulePoints {
         let mut squares = [0.0; 3];
         for k in 0..3 {
             let (before, this) = kept.split_at_mut(k);
-            before.iter().zip(squares).for_each(|(other, square)| leave_out(&mut this[0], other, square, &sum));
+            before.iter().zip(squares).for_each(|(other, square)| leave_out(&mut this[0], other, square));
             squares[k] = sum(&this[0], &this[0]);
         }
         let mut factors: Function = [1.0; MOST];
@@ -97,16 +108,16 @@ impl RulePoints {
                 false => 0.0,
             };
             let mut rest = product;
-            kept.iter().zip(squares).for_each(|(other, square)| leave_out(&mut rest, other, square, &sum));
+            kept.iter().zip(squares).for_each(|(other, square)| leave_out(&mut rest, other, square));
             let whole = sum(&rest, &rest);
             if let Some((other, square, of_other)) = &before {
                 missing -= sum(&rest, other) / square * of_other;
-                leave_out(&mut rest, other, *square, &sum);
+                leave_out(&mut rest, other, *square);
             }
             let square = sum(&rest, &rest);
             let largest = rest[..self.count].iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             if square > ALIKE * whole && missing.abs() * largest < MOST_CHANGE * square {
-                factors.iter_mut().zip(&rest).for_each(|(factor, rest)| *factor += missing / square * rest);
+                factors[..count].iter_mut().zip(&rest).for_each(|(factor, rest)| *factor += missing / square * rest);
                 before = Some((rest, square, missing));
             }
         }
@@ -116,14 +127,6 @@ impl RulePoints {
 
 /// Values at the points of a rule.
 type Function = [f64; MOST];
-
-/// Makes a function orthogonal to another one, whose square has this sum.
-fn leave_out(function: &mut Function, other: &Function, square: f64, sum: &impl Fn(&Function, &Function) -> f64) {
-    if square > 0.0 {
-        let share = sum(function, other) / square;
-        function.iter_mut().zip(other).for_each(|(x, other)| *x -= share * other);
-    }
-}
 
 fn cross([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
     a * d - b * c

@@ -82,16 +82,20 @@ impl Facet {
     }
 
     /// The nodes in the order given.
+    #[inline]
     pub fn nodes(&self) -> &[usize] {
         &self.nodes[..self.count]
     }
 
     /// The facet with its vertices at the positions of its nodes.
+    #[inline]
     pub(crate) fn shape(&self, positions: &[Point]) -> Shape {
-        Shape::new(self.nodes.map(|node| positions[node]), self.count)
+        let [a, b, c, d] = self.nodes;
+        Shape::new([positions[a], positions[b], positions[c], positions[d]], self.count)
     }
 
     /// The outward unit normal in its middle; none if it is degenerate there.
+    #[inline]
     pub(crate) fn normal(&self, positions: &[Point]) -> Option<Point> {
         self.shape(positions).normal(&middle(self.count))
     }

@@ -34,6 +34,8 @@ pub(crate) struct Nodes {
     bodies: [Vec<usize>; 2],
     /// Where the nodes of the two bodies are now.
     pub(crate) positions: Vec<Point>,
+    /// How often they have been moved: as long as this is the same, so are the positions.
+    moves: usize,
 }
 
 impl Nodes {
@@ -49,6 +51,7 @@ impl Nodes {
             bodies: [Vec::new(), Vec::new()],
             positions: coordinates.clone(),
             coordinates,
+            moves: 0,
         })
     }
 
@@ -148,22 +151,30 @@ impl Nodes {
 
     /// Moves the nodes of both bodies to where they are with displacements u; returns the boxes of the bodies.
     pub(crate) fn move_to<T: Real>(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
-        let Self { dimension, coordinates, system_dofs, places, positions, bodies, .. } = self;
-        let mut boxes = [Bounds::EMPTY; 2];
+        let Self { dimension, coordinates, system_dofs, places, positions, bodies, moves, .. } = self;
+        let (mut boxes, mut moved) = ([Bounds::EMPTY; 2], false);
         for (body, bounds) in bodies.iter().zip(&mut boxes) {
             for &node in body {
                 let mut x = coordinates[node];
                 for (axis, (x, &place)) in x.iter_mut().zip(&places[node][..*dimension]).enumerate() {
                     *x += u[place].value();
                     if !x.is_finite() {
+                        *moves += 1;
                         let what = "the displacement of a contact surface (by dof)";
                         return Err(Error::NotFinite { what, index: system_dofs[node][axis], value: u[place].value() });
                     }
                 }
+                moved |= positions[node].map(f64::to_bits) != x.map(f64::to_bits);
                 positions[node] = x;
                 bounds.include(x);
             }
         }
+        *moves += usize::from(moved);
         Ok(boxes)
+    }
+
+    /// How often [`move_to`](Self::move_to) has moved a node.
+    pub(crate) fn moves(&self) -> usize {
+        self.moves
     }
 }

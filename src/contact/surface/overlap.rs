@@ -74,6 +74,7 @@ const NEARER: f64 = 0.25;
 
 impl Base {
     /// None if the facet has no normal.
+    #[inline]
     pub(crate) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
         let (shape, count) = (facet.shape(positions), facet.nodes().len());
         let [first, second] = shape.tangents_at(&middle(count));
@@ -90,14 +91,22 @@ impl Base {
 
     /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over
     /// there, or lies there, is not below this facet.
-    pub(crate) fn see_beside(&mut self, surface: &Surface, index: usize, positions: &[Point]) {
+    ///
+    /// `normals` are those in the middles of all facets.
+    pub(crate) fn see_beside(
+        &mut self,
+        surface: &Surface,
+        index: usize,
+        (positions, normals): (&[Point], &[Option<Point>]),
+    ) {
         for side in 0..self.count {
             let Some((other, _)) = surface.neighbor(index, side) else { continue };
-            let other = surface.facets()[other].shape(positions);
-            let (weights, point) = (middle(other.corners().len()), other.middle());
             let sharp = |normal: &Point| dot(*normal, self.normal) < SHARP;
-            let convex = dot(self.normal, sub(point, self.shape.corner(side))) < 0.0;
-            self.beside[side] = other.normal(&weights).filter(sharp).filter(|_| convex).map(|normal| [point, normal]);
+            self.beside[side] = normals[other].filter(sharp).and_then(|normal| {
+                let point = surface.facets()[other].shape(positions).middle();
+                let convex = dot(self.normal, sub(point, self.shape.corner(side))) < 0.0;
+                convex.then_some([point, normal])
+            });
         }
     }
 
@@ -132,17 +141,20 @@ impl Base {
             .all(|(&node, gap)| self.is_beside(positions[node], gap))
     }
 
+    #[inline]
     fn in_plane(&self, x: Point) -> [f64; 2] {
         let r = sub(x, self.shape.corner(0));
         [dot(r, self.axes[0]), dot(r, self.axes[1])]
     }
 
     /// The heights of a facet's corners above the first corner of this one, along its normal.
+    #[inline]
     fn heights<'a>(&'a self, facet: &'a Facet, positions: &'a [Point]) -> impl Iterator<Item = f64> + 'a {
         facet.nodes().iter().map(|&node| dot(self.normal, sub(positions[node], self.shape.corner(0))))
     }
 
     /// Whether a facet with this normal looks toward this one, and is not behind it by more than `depth`.
+    #[inline]
     pub(crate) fn may_meet(&self, normal: Point, facet: &Facet, positions: &[Point], depth: f64) -> bool {
         dot(normal, self.normal) < -FACING && self.heights(facet, positions).any(|height| height > -depth)
     }
@@ -199,6 +211,7 @@ impl Base {
         }
     }
 
+    #[inline]
     fn sample(&self, area: f64, slave: [f64; 4], shape: &Shape, master: [f64; 4], act: &mut impl FnMut(&Sample)) {
         let Some(normal) = shape.normal(&master) else { return };
         let cosine = dot(normal, self.normal);
@@ -254,6 +267,7 @@ impl Base {
 
     /// The product of the tangents where the shape functions are `weights` (of a segment with the unit vector out of
     /// the plane), and the derivative of its part along n, the facet's area for its coordinates, by the corners.
+    #[inline]
     pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
         let tangents = self.tangents(weights);
         (cross(tangents[0], tangents[1]), self.turned_by(tangents, weights, self.normal))
@@ -261,6 +275,7 @@ impl Base {
 
     /// The tangents where the shape functions are `weights`, the second one of a segment being the unit vector out of
     /// the plane.
+    #[inline]
     fn tangents(&self, weights: &[f64; 4]) -> [Point; 2] {
         let [first, second] = self.shape.tangents_at(weights);
         [first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }]
@@ -320,10 +335,12 @@ impl Base {
 
     /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`:
     /// the vector that each corner's motion is multiplied by.
+    #[inline]
     pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
         self.turned_by(self.tangents(weights), weights, vector)
     }
 
+    #[inline]
     fn turned_by(&self, [first, second]: [Point; 2], weights: &[f64; 4], vector: Point) -> [Point; 4] {
         // (The second tangent of a segment has no derivatives.)
         let [by_first, by_second] = [cross(second, vector), cross(vector, first)];
@@ -333,6 +350,7 @@ impl Base {
 }
 
 /// How the tangents follow from the corners: their coefficients where the shape functions are `weights`.
+#[inline]
 fn derivatives(count: usize, weights: &[f64; 4]) -> [[f64; 4]; 2] {
     match count {
         2 => [[-1.0, 1.0, 0.0, 0.0], [0.0; 4]],
@@ -355,6 +373,7 @@ pub(super) struct Flat {
 
 impl Flat {
     /// The shape functions at a point: of a quadrilateral by Newton's method, which ends at once on parallelograms.
+    #[inline]
     pub(super) fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
         let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
@@ -408,6 +427,7 @@ impl Flat {
 
     /// What another one that goes the other way around has in common with this one, if its area is above `least`
     /// (Sutherland and Hodgman, Commun. ACM 17, 1974).
+    #[inline]
     fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
         let is_apart = |axis: usize| {
             let ends = [self, other].map(|flat| {

@@ -33,6 +33,7 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
+    #[inline]
     pub(super) fn push(&mut self, corner: [f64; 2]) {
         // (A quadrilateral that is not convex may have more corners in common: the last ones are left out.)
         if let Some(place) = self.corners.get_mut(self.count) {
@@ -41,10 +42,12 @@ impl Polygon {
         }
     }
 
+    #[inline]
     pub(super) fn corners(&self) -> &[[f64; 2]] {
         &self.corners[..self.count]
     }
 
+    #[inline]
     pub(super) fn area(&self) -> f64 {
         let corners = self.corners();
         let Some(&first) = corners.first() else { return 0.0 };
@@ -60,6 +63,7 @@ impl Polygon {
     /// (A rule on the triangles from there changes with the polygon as smoothly as this does: where two corners come
     /// out of one, a triangle without area is added. Listed as they are found, another corner would be the first, and
     /// what the rule lacks another: rows would not find rest.)
+    #[inline]
     fn turned_to_apex(&self) -> Self {
         let height = |corner: &[f64; 2]| APEX[0] * corner[0] + APEX[1] * corner[1];
         let corners = self.corners();
@@ -83,6 +87,7 @@ impl Polygon {
     }
 
     /// What is to the left of a line.
+    #[inline]
     pub(super) fn cut(&self, from: [f64; 2], to: [f64; 2]) -> Self {
         let along = [to[0] - from[0], to[1] - from[1]];
         let left = |x: [f64; 2]| along[0] * (x[1] - from[1]) - along[1] * (x[0] - from[0]);

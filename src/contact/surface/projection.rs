@@ -1,9 +1,11 @@
 //! Where a node stands on a surface: what searching and following share, and how the gap accelerates along a motion.
 
 use super::Surface;
+use super::cones::Cones;
 use super::kin::{FACING, Kin};
+use super::nearest_first::{Kept, NearestFirst};
 use super::offsets::Offsets;
-use super::search::{Bounds, Neighborhood, overhang};
+use super::search::{Bounds, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
 use std::cell::OnceCell;
 
@@ -57,10 +59,14 @@ pub(crate) struct Stand {
 pub(crate) struct Ground<'a> {
     pub(crate) nodes: &'a [usize],
     /// The facets near each node, if known; otherwise all are looked at.
-    pub(crate) neighborhood: Option<&'a Neighborhood>,
+    pub(crate) lists: Option<&'a NearestFirst>,
+    /// What has moved since they were built, if it is known: then a node looks no farther than it must.
+    pub(crate) kept: Option<Kept<'a>>,
     pub(crate) surface: &'a Surface,
     /// The boxes of its facets, if they are known.
     pub(crate) boxes: Option<&'a [Bounds]>,
+    /// The cones of its normals, and those of the nodes' own surface, if they are known.
+    pub(crate) cones: [Option<&'a Cones>; 2],
     /// The surface of the nodes, if known.
     pub(crate) own: Option<&'a Surface>,
     /// What nodes do not meet of it, if it is the same surface.
@@ -74,11 +80,18 @@ pub(crate) struct Ground<'a> {
 impl Ground<'_> {
     /// Facets to look at for the node at a place of the list.
     pub(crate) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
-        let kin = self.kin;
-        let list = self.neighborhood.map(|lists| lists.of(place));
-        let count = list.map_or(self.surface.facets().len(), <[usize]>::len);
-        let apart = move |&facet: &usize| kin.is_none_or(|kin| !kin.keeps_apart(place, facet));
-        (0..count).map(move |k| list.map_or(k, |list| list[k])).filter(apart)
+        self.by_distance(place).map(|(_, facet)| facet).filter(move |&facet| self.may_meet(place, facet))
+    }
+
+    /// Facets in the order of the list, with the distances there.
+    fn by_distance(&self, place: usize) -> impl Iterator<Item = (f64, usize)> + use<'_> {
+        let list = self.lists.map(|lists| lists.of(place));
+        let count = list.map_or(self.surface.facets().len(), <[_]>::len);
+        (0..count).map(move |k| list.map_or((0.0, k), |list| list[k]))
+    }
+
+    fn may_meet(&self, place: usize, facet: usize) -> bool {
+        self.kin.is_none_or(|kin| !kin.keeps_apart(place, facet))
     }
 
     /// The corners of a facet, as far out along its normal as a node that touches its surface is, and the facet itself
@@ -112,11 +125,18 @@ impl Ground<'_> {
     /// Whether a facet is behind a node of its own body by more than there can be of it inside. (By the normal that the
     /// gap would have: on a side or a vertex a node may be in front of the one facet and behind the other. Where it
     /// looks along that normal itself there is its own body on the way, whose flanks bulge.)
-    fn is_beyond(&self, place: usize, facet: usize, projected: &(Shape, Foot), own_normal: Option<Point>) -> bool {
+    fn is_beyond(
+        &self,
+        place: usize,
+        facet: usize,
+        projected: &(Shape, Foot),
+        own_normal: &impl Fn() -> Option<Point>,
+    ) -> bool {
         self.kin.is_some_and(|kin| {
             let p = self.positions[self.nodes[place]];
             let direction = || self.direction(place, facet, p, projected);
-            let is_behind = |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal);
+            let is_behind =
+                |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal());
             projected.1.distance > kin.depth(place, facet) && direction().is_some_and(is_behind)
         })
     }
@@ -145,51 +165,71 @@ impl Ground<'_> {
 
     fn nearest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<(usize, (Shape, Foot))> {
         let Self { surface, positions, .. } = *self;
-        let p = positions[self.nodes[place]];
-        let own_normal = self.own_normal(place);
-        let bounds = |facet: usize| match self.boxes {
-            Some(boxes) => boxes[facet],
-            None => Bounds::of_corners(&surface.facets()[facet].shape(positions)),
-        };
-        // The first one decides which of the others are too far by their boxes.
-        let first = match likely.filter(|&likely| self.near(place).any(|facet| facet == likely)) {
-            None => {
-                let boxes = self.near(place).map(|facet| (facet, bounds(facet).distance(p)));
-                boxes.min_by(|x, y| x.1.total_cmp(&y.1)).map(|(facet, _)| facet)
-            }
-            likely => likely,
-        };
-        // (Distances of surfaces, and what offsets may take from those of the facets at most.)
+        let node = self.nodes[place];
+        let p = positions[node];
+        let own_normal = OnceCell::new();
+        let own_normal = || *own_normal.get_or_init(|| self.own_normal(place));
+        let own_place = self.own_place(place);
+        let slack = self.kept.zip(self.lists).map_or(f64::INFINITY, |(kept, lists)| kept.slack(lists, node, p));
         let is_even = self.offsets.is_none();
-        let most =
-            |facet: usize| if is_even { 0.0 } else { self.offsets.most(self.nodes[place], &surface.facets()[facet]) };
+        // (Distances of surfaces, and what offsets may take from those of the facets at most.)
+        let most = |facet: usize| if is_even { 0.0 } else { self.offsets.most(node, &surface.facets()[facet]) };
         let mut best: Option<(usize, (Shape, Foot), f64)> = None;
-        for facet in first.into_iter().chain(self.near(place).filter(|&facet| Some(facet) != first)) {
-            let limit = best.map_or(reach, |(.., depth)| depth) + most(facet);
-            let bounds = bounds(facet);
-            if bounds.distance(p) > limit + overhang(&bounds) {
-                continue;
+        let look_at = |facet: usize, best: &mut Option<(usize, (Shape, Foot), f64)>| {
+            let limit = best.as_ref().map_or(reach, |(.., depth)| *depth) + most(facet);
+            let bounds = match self.boxes {
+                Some(boxes) => boxes[facet],
+                None => Bounds::of_corners(&surface.facets()[facet].shape(positions)),
+            };
+            if bounds.distance(p) > limit + overhang(&bounds) || !self.may_meet(place, facet) {
+                return;
             }
-            let Some(projected) = surface.project(facet, p, positions) else { continue };
+            let Some(projected) = surface.project(facet, p, positions) else { return };
             let depth = self.height(place, facet, &projected.1);
             // (Of two that share the point the one that comes first.)
             let foot = Foot { distance: depth, ..projected.1 };
-            let is_better = |&(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
-                let best = Foot { distance: depth, ..best };
-                foot.is_better_than(&best) || (facet < other && !best.is_better_than(&foot))
+            let is_better = |(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
+                let best = Foot { distance: *depth, ..*best };
+                foot.is_better_than(&best) || (facet < *other && !best.is_better_than(&foot))
             };
-            if depth > reach || best.is_some_and(|best| !is_better(&best)) {
-                continue;
+            if depth > reach || best.as_ref().is_some_and(|best| !is_better(best)) {
+                return;
             }
             let is_met = || {
-                faces(&projected, own_normal, self.limit(place, facet))
-                    || faces(&projected, own_normal, SAME_SIDE) && is_over(&projected, p)
+                let limit = self.limit(place, facet);
+                self.surely_faces(own_place, facet, limit)
+                    || faces(&projected, own_normal(), limit)
+                    || faces(&projected, own_normal(), SAME_SIDE) && is_over(&projected, p)
             };
-            if is_met() && !self.is_beyond(place, facet, &projected, own_normal) {
-                best = Some((facet, projected, depth));
+            if is_met() && !self.is_beyond(place, facet, &projected, &own_normal) {
+                *best = Some((facet, projected, depth));
             }
+        };
+        // The first one decides which of the others are too far by their boxes.
+        let is_listed = |likely: &usize| self.by_distance(place).any(|(_, facet)| facet == *likely);
+        let first = likely.filter(is_listed);
+        if let Some(facet) = first {
+            look_at(facet, &mut best);
+        }
+        for (distance, facet) in self.by_distance(place).filter(|&(_, facet)| Some(facet) != first) {
+            if distance - slack > best.as_ref().map_or(reach, |(.., depth)| *depth) {
+                break;
+            }
+            look_at(facet, &mut best);
         }
         best.map(|(facet, projected, _)| (facet, projected))
+    }
+
+    /// Where a node is in its own surface, if it is there at the place that it has in the list.
+    fn own_place(&self, place: usize) -> Option<usize> {
+        self.own.filter(|own| own.nodes().get(place) == Some(&self.nodes[place])).map(|_| place)
+    }
+
+    /// Whether a facet is turned against the normal of a node by all that is known of the normals around both.
+    fn surely_faces(&self, own_place: Option<usize>, facet: usize, limit: f64) -> bool {
+        let [Some(cones), Some(own_cones)] = self.cones else { return false };
+        let surely = |(own, place): (&Surface, usize)| own_cones.surely_face(own, place, (cones, facet), limit);
+        self.own.zip(own_place).is_some_and(surely)
     }
 
     /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node

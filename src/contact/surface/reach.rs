@@ -73,10 +73,13 @@ impl Reach {
     /// Up to which distance from a node lists hold all now, with the motion of the other body; below zero without
     /// lists.
     pub(crate) fn known_around(&self, node: usize, position: Point, other: &Bounds) -> f64 {
-        let moved = self
-            .built_at
-            .get(node)
-            .map_or(f64::INFINITY, |&before| Bounds::of_points([sub(position, before)]).spread(other));
-        self.listed - moved
+        self.listed - self.moved(node, position, other)
+    }
+
+    /// How far a node has moved since lists were built against the other body, of which this is the box of motions, in
+    /// any coordinate; infinite without lists.
+    pub(crate) fn moved(&self, node: usize, position: Point, other: &Bounds) -> f64 {
+        let before = self.built_at.get(node);
+        before.map_or(f64::INFINITY, |&before| Bounds::of_points([sub(position, before)]).spread(other))
     }
 }

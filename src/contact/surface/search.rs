@@ -16,6 +16,7 @@ impl Bounds {
     /// Holds nothing.
     pub(crate) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
 
+    #[inline]
     pub(crate) fn include(&mut self, x: Point) {
         self.lower = std::array::from_fn(|i| self.lower[i].min(x[i]));
         self.upper = std::array::from_fn(|i| self.upper[i].max(x[i]));
@@ -28,6 +29,7 @@ impl Bounds {
         })
     }
 
+    #[inline]
     pub(crate) fn of_corners(shape: &Shape) -> Self {
         let [lower, upper] = shape.bounds();
         Self { lower, upper }
@@ -38,27 +40,38 @@ impl Bounds {
         Self::of_points([self.lower, self.upper, other.lower, other.upper])
     }
 
+    #[inline]
     pub(crate) fn inflated(&self, by: f64) -> Self {
         Self { lower: self.lower.map(|x| x - by), upper: self.upper.map(|x| x + by) }
     }
 
+    #[inline]
     pub(crate) fn intersects(&self, other: &Self) -> bool {
         (0..3).all(|i| self.lower[i] <= other.upper[i] && other.lower[i] <= self.upper[i])
     }
 
     /// The largest component of the way from a point to the box; zero inside.
+    #[inline]
     pub(crate) fn distance(&self, x: Point) -> f64 {
         (0..3).fold(0.0, |most, i| most.max(self.lower[i] - x[i]).max(x[i] - self.upper[i]))
     }
 
+    #[inline]
     pub(crate) fn contains(&self, x: Point) -> bool {
         (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
     }
 
     /// A bound of |x − y| over x in one box and y in the other.
+    #[inline]
     pub(crate) fn farthest(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
         norm([one(0), one(1), one(2)])
+    }
+
+    /// The longest side of the box.
+    #[inline]
+    pub(super) fn extent(&self) -> f64 {
+        (0..3).map(|i| self.upper[i] - self.lower[i]).fold(0.0, f64::max)
     }
 
     /// Largest absolute coordinate: the scale of rounding.
@@ -67,6 +80,7 @@ impl Bounds {
     }
 
     /// Largest component of x − y over x in one box and y in the other, in either direction.
+    #[inline]
     pub(crate) fn spread(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
         one(0).max(one(1)).max(one(2))
@@ -75,7 +89,11 @@ impl Bounds {
 
 /// How far around a facet a foot can lie beyond its box: the facet goes on a little beyond the rim.
 pub(crate) fn overhang(bounds: &Bounds) -> f64 {
-    let extent = (0..3).map(|i| bounds.upper[i] - bounds.lower[i]).fold(0.0, f64::max);
+    overhang_of(bounds.extent())
+}
+
+/// The same of a facet by the largest extent of its box.
+pub(super) fn overhang_of(extent: f64) -> f64 {
     8.0 * RIM * extent
 }
 
@@ -135,26 +153,41 @@ impl Neighborhood {
         others: impl Iterator<Item = Bounds>,
         range: f64,
     ) {
-        let all = boxes.clone().reduce(|all, bounds| all.with(&bounds)).unwrap_or(Bounds::EMPTY);
-        let leaves = others.enumerate().filter_map(|(index, bounds)| {
-            let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
-            let near = bounds.inflated(range + overhang(&bounds) + rounding);
-            let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);
-            near.intersects(&all).then(leaf)
-        });
-        let tree = RTree::bulk_load(leaves.collect());
         self.starts.clear();
         self.facets.clear();
         self.starts.push(0);
-        for bounds in boxes {
+        each_near(boxes, others, range, |found| {
             let start = self.facets.len();
-            let found = AABB::from_corners(bounds.lower, bounds.upper);
-            let _: ControlFlow<()> = tree.locate_in_envelope_intersecting_int(&found, |leaf| {
-                self.facets.push(leaf.data);
-                ControlFlow::Continue(())
-            });
+            self.facets.extend_from_slice(found);
             self.facets[start..].sort_unstable();
             self.starts.push(self.facets.len());
-        }
+        });
+    }
+}
+
+/// Calls `act` for each box with those of the others, in any order, that are within `range` of it.
+pub(super) fn each_near(
+    boxes: impl Iterator<Item = Bounds> + Clone,
+    others: impl Iterator<Item = Bounds>,
+    range: f64,
+    mut act: impl FnMut(&[usize]),
+) {
+    let all = boxes.clone().reduce(|all, bounds| all.with(&bounds)).unwrap_or(Bounds::EMPTY);
+    let leaves = others.enumerate().filter_map(|(index, bounds)| {
+        let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
+        let near = bounds.inflated(range + overhang(&bounds) + rounding);
+        let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);
+        near.intersects(&all).then(leaf)
+    });
+    let tree = RTree::bulk_load(leaves.collect());
+    let mut near = Vec::new();
+    for bounds in boxes {
+        near.clear();
+        let found = AABB::from_corners(bounds.lower, bounds.upper);
+        let _: ControlFlow<()> = tree.locate_in_envelope_intersecting_int(&found, |leaf| {
+            near.push(leaf.data);
+            ControlFlow::Continue(())
+        });
+        act(&near);
     }
 }

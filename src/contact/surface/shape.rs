@@ -7,28 +7,34 @@ pub(crate) type Point = [f64; 3];
 /// rim of matching meshes must not lose their row to rounding or to a little stretch.
 pub(crate) const RIM: f64 = 1e-3;
 
+#[inline]
 pub(crate) fn sub(x: Point, y: Point) -> Point {
     [x[0] - y[0], x[1] - y[1], x[2] - y[2]]
 }
 
 /// `x + c y`.
+#[inline]
 pub(crate) fn add_scaled(x: Point, c: f64, y: Point) -> Point {
     [x[0] + c * y[0], x[1] + c * y[1], x[2] + c * y[2]]
 }
 
+#[inline]
 pub(crate) fn dot(x: Point, y: Point) -> f64 {
     x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 }
 
+#[inline]
 pub(crate) fn cross(x: Point, y: Point) -> Point {
     [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
 }
 
+#[inline]
 pub(crate) fn norm(x: Point) -> f64 {
     dot(x, x).sqrt()
 }
 
 /// `x / |x|`; none for the zero vector.
+#[inline]
 pub(crate) fn unit(x: Point) -> Option<Point> {
     let length = norm(x);
     (length > 0.0 && length.is_finite()).then(|| [x[0] / length, x[1] / length, x[2] / length])
@@ -77,6 +83,7 @@ pub(crate) struct Shape {
 
 impl Shape {
     /// The facet with 2, 3 or 4 corners.
+    #[inline]
     pub(crate) fn new(corners: [Point; 4], count: usize) -> Self {
         Self { corners, count }
     }
@@ -86,25 +93,30 @@ impl Shape {
         self.count == 2
     }
 
+    #[inline]
     fn after(&self, k: usize) -> usize {
         if k + 1 == self.count { 0 } else { k + 1 }
     }
 
+    #[inline]
     fn before(&self, k: usize) -> usize {
         if k == 0 { self.count - 1 } else { k - 1 }
     }
 
     /// The side that begins at vertex k, as a vector.
+    #[inline]
     pub(crate) fn side(&self, k: usize) -> Point {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
     /// Its corners.
+    #[inline]
     pub(crate) fn corners(&self) -> &[Point] {
         &self.corners[..self.count]
     }
 
     /// A corner.
+    #[inline]
     pub(crate) fn corner(&self, k: usize) -> Point {
         self.corners[k]
     }
@@ -133,11 +145,19 @@ impl Shape {
     }
 
     /// Length of the longest side.
+    #[inline]
     pub(crate) fn size(&self) -> f64 {
-        (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max).sqrt()
+        self.square_of_size().sqrt()
+    }
+
+    /// Its square.
+    #[inline]
+    pub(super) fn square_of_size(&self) -> f64 {
+        (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max)
     }
 
     /// Lower and upper corner of the bounding box.
+    #[inline]
     pub(crate) fn bounds(&self) -> [Point; 2] {
         let [mut lower, mut upper] = [self.corners[0]; 2];
         for corner in &self.corners[1..self.count] {
@@ -148,12 +168,14 @@ impl Shape {
     }
 
     /// The mean of the corners.
+    #[inline]
     pub(crate) fn middle(&self) -> Point {
         let (first, share) = (self.corners[0], 1.0 / self.count as f64);
         self.corners().iter().fold(first, |sum, &corner| add_scaled(sum, share, sub(corner, first)))
     }
 
     /// The point with the given shape functions.
+    #[inline]
     pub(crate) fn point(&self, weights: &[f64; 4]) -> Point {
         // Differences from the first corner: far from the origin the sum of weighted corners would lose digits.
         let first = self.corners[0];
@@ -164,6 +186,7 @@ impl Shape {
     }
 
     /// The shape functions at share `s` of side k.
+    #[inline]
     pub(crate) fn on_side(&self, k: usize, s: f64) -> [f64; 4] {
         let mut weights = [0.0; 4];
         weights[k] = 1.0 - s;
@@ -172,6 +195,7 @@ impl Shape {
     }
 
     /// How far inside of side k a point is, in shares of the facet: 0 on the side, 1 opposite of it.
+    #[inline]
     pub(crate) fn inset(&self, weights: &[f64; 4], k: usize) -> f64 {
         match self.count {
             2 => weights[1 - k],
@@ -181,6 +205,8 @@ impl Shape {
     }
 
     /// The outward unit normal where the shape functions are `weights`; none if the facet is degenerate there.
+    #[inline(always)]
+    #[allow(clippy::inline_always)] // at each point of quadrature
     pub(crate) fn normal(&self, weights: &[f64; 4]) -> Option<Point> {
         let [first, second] = self.tangents_at(weights);
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
@@ -193,19 +219,25 @@ impl Shape {
             let turned = cross(vector, product);
             dot(vector, product) > 0.0 && dot(turned, turned) < sine * sine * dot(product, product)
         };
+        self.extreme_products(beyond).into_iter().all(is_within)
+    }
+
+    /// Products of the tangents between which, as vectors with positive weights, those of the facet are, which goes on
+    /// beyond its sides for a share of itself: of a quadrilateral the product is bilinear.
+    #[inline]
+    pub(super) fn extreme_products(&self, beyond: f64) -> [Point; 4] {
         if self.count < 4 {
             let [first, second] = self.tangents_at(&[0.0; 4]);
-            return is_within(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }));
+            return [cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }); 4];
         }
-        // The product of the tangents is bilinear, and those within an angle make a convex cone.
         let end = 1.0 + 2.0 * beyond;
         let [lower, upper] = [-end, end].map(|end| self.tangents([end; 2]));
-        [lower[0], upper[0]]
-            .into_iter()
-            .all(|first| [lower[1], upper[1]].into_iter().all(|b| is_within(cross(first, b))))
+        std::array::from_fn(|k| cross([lower[0], upper[0]][k / 2], [lower[1], upper[1]][k % 2]))
     }
 
     /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
+    #[inline(always)]
+    #[allow(clippy::inline_always)] // at each point of quadrature
     pub(crate) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
         match self.count {
             2 => [self.side(0), [0.0; 3]],
@@ -233,6 +265,7 @@ impl Shape {
     }
 
     /// ∂²x/∂ξ∂η of a quadrilateral; the other shapes are flat.
+    #[inline]
     pub(crate) fn twist(&self) -> Point {
         if self.count < 4 {
             return [0.0; 3];
@@ -271,6 +304,7 @@ impl Shape {
         size <= 0.0 || self.count > 2 && (0..self.count).any(flat)
     }
 
+    #[inline]
     fn foot(&self, p: Point, weights: [f64; 4], location: Location) -> Foot {
         let point = self.point(&weights);
         Foot { weights, point, distance: norm(sub(p, point)), location }
@@ -349,17 +383,20 @@ impl Shape {
     }
 
     /// Natural coordinates (ξ, η) ∈ [−1, 1]² of a quadrilateral from its shape functions.
+    #[inline]
     fn coordinates(weights: &[f64; 4]) -> [f64; 2] {
         let [w0, w1, w2, w3] = *weights;
         [w1 + w2 - w0 - w3, w2 + w3 - w0 - w1]
     }
 
+    #[inline]
     fn bilinear([xi, eta]: [f64; 2]) -> [f64; 4] {
         let (left, right, bottom, top) = (0.5 * (1.0 - xi), 0.5 * (1.0 + xi), 0.5 * (1.0 - eta), 0.5 * (1.0 + eta));
         [left * bottom, right * bottom, right * top, left * top]
     }
 
     /// ∂x/∂ξ and ∂x/∂η of a quadrilateral.
+    #[inline]
     fn tangents(&self, [xi, eta]: [f64; 2]) -> [Point; 2] {
         let [x0, x1, x2, x3] = self.corners;
         let blend = |c: f64, lower: Point, upper: Point| {

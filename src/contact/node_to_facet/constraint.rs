@@ -1,0 +1,113 @@
+//! Nodes on facets as a constraint: what it says of its rows, its search, gaps and rates.
+
+use super::NodeToFacet;
+use super::candidates::{gap_of, pass_of};
+use super::rows::Rows;
+use crate::contact::surface::{Shape, overhang};
+use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates, Stride, check_local};
+use crate::error::Result;
+use crate::real::Real;
+
+impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
+    fn dofs(&self) -> &[usize] {
+        self.nodes.dofs()
+    }
+
+    fn contacts(&self, contacts: &mut Contacts<T>) {
+        let Rows { identities, stands, affine, .. } = &self.rows;
+        for (row, (&(node, candidate), stand)) in identities.iter().zip(stands).enumerate() {
+            let pass = pass_of(candidate);
+            let position = self.nodes.positions[node];
+            let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
+            let mut contact = contacts.push_row((node, candidate), self.law, (&affine.jacobian, row));
+            contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
+            if self.friction == 0.0 {
+                continue;
+            }
+            contact.friction(self.friction);
+            let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
+            let vertices = surface.facets()[stand.facet].nodes();
+            for tangent in self.nodes.tangents(stand.normal) {
+                let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
+                let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
+                    let dofs = self.nodes.places(node);
+                    dofs.iter().zip(tangent).map(move |(&dof, along)| (dof, T::of(share * along)))
+                });
+                contact.tangent_entries(entries);
+            }
+        }
+    }
+
+    fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
+        check_local(u.len(), self.nodes.dofs().len())?;
+        let boxes = self.nodes.move_to(u)?;
+        let motions = self.vicinity.reach.motions(&self.nodes);
+        let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
+        self.found.clear();
+        let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
+        let near = self.vicinity.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
+        let range = near + thick;
+        // Facets go on a little beyond the rim.
+        let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
+        for pass in &mut self.passes {
+            pass.clearance.fill(near);
+        }
+        if boxes[0].inflated(wide).intersects(&boxes[1]) {
+            self.update_lists(&motions, range);
+            for pass in 0..self.passes.len() {
+                self.find_rows(pass, &boxes[1 - pass].inflated(wide), (t, u, v), (&speeds, ahead));
+            }
+        }
+        let (rows, found) = (&self.rows, &self.found);
+        let same = rows.identities == found.identities && rows.affine.jacobian == found.affine.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+    }
+
+    fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
+        check_local(u.len(), self.nodes.dofs().len())?;
+        // A trial state that is not finite: the gaps say so.
+        if self.nodes.move_to(u).is_err() {
+            return Ok(Candidates::Unchanged);
+        }
+        self.found.clear();
+        self.move_rows(t, u)?;
+        let same = self.rows.affine.jacobian == self.found.affine.jacobian;
+        std::mem::swap(&mut self.rows, &mut self.found);
+        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+    }
+
+    fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
+        self.look_at(step)
+    }
+
+    fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
+        let factor = self.vicinity.thickness.ramp.at(t);
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
+            *gap = gap_of(&self.rows, row, factor, u);
+        }
+        Ok(())
+    }
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
+        let Rows { identities, stands, .. } = &self.rows;
+        for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(stands) {
+            let surface = self.own_surface.as_ref().filter(|_| pass_of(candidate) > 0).unwrap_or(&self.surface);
+            let facet = &surface.facets()[stand.facet];
+            let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));
+            let [x, speed] = self.moving(node, u, v);
+            let [shape, velocity] = [0, 1].map(|k| Shape::new(corners.map(|corner| corner[k]), facet.count));
+            let mut acceleration = stand.acceleration(x, speed, &shape, &velocity);
+            let (offsets, ramp) = (self.vicinity.thickness.at(t), &self.vicinity.thickness.ramp);
+            let mut rate = 0.0;
+            if !offsets.is_none() {
+                let [slides, bends] = stand.sliding(speed, (&shape, &velocity), offsets.at_corners(facet));
+                rate = -ramp.rate(t) * stand.offset;
+                acceleration -=
+                    offsets.factor * bends + 2.0 * ramp.rate(t) * slides + ramp.acceleration(t) * stand.offset;
+            }
+            *out = GapRates { rate: T::of(rate), acceleration: T::of(acceleration) };
+        }
+        Ok(Rates::Given)
+    }
+}

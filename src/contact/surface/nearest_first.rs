@@ -1,0 +1,62 @@
+//! Lists of the facets near each node, the nearest first, so that a node looks at few of them.
+
+use super::reach::Reach;
+use super::search::{Bounds, each_near, overhang_of};
+use super::shape::Point;
+
+/// For each node of a list the facets near it, and how far their boxes were from it, ascending, when the lists were
+/// built.
+#[derive(Debug, Default)]
+pub(crate) struct NearestFirst {
+    starts: Vec<usize>,
+    entries: Vec<(f64, usize)>,
+    /// The longest side of the boxes then.
+    extent: f64,
+}
+
+impl NearestFirst {
+    /// Lists anew the facets within `range` of each node, by their boxes.
+    pub(crate) fn build(&mut self, nodes: &[usize], positions: &[Point], boxes: &[Bounds], range: f64) {
+        let Self { starts, entries, extent } = self;
+        starts.clear();
+        entries.clear();
+        starts.push(0);
+        *extent = boxes.iter().map(Bounds::extent).fold(0.0, f64::max);
+        let mut places = nodes.iter().map(|&node| positions[node]);
+        let points = nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
+        each_near(points, boxes.iter().copied(), range, |near| {
+            let start = entries.len();
+            let x = places.next().unwrap_or_default();
+            entries.extend(near.iter().map(|&facet| (boxes[facet].distance(x), facet)));
+            entries[start..].sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+            starts.push(entries.len());
+        });
+    }
+
+    /// What is near the k-th node: distances that boxes had then, and facets.
+    pub(crate) fn of(&self, k: usize) -> &[(f64, usize)] {
+        match self.starts.get(k..k + 2) {
+            Some(range) => &self.entries[range[0]..range[1]],
+            None => &[],
+        }
+    }
+}
+
+/// What tells how near facets may have come since lists were built.
+#[derive(Clone, Copy)]
+pub(crate) struct Kept<'a> {
+    pub(crate) reach: &'a Reach,
+    /// The box of the motions of the facets' nodes since.
+    pub(crate) motion: Bounds,
+    /// A bound of the sum of offsets of a node and a facet.
+    pub(crate) thick: f64,
+}
+
+impl Kept<'_> {
+    /// A bound of how much nearer to a node the surface on a facet may be than the box of the facet was: by motions, by
+    /// offsets, and because facets go on a little beyond the rim.
+    pub(super) fn slack(&self, lists: &NearestFirst, node: usize, position: Point) -> f64 {
+        let stretched = lists.extent + self.motion.extent();
+        self.reach.moved(node, position, &self.motion) + self.thick + overhang_of(stretched)
+    }
+}
