@@ -1,6 +1,6 @@
 //! The copy of the package that has all drawn mutants, and what compiles of it.
 
-use crate::draw::Draw;
+use crate::draw::{self, Draw};
 use crate::schema::{self, Place};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -61,6 +61,13 @@ impl Package {
             }
         }
         Ok(Self { copy: copy.to_owned(), target: target.to_owned(), texts })
+    }
+
+    /// A number that changes with the sources and the mutants in them.
+    pub fn stamp(&self, draw: &Draw) -> String {
+        let keys = draw.drawn().into_iter().map(|mutant| mutant.key.as_str());
+        let texts = self.texts.iter().flat_map(|(path, text)| [path.as_str(), text.as_str()]);
+        format!("{:016x}", texts.chain(keys).fold(0, draw::chance))
     }
 
     /// Writes the sources with the mutants that are drawn, numbered from one in their order.

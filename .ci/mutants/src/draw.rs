@@ -22,7 +22,7 @@ pub struct Pool {
 
 /// A number that depends on all bits of seed and name. The order of these numbers is by chance, and is the same for
 /// mutants that stay when others come and go (Fowler, Noll and Vo; then mixed).
-fn chance(seed: u64, name: &str) -> u64 {
+pub fn chance(seed: u64, name: &str) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64 ^ seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     for byte in name.bytes() {
         hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);

@@ -1,7 +1,7 @@
 //! What the tests see: mutants drawn from the sources, and which of them tests kill.
 //!
 //! ```text
-//! mutants [--seed N] [--count N] [--seconds N] [--jobs N] [--again] [--mutants WORD] [--tests WORD] [--quick]
+//! mutants [--seed N] [--count N] [--seconds N] [--jobs N] [--again] [--mutants WORD] [--tests WORD] [--list | --quick]
 //! ```
 //!
 //! Run in the root of the repository. So many mutants of every room (`rooms.rs`) are drawn from all that there are
@@ -12,11 +12,13 @@
 //! seconds. `--seconds` is how long the tests of one mutant may take (without it) in all. Tests are those of
 //! `cargo test --lib --tests`; programs in documents are none of them.
 //!
-//! All that was found is kept in `target/mutants`, and a run goes on where the last one ended. `--again` runs those
+//! All that was found is kept in `target/mutants`, and a run goes on where the last one ended. What a test reaches is
+//! asked again where the sources or the sample change, and of new tests; of one that was changed when its line in
+//! `reach` is deleted. `--again` runs those
 //! anew that were alive, `--mutants` those with a word in their names, `--tests` only tests with a word in theirs.
 //! `equivalent.txt` has those in which nothing can be seen, each with the reason; they count apart.
 //!
-//! `--quick` runs all of this on a package of a few lines, `sample`, whose mutants have known ends.
+//! `--list` shows the mutants that are drawn, and compiles nothing. `--quick` runs all of this on a package of a few lines, `sample`, whose mutants have known ends.
 
 mod compile;
 mod draw;
@@ -44,6 +46,7 @@ struct Options {
     seconds: f64,
     jobs: usize,
     again: bool,
+    list: bool,
     quick: bool,
     mutants: String,
     tests: String,
@@ -52,12 +55,22 @@ struct Options {
 impl Options {
     fn read() -> Result<Self, String> {
         let (mutants, tests) = (String::new(), String::new());
-        let mut options =
-            Self { seed: 1, count: 16, seconds: f64::INFINITY, jobs: 2, again: false, quick: false, mutants, tests };
+        let mut options = Self {
+            seed: 1,
+            count: 16,
+            seconds: f64::INFINITY,
+            jobs: 2,
+            again: false,
+            list: false,
+            quick: false,
+            mutants,
+            tests,
+        };
         let mut arguments = std::env::args().skip(1);
         while let Some(option) = arguments.next() {
             match option.as_str() {
                 "--again" => options.again = true,
+                "--list" => options.list = true,
                 "--quick" => options.quick = true,
                 _ => {
                     let value = arguments.next().ok_or_else(|| format!("{option} is unknown, or needs a value"))?;
@@ -126,6 +139,25 @@ impl Ends {
     }
 }
 
+/// The mutants that are drawn from a package.
+struct Drawn {
+    package: Package,
+    draw: Draw,
+    /// The folder in which all is kept.
+    state: PathBuf,
+}
+
+impl Drawn {
+    fn new(options: &Options, rooms: &'static [Room], source: &Path, folder: &str) -> Result<Self, String> {
+        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+        let target = std::path::absolute(target).map_err(|error| error.to_string())?;
+        let state = target.join("mutants").join(folder);
+        let package = Package::copy(source, &state.join("package"), &target)?;
+        let draw = Draw::new(rooms, &package.texts, options.seed, options.count, &state)?;
+        Ok(Self { package, draw, state })
+    }
+}
+
 /// The mutants of a package and what became of them.
 struct Run {
     options: Options,
@@ -138,15 +170,11 @@ struct Run {
 }
 
 impl Run {
-    fn new(options: Options, rooms: &'static [Room], source: &Path, folder: &Path) -> Result<Self, String> {
-        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-        let target = std::path::absolute(target).map_err(|error| error.to_string())?;
-        let state = target.join("mutants").join(folder);
-        let package = Package::copy(source, &state.join("package"), &target)?;
-        let mut draw = Draw::new(rooms, &package.texts, options.seed, options.count, &state)?;
+    fn new(options: Options, rooms: &'static [Room], drawn: Drawn) -> Result<Self, String> {
+        let Drawn { package, mut draw, state } = drawn;
         let binaries = package.compile(&mut draw)?;
         eprintln!("{} mutants drawn; tests without them", draw.drawn().len());
-        let suite = Suite::reach(&binaries, &package.copy, &state, options.jobs)?;
+        let suite = Suite::reach(&binaries, &package.stamp(&draw), &package.copy, &state, options.jobs)?;
         let seconds: f64 = suite.tests.iter().map(|test| test.seconds).sum();
         eprintln!("{} tests, {seconds:.0} s one after the other", suite.tests.len());
         for test in suite.tests.iter().filter(|test| !test.passes) {
@@ -180,7 +208,11 @@ impl Run {
             }
             let outcome = self.suite.judge(number, room, options.seconds, &options.tests)?;
             eprintln!("{}/{} {}: {outcome:?}", at + 1, open.len(), mutant.key);
-            self.ends.add(&mutant.key, outcome)
+            // (That some of the tests see nothing is no end.)
+            match outcome {
+                Outcome::Alive { .. } if !options.tests.is_empty() => Ok(()),
+                end => self.ends.add(&mutant.key, end),
+            }
         })
     }
 
@@ -232,8 +264,9 @@ impl Run {
 
 /// The sample package, all of whose mutants end as `expected.txt` has it.
 fn quick(options: Options) -> Result<(), String> {
-    let source = Path::new(".ci/mutants/sample");
-    let mut run = Run::new(Options { count: usize::MAX, ..options }, &SAMPLE, source, Path::new("sample"))?;
+    let (source, options) = (Path::new(".ci/mutants/sample"), Options { count: usize::MAX, ..options });
+    let drawn = Drawn::new(&options, &SAMPLE, source, "sample")?;
+    let mut run = Run::new(options, &SAMPLE, drawn)?;
     // (Nothing of earlier runs.)
     run.ends.known = Mutex::default();
     run.judge()?;
@@ -261,8 +294,14 @@ fn run() -> Result<(), String> {
     if options.quick {
         return quick(options);
     }
-    let folder = PathBuf::from(format!("seed-{}", options.seed));
-    let run = Run::new(options, &ROOMS, Path::new("."), &folder)?;
+    let drawn = Drawn::new(&options, &ROOMS, Path::new("."), &format!("seed-{}", options.seed))?;
+    if options.list {
+        for (at, mutant) in drawn.draw.drawn().into_iter().enumerate() {
+            println!("{} {}:{} {}", at + 1, mutant.path, mutant.line, mutant.key);
+        }
+        return Ok(());
+    }
+    let run = Run::new(options, &ROOMS, drawn)?;
     run.judge()?;
     println!("{}\n{}", run.living(), table::print(&run.count()));
     Ok(())

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::{Duration, Instant, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Memory of a test, in KiB: a mutant may ask for all of it.
 const MEMORY: &str = "8000000";
@@ -105,14 +105,6 @@ pub fn side_by_side(
     failure.into_inner().expect("no panic").map_or(Ok(()), Err)
 }
 
-/// What tells a binary from one that was built before.
-fn stamp(binary: &Binary) -> Result<String, String> {
-    let failed = |error| format!("{}: {error}", binary.executable.display());
-    let data = fs::metadata(&binary.executable).map_err(failed)?;
-    let time = data.modified().map_err(failed)?.duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos());
-    Ok(format!("{time} {}", data.len()))
-}
-
 fn list(binary: &Binary, folder: &Path) -> Result<Vec<String>, String> {
     let mut command = Command::new(&binary.executable);
     let output = command.args(["--list", "--format", "terse"]).current_dir(folder).output();
@@ -122,20 +114,18 @@ fn list(binary: &Binary, folder: &Path) -> Result<Vec<String>, String> {
 }
 
 impl Suite {
-    /// Runs every test once without a mutant, but those whose reach is on disk from the same binary.
-    pub fn reach(binaries: &[Binary], folder: &Path, state: &Path, jobs: usize) -> Result<Self, String> {
+    /// Runs every test once without a mutant, but those whose reach is on disk with the stamp of the sources.
+    pub fn reach(binaries: &[Binary], stamp: &str, folder: &Path, state: &Path, jobs: usize) -> Result<Self, String> {
         let mut tests = Vec::new();
         for binary in binaries {
-            let (kept, stamp) = (state.join("reach").join(&binary.name), stamp(binary)?);
-            let lines = read(&kept).unwrap_or_default();
-            let mut lines = lines.lines();
-            if lines.next() == Some(&stamp) {
-                tests.extend(lines.filter_map(|line| Some((parse(binary, line)?, true))));
-                continue;
-            }
+            let text = read(&state.join("reach").join(&binary.name)).unwrap_or_default();
+            let lines = text.strip_prefix(stamp).unwrap_or_default().lines();
+            let known: Vec<Test> = lines.filter_map(|line| parse(binary, line)).filter(|test| test.passes).collect();
             for name in list(binary, folder)? {
-                let (binary, reach) = (binary.clone(), BTreeSet::new());
-                tests.push((Test { binary, name, seconds: 0.0, passes: false, reach }, false));
+                let known = known.iter().find(|test| test.name == name);
+                let (binary, reach) = (binary.clone(), known.map(|test| test.reach.clone()).unwrap_or_default());
+                let (seconds, passes) = known.map_or((0.0, false), |test| (test.seconds, true));
+                tests.push((Test { binary, name, seconds, passes, reach }, known.is_some()));
             }
         }
         let fresh: Vec<usize> = (0..tests.len()).filter(|&test| !tests[test].1).collect();
@@ -159,7 +149,7 @@ impl Suite {
         }
         let tests: Vec<Test> = tests.into_iter().map(|(test, _)| test).collect();
         for binary in binaries {
-            let mut text = stamp(binary)?;
+            let mut text = stamp.to_owned();
             for test in tests.iter().filter(|test| test.binary.name == binary.name) {
                 let reach: Vec<String> = test.reach.iter().map(ToString::to_string).collect();
                 let fields = [&test.name, &test.seconds.to_string(), &test.passes.to_string(), &reach.join(" ")];
