@@ -26,7 +26,8 @@ fn ask(number: u32) -> bool {
     if ALIVE.load(Relaxed) == UNKNOWN {
         let alive = match std::env::var_os("MUTANT_REACH") {
             Some(file) => {
-                REACH.get_or_init(|| OpenOptions::new().create(true).append(true).open(file).expect("the file of reach"));
+                let open = || OpenOptions::new().create(true).append(true).open(file);
+                REACH.get_or_init(|| open().expect("the file of reach"));
                 RECORD
             }
             None => std::env::var("MUTANT").ok().and_then(|number| number.parse().ok()).unwrap_or(0),

@@ -18,7 +18,8 @@
 //! anew that were alive, `--mutants` those with a word in their names, `--tests` only tests with a word in theirs.
 //! `equivalent.txt` has those in which nothing can be seen, each with the reason; they count apart.
 //!
-//! `--list` shows the mutants that are drawn, and compiles nothing. `--quick` runs all of this on a package of a few lines, `sample`, whose mutants have known ends.
+//! `--list` shows the mutants that are drawn, and compiles nothing. `--quick` runs all of this on a package of a few
+//! lines, `sample`, whose mutants have known ends.
 
 mod compile;
 mod draw;

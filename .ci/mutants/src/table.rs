@@ -56,7 +56,8 @@ fn overall(rooms: &[Count]) -> (f64, [f64; 2]) {
 
 pub fn print(rooms: &[(&str, Count)]) -> String {
     let mut text = String::from(
-        "| room | mutants | drawn | of these killed | by time | not seen | not reached | equivalent | score % | 95 % interval | drawn in vain |\n\
+        "| room | mutants | drawn | of these killed | by time | not seen | not reached | equivalent | score % | \
+         95 % interval | drawn in vain |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let mut row = |name: &str, count: &Count, score: f64, [low, high]: [f64; 2]| {
