@@ -405,6 +405,23 @@ fn documents_with_one_wrong_value_are_refused_or_run() {
     assert!(refused > taken && taken > 100, "{refused} {taken}");
 }
 
+/// Counts of a run are numbers that `f64` has exactly.
+#[test]
+fn counts_that_no_run_reaches_are_refused() {
+    for Files { text, .. } in samples() {
+        for (path, name) in [
+            ("/history/clock/steps", "the number of steps of a checkpoint"),
+            ("/history/pace/position", "the place in the nominal grid of a checkpoint"),
+        ] {
+            let mut document: Value = serde_json::from_str(&text).unwrap();
+            assert!(document.pointer(path).unwrap().as_u64().unwrap() < 1 << 53);
+            *document.pointer_mut(path).unwrap() = json!((1_u64 << 53) + 1);
+            let error = serde_json::from_value::<Checkpoint<f64>>(document).unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+}
+
 #[test]
 fn bytes_that_are_cut_or_flipped_are_refused_or_run() {
     for Files { text, bytes } in samples() {

@@ -7,7 +7,8 @@ use contact_dynamics::contact::{
 };
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    Composite, ContactStatus, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Result, Simulation,
+    CentralDifference, Composite, ContactStatus, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
+    Result, Simulation, TimeIntegrator,
 };
 
 /// Free masses.
@@ -293,6 +294,40 @@ fn candidates_come_in_any_number() {
     assert_eq!(run.gaps().len(), count);
     for (dof, (u, v)) in run.state().displacement().iter().zip(run.state().velocity()).enumerate() {
         assert!((u + 1.0).abs() < 1e-9 && v.abs() < 1e-9, "{dof}: {u} {v}");
+    }
+}
+
+/// Nothing to touch; writes down for how far ahead it searches.
+struct Horizon(Vec<f64>);
+
+impl ContactConstraint<f64> for Horizon {
+    fn dofs(&self) -> &[usize] {
+        &[0]
+    }
+    fn search(&mut self, _: f64, _: &[f64], _: &[f64], ahead: f64) -> Result<Candidates> {
+        self.0.push(ahead);
+        Ok(Candidates::Unchanged)
+    }
+    fn contacts(&self, _: &mut Contacts<f64>) {}
+    fn gaps(&mut self, _: f64, _: &[f64], _: &mut [f64]) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// A step looks as far ahead as it goes, and one step further where the scheme imposes contact a step after its state.
+#[test]
+fn searches_are_told_how_far_a_step_looks() {
+    let h = 0.125;
+    let schemes: [(Box<dyn TimeIntegrator>, f64); 3] =
+        [(Box::new(Newmark::trapezoidal()), h), (Box::new(Composite), h), (Box::new(CentralDifference), 2.0 * h)];
+    for (scheme, ahead) in schemes {
+        let (name, mut horizon) = (scheme.name(), Horizon(Vec::new()));
+        let mut run = Simulation::builder(free(1), scheme, h).constraint(&mut horizon).build().unwrap();
+        run.step().unwrap();
+        run.set_step_size(0.5 * h).unwrap();
+        run.step().unwrap();
+        drop(run);
+        assert!(horizon.0.ends_with(&[ahead, 0.5 * ahead]), "{name}: {:?}", horizon.0);
     }
 }
 

@@ -392,6 +392,20 @@ fn found(contact: &mut Mortar<f64>, u: &[f64]) -> Vec<Found> {
     gaps.iter().enumerate().map(|(k, &gap)| (contacts.name(k), gap, row(k))).collect()
 }
 
+/// Surfaces are outside of their facets by offsets, and are found as far apart as the reach.
+#[test]
+fn the_reach_is_that_of_surfaces_with_thickness() {
+    let stack = Stack::new(plates(3, 4), 0.5, |x| x);
+    let offsets = vec![0.15; stack.solid.nodes.len()];
+    let still = vec![0.0; stack.solid.dofs()];
+    for (reach, rows) in [(0.19, 0), (0.21, 5)] {
+        let mut contact = stack.mortar(true).unwrap().reach(reach).unwrap().offsets(&offsets).unwrap();
+        let found = found(&mut contact, &still);
+        assert_eq!(found.len(), rows, "{reach}: {found:?}");
+        assert!(found.iter().all(|(_, gap, _)| (gap - 0.2).abs() < 1e-13), "{found:?}");
+    }
+}
+
 #[test]
 fn rows_depend_neither_on_units_nor_on_the_order_of_facets() {
     let bodies = || {

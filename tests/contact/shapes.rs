@@ -62,6 +62,17 @@ fn normals_and_curvatures_are_the_derivatives_of_the_distance() {
     }
 }
 
+/// At the center of a ball, or on the axis of a cylinder, any direction to the surface is right, but it has length one.
+#[test]
+fn centers_of_round_bodies_have_a_normal() {
+    for (side, sign) in [(Side::Outside, -1.0), (Side::Inside, 1.0)] {
+        let disc = Sphere::new([0.1, 0.2], 0.5, side).unwrap().distance([0.1, 0.2]);
+        let ball = Sphere::new([0.1, 0.2, 0.3], 0.5, side).unwrap().distance([0.1, 0.2, 0.3]);
+        assert_eq!([disc.0, ball.0], [0.5 * sign; 2]);
+        assert!((dot(disc.1, disc.1) - 1.0).abs() < 1e-15 && (dot(ball.1, ball.1) - 1.0).abs() < 1e-15);
+    }
+}
+
 /// Closest points of a cone by going around the boundary of its section.
 #[test]
 fn cones_have_their_distances() {
@@ -98,6 +109,10 @@ fn cones_have_their_distances() {
         let (depth, normal) = cone.distance(along(base, 0.5 * height, axis));
         assert!(depth < 0.0 && (dot(normal, normal) - 1.0).abs() < 1e-14);
     }
+    // In the plane from which the base is rounded the base is the nearest all the same.
+    let blunt = Cone::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 0.125).unwrap();
+    let (distance, normal): (f64, _) = blunt.distance([0.25, 0.0, 0.125]);
+    assert!((distance + 0.125).abs() < 1e-15 && (normal[2] + 1.0).abs() < 1e-15, "{distance} {normal:?}");
     // As much rounding as there can be: a ball.
     let ball = Cone::new([0.0; 3], [0.0, 0.0, 4.0], 3.0, 1.5).unwrap();
     let exact = Sphere::new([0.0, 0.0, 1.5], 1.5, Side::Outside).unwrap();

@@ -54,6 +54,43 @@ fn check(w: &[f64], q: &[f64], sets: &[AdmissibleSet], r: &[f64], tolerance: f64
     }
 }
 
+/// The nearest point z of a convex set to x is the one with (x − z)·(y − z) ≤ 0 for all y of the set.
+#[test]
+fn multipliers_go_to_the_nearest_ones_of_a_cone() {
+    let mut random = Congruential(5);
+    for rows in [2, 3] {
+        for friction in [0.0, 0.3, 1.0, 4.0] {
+            let (mut moved, set) = (0, cone(rows, friction));
+            for _ in 0..200 {
+                let x = random.vector(rows, 1.0);
+                let mut z = x.clone();
+                set.project(&mut z);
+                let rubbed = |f: &[f64]| f[1..].iter().map(|f| f * f).sum::<f64>().sqrt();
+                assert!(z[0] >= 0.0 && rubbed(&z) <= friction * z[0] + 1e-15, "{set:?}: {x:?} to {z:?}");
+                moved += usize::from(z != x);
+                for _ in 0..20 {
+                    let mut y = random.vector(rows, friction);
+                    y[0] = random.unit() + if friction > 0.0 { rubbed(&y) / friction } else { 0.0 };
+                    let angle: f64 = (0..rows).map(|k| (x[k] - z[k]) * (y[k] - z[k])).sum();
+                    assert!(angle <= 1e-14 * (1.0 + y[0]), "{set:?}: {x:?} to {z:?}, {y:?}: {angle}");
+                }
+            }
+            assert!(moved > 50, "{set:?}: {moved}");
+        }
+        // A contact that is held keeps its normal force, and rubs in its direction with what that admits.
+        let set =
+            if rows == 2 { AdmissibleSet::Held2 { friction: 0.5 } } else { AdmissibleSet::Held3 { friction: 0.5 } };
+        for (x, share) in
+            [([2.0_f64, 3.0, 4.0], [1.0 / 3.0, 0.2]), ([-2.0, 3.0, 4.0], [0.0; 2]), ([9.0, 0.6, 0.8], [1.0; 2])]
+        {
+            let mut z = x[..rows].to_vec();
+            set.project(&mut z);
+            let near = |k: usize| (z[k] - share[rows - 2] * x[k]).abs() < 1e-15;
+            assert!((z[0] - x[0]).abs() < 1e-15 && (1..rows).all(near), "{x:?} to {z:?}");
+        }
+    }
+}
+
 #[test]
 fn one_contact_is_open_sticks_or_slides() {
     let w = [2.0, 0.0, 0.0, 4.0];

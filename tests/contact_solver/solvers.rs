@@ -265,6 +265,8 @@ fn closed_forms() {
             for (found, expected) in found.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-11, "{name}: {found:?}, not {expected:?}");
             }
+            // (Where no row misses anything it is the first.)
+            assert_eq!(problem.view().residual(&expected), (0, 0.0), "{expected:?}");
         }
         // A loaded string: λ_i = i (n + 1 − i)/2.
         let size = 9;
@@ -277,6 +279,15 @@ fn closed_forms() {
         // One contact many times: the sum is determined.
         let (found, _) = solve(&mut *solver, &Problem::unilateral(&[2.0; 49], &[-6.0; 7]), &[0.0; 7]).unwrap();
         assert!((found.iter().sum::<f64>() - 3.0).abs() < 1e-11, "{name}: {found:?}");
+        // Beside a row without W, which touches, or is open.
+        for gap in [0.0, 1.0] {
+            let entry = |e: usize| if e % 8 < 7 && e / 8 < 7 { 2.0 } else { 0.0 };
+            let mut offset = [-6.0; 8];
+            offset[7] = gap;
+            let beside = Problem::unilateral(&(0..64).map(entry).collect::<Vec<_>>(), &offset);
+            let (found, _) = solve(&mut *solver, &beside, &[0.0; 8]).unwrap();
+            assert!((found.iter().sum::<f64>() - 3.0).abs() < 1e-11 && found[7] == 0.0, "{name}: {found:?}");
+        }
         // Clamped without play: only the difference is determined.
         let clamped = Problem::unilateral(&[1.0, -1.0, -1.0, 1.0], &[-1.0, 1.0]);
         let (found, _) = solve(&mut *solver, &clamped, &[0.0; 2]).unwrap();

@@ -236,6 +236,37 @@ fn energy_is_exchanged_as_asked() {
     }
 }
 
+/// ½ S j² + j ġ = energy has its digits for energies far below that of the motion, and below their rounding nothing is
+/// done.
+#[test]
+fn small_energies_are_exchanged_without_cancellation() {
+    fn exchange(step: &mut Correction<'_, f64>) -> Result<()> {
+        let mut compliance = Vec::new();
+        for i in 0..step.released().len() {
+            let row = step.released()[i];
+            step.compliances(&[row], &mut compliance)?;
+            for share in [1e-12, 1e-9, 1e-6, 1e-3] {
+                let rate = step.rate(row)?;
+                assert!(rate > 0.0, "{rate}");
+                let energy = share * rate * rate / compliance[0];
+                let impulse = step.exchange_energy(row, energy)?;
+                let expected = energy / (rate + 0.5 * compliance[0] * impulse);
+                assert!((impulse - expected).abs() <= 1e-12 * expected, "{share}: {impulse:e}, not {expected:e}");
+            }
+            let (rate, taken) = (step.rate(row)?, step.contacts().dissipated()[row]);
+            let impulse = step.exchange_energy(row, 1e-40 * rate * rate / compliance[0])?;
+            assert_eq!(impulse.to_bits(), 0.0_f64.to_bits());
+            assert_eq!((step.rate(row)?, step.contacts().dissipated()[row]), (rate, taken));
+        }
+        Ok(())
+    }
+    let correctors: Vec<Box<dyn Corrector<f64>>> =
+        vec![Box::new(PersistencyCorrection::new()), Box::new(Own(exchange))];
+    let mut run = run(Box::new(Newmark::trapezoidal()), MassKind::Lumped, correctors);
+    run.run_until(0.4, &mut ()).unwrap();
+    assert!(run.statistics().contact_changes > 1);
+}
+
 /// A corrector that edits the past must say so beforehand.
 #[test]
 fn the_past_is_moved_by_those_who_said_so() {

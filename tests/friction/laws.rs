@@ -54,6 +54,19 @@ fn oblique_impacts_of_a_particle() {
     }
 }
 
+/// Before the first step a contact at rest is known to stick or slide, from what pulls along it.
+#[test]
+fn a_run_begins_with_contacts_that_stick_or_slide() {
+    for (pull, status, friction) in [(2.0, ContactStatus::Sticking, -2.0), (8.0, ContactStatus::Sliding, -6.0)] {
+        let block = masses(vec![2.0; 2], vec![pull, -20.0]).unwrap();
+        let floor = LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.3, &[&[(0, 1.0)]]);
+        let run = run(block, Box::new(Newmark::trapezoidal()), 0.01, vec![0.0; 2]).constraint(floor).build().unwrap();
+        let contacts = run.state().contacts();
+        assert!((contacts.friction_forces(0)[0] - friction).abs() < 1e-12, "{:?}", contacts.friction_forces(0));
+        assert_eq!(contacts.status(0), status, "{pull}");
+    }
+}
+
 /// Friction is μ times the force of a spring, and what sticks is held by a multiplier: by implicit schemes, and by
 /// explicit ones, which know the force before they solve.
 #[test]

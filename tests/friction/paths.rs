@@ -2,7 +2,7 @@
 
 use super::{GRAVITY, masses, run, schemes};
 use contact_dynamics::contact::ContactLaw;
-use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Newmark, Simulation, TimeIntegrator};
+use contact_dynamics::{Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::schemes::Listed;
 use contact_dynamics_scenes::sparse::matrix;
 
@@ -174,5 +174,41 @@ fn dofs_without_mass_begin_with_friction() {
         run.step().unwrap();
         assert!((run.state().displacement()[2] - rests).abs() < 1e-5, "{friction} {:?}", run.state().displacement());
         assert!((run.state().contacts().forces()[0] - 2.0).abs() < 1e-3);
+    }
+}
+
+/// A contact node without mass on a spring whose other end is driven (Jenkins' element): it stays where it is until the
+/// spring pulls with f, and then follows at the distance f/k: the play of the drive, in each step anew.
+#[test]
+fn a_dragged_node_without_mass_is_the_play_of_its_spring() {
+    let (friction, width) = (0.3, 0.3);
+    let springs = |i: usize, j: usize, k: f64| [(i, i, k), (j, j, k), (i, j, -k), (j, i, -k)];
+    let drive = |t: f64| [t.sin(), t.cos(), -t.sin()];
+    // (The composite's first stage may go further than both ends of a step around a turning point.)
+    let schemes: [(Box<dyn TimeIntegrator>, f64); 2] =
+        [(Box::new(Newmark::trapezoidal()), 1e-10), (Box::new(Composite), 2e-5)];
+    for (scheme, tolerance) in schemes {
+        let name = scheme.name();
+        let stiffness = matrix(4, [springs(0, 2, 2.0), springs(1, 3, 100.0)].concat());
+        let system = LinearSystem::lumped(vec![1.0, 1.0, 0.0, 0.0], stiffness).unwrap();
+        let system = system.load(|_, f| f[1] = -2.0).drive(0, drive).unwrap();
+        let floor = LinearRows::new().unilateral(&[(3, 1.0)], 0.0).friction(friction, &[&[(2, 1.0)]]);
+        let mut run = run(system, scheme, 1e-2, vec![1.0, 0.0, 0.0, 0.0])
+            .displacement(vec![0.0, -0.02, 0.0, 0.0])
+            .constraint(floor)
+            .build()
+            .unwrap();
+        let (mut play, mut ways) = (0.0_f64, [0.0, 0.0]);
+        while run.state().time() < 12.0 {
+            run.step().unwrap();
+            let x = drive(run.state().time())[0];
+            let next = play.clamp(x - width, x + width);
+            ways[usize::from(next > play)] += (next - play).abs();
+            play = next;
+            let found = run.state().displacement()[2];
+            assert!((found - play).abs() < tolerance, "{name}: {found} {play} at {}", run.state().time());
+        }
+        // There and back at least once.
+        assert!(ways[0] > 1.0 && ways[1] > 1.0, "{ways:?}");
     }
 }

@@ -473,6 +473,12 @@ fn elements_give_their_mass_to_their_other_dofs() {
     let redistributed = mass::redistribute_consistent(m.as_ref(), &[0], &[0; 5], near).unwrap();
     assert_eq!(found.symbolic().row_idx(), redistributed.symbolic().row_idx());
     close(found.val(), redistributed.val(), 1e-15);
+    // A dof without mass that is not listed, wherever it stands.
+    for missing in 0..3 {
+        let dofs: Vec<usize> = (0..3).filter(|&dof| dof != missing).collect();
+        let refused = mass::singular([(dofs, [2.0, 1.0, 1.0, 2.0])], &[], &[0; 3]);
+        assert!(matches!(refused, Err(Error::Mass { dof, .. }) if dof == missing), "{refused:?}");
+    }
     // One quadrilateral of mass 0.7: its upper nodes have 3 · 0.7/36 [4 2; 2 4] upward.
     let one = Solid::rectangle([1.0, 1.0], [1, 1], MATERIAL);
     let found = mass::singular(element_masses(&one), &[1, 3], &directions(&one)).unwrap();

@@ -85,6 +85,8 @@ fn modes_up_to_a_frequency_are_all_of_them() {
     let limit = 0.5 * (omega(30) + omega(31));
     let modes = Modes::up_to(mass.as_ref(), stiffness.as_ref(), &[], limit).unwrap();
     assert_eq!(modes.count(), 31);
+    // (No mode of so many is without rounding.)
+    assert!(modes.residual() > 0.0 && modes.residual() < 1e-10, "{}", modes.residual());
     assert!((modes.next_frequency() / omega(31) - 1.0).abs() < 1e-10);
     let none = Modes::up_to(mass.as_ref(), stiffness.as_ref(), &[n], 0.5 * omega(1) * 0.9);
     assert!(matches!(none, Err(Error::Empty { .. })));
@@ -276,6 +278,9 @@ fn modes_of_another_code_are_checked() {
     let mut bent = all.clone();
     bent[3] += 0.1;
     assert!(matches!(take(omega, bent, own.next_frequency()), Err(Error::ModeResidual { .. })));
+    // What comes next is said to come before the last.
+    let early = take(omega, all.clone(), 0.5 * (omega[4] + omega[5]));
+    assert!(matches!(early, Err(Error::Parameter { .. })), "{early:?}");
     // An elastic mode that is said to be rigid.
     let named = take(&[0.0, 0.0], shapes(&[0, 1]), omega[2]);
     assert!(matches!(named, Err(Error::ModeResidual { mode: 1, .. })), "{named:?}");

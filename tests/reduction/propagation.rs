@@ -210,6 +210,25 @@ fn what_is_refused() {
     assert!(matches!(ModalPropagation::builder(&[&held], 0.1).build(), Err(Error::Incompatible { .. })));
 }
 
+/// A body that is held at both ends and in between moves elsewhere, and stays where it is held.
+#[test]
+fn three_dofs_of_a_body_are_held_at_once() {
+    let n = 30;
+    let (mass, stiffness) = (diagonal(&vec![1.0; n]), matrix(n, springs(n, 1.0)));
+    let body: ReducedBody<f64> = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0, 12, n - 1]).modes(8).unwrap();
+    let start: Vec<f64> = (1..=8).map(|k| 1.0 / f64::from(k)).chain([0.0; 3]).collect();
+    let held = (8..11).fold(LinearRows::new(), |rows, dof| rows.equality(&[(dof, 1.0)], 0.0));
+    let mut run = ModalPropagation::builder(&[&body], 0.5).velocity(start).constraint(held).build().unwrap();
+    let (mut pulled, before) = (0.0_f64, total(&run));
+    for _ in 0..200 {
+        run.step().unwrap();
+        assert!(run.gaps().iter().all(|gap| gap.abs() < 1e-12), "{:?}", run.gaps());
+        assert!(total(&run) < 1.1 * before, "{} {before}", total(&run));
+        pulled = run.forces().iter().fold(pulled, |most, force| most.max(force.abs()));
+    }
+    assert!(pulled > 0.1, "{pulled}");
+}
+
 /// Two equality rows that part from each other after a while, and a load that becomes infinite.
 #[test]
 fn a_step_that_fails_changes_nothing() {

@@ -467,3 +467,31 @@ fn newtons_method_finds_dofs_without_mass_at_large_strains() {
         assert!(energy > 0.8 && energy < 1.01, "{name}: {energy}");
     }
 }
+
+/// A node without mass on a spring whose end A is inside of a disc of radius 1: wherever on the disc it begins, it starts
+/// at the nearest point to A, A/|A|, pressed with k (1 − |A|).
+#[test]
+fn static_balance_is_found_on_curved_obstacles() {
+    let (k, anchor) = (2.0, [0.54, 0.72]);
+    for angle in [0.6_f64, 0.9, 1.3] {
+        let start = [angle.cos(), angle.sin()];
+        let stiffness = matrix(3, [(0, 0, k), (1, 1, k), (2, 2, 1.0)]);
+        let system = LinearSystem::lumped(vec![0.0, 0.0, 1.0], stiffness).unwrap();
+        let pull = [0, 1].map(|axis| k * (anchor[axis] - start[axis]));
+        let disc = Sphere::new([0.0, 0.0], 1.0, Side::Outside).unwrap();
+        let run = Simulation::builder(
+            system.load(move |_, f| f[..2].copy_from_slice(&pull)),
+            GeneralizedAlpha::chung_hulbert(0.5).unwrap(),
+            0.01,
+        )
+        .constraint(NodesOnObstacle::new(disc, &[start], &[[0, 1]], &[0]).unwrap())
+        .build()
+        .unwrap();
+        let (u, force) = (run.state().displacement(), run.state().contacts().forces()[0]);
+        for axis in [0, 1] {
+            let found = start[axis] + u[axis];
+            assert!((found - anchor[axis] / 0.9).abs() < 1e-10, "{angle}: {found}");
+        }
+        assert!((force - 0.1 * k).abs() < 1e-9, "{angle}: {force}");
+    }
+}

@@ -93,6 +93,34 @@ fn seen(run: &Simulation<'_, f64>) -> (Vec<Vec<u64>>, u64) {
     (all, run.statistics().steps)
 }
 
+/// Steps of H/2ⁿ end at multiples of H/2ⁿ, wherever the window is in which they are that short.
+#[test]
+fn steps_of_every_size_stay_on_the_grid_of_that_size() {
+    for k in 0..24 {
+        let start = 0.01 + 3.7e-4 * f64::from(k);
+        let rule = Arc::new(Mutex::new(Rule { window: [start, start + 3.3e-3], limit: H / 16.0, recoverable: true }));
+        let mut run = Simulation::builder(host(oscillator(1.0), 0.0, rule), Composite, H)
+            .displacement(vec![1.0])
+            .step_control(StepControl::halving(H / 64.0).unwrap())
+            .build()
+            .unwrap();
+        let mut smallest = H;
+        run.run_until(0.06, &mut |step: &StepView<'_, f64>| {
+            let steps = step.state.time() / step.h;
+            assert!(
+                (steps - steps.round()).abs() < 1e-6,
+                "{start}: {} is no multiple of {}",
+                step.state.time(),
+                step.h
+            );
+            smallest = smallest.min(step.h);
+            Control::Continue
+        })
+        .unwrap();
+        assert_eq!((smallest, run.step_size()), (H / 16.0, H));
+    }
+}
+
 #[test]
 fn a_refused_step_is_halved_and_grows_back_on_the_nominal_grid() {
     for make in asking_at_the_end() {

@@ -454,6 +454,28 @@ fn a_run_with_step_changes_is_resumed_bit_for_bit() {
     }
 }
 
+/// A past is made from the motions that were computed, whatever sizes were set in between.
+#[test]
+fn a_step_size_without_a_step_leaves_no_trace() {
+    for listed in all() {
+        let run = |sizes: &[f64]| {
+            let mut run = oscillator((listed.make)(), 0.01);
+            run.run_until(0.2, &mut ()).unwrap();
+            for &h in sizes {
+                run.set_step_size(h).unwrap();
+            }
+            for _ in 0..5 {
+                run.step().unwrap();
+            }
+            let state = run.state();
+            [state.displacement()[0], state.velocity()[0], state.acceleration()[0]]
+        };
+        for (once, twice) in run(&[0.007]).into_iter().zip(run(&[0.009, 0.005, 0.007])) {
+            assert!((once - twice).abs() < 1e-12, "{}: {once} {twice}", listed.name());
+        }
+    }
+}
+
 #[test]
 fn absurd_steps_are_refused_and_leave_the_run_as_it_was() {
     let mut run = oscillator(Box::new(Composite), 0.01);

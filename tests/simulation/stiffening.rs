@@ -118,6 +118,22 @@ fn power_laws_are_judged_by_their_present_compression() {
     }
 }
 
+/// That one contact is admissible says nothing of another with the same spring, on a mass that the mesh holds.
+#[test]
+fn each_contact_is_judged_with_what_holds_it() {
+    // The limit is ω² = 400: neither 200 nor 300 is beyond it, but both are.
+    let (contact, mesh) = (200.0, 300.0);
+    let held = matrix(3, [(0, 0, 0.0), (1, 1, mesh), (2, 2, mesh), (1, 2, -mesh), (2, 1, -mesh)]);
+    let system = LinearSystem::lumped(vec![1.0, 1.0, 1e3], held).unwrap();
+    let law = ContactLaw::Penalty { stiffness: contact };
+    let walls = LinearRows::new().row(law, &[(0, 1.0)], 0.05).row(law, &[(1, 1.0)], 0.55);
+    let mut run =
+        Simulation::builder(system, CentralDifference, 0.1).velocity(vec![-1.0; 3]).constraint(walls).build().unwrap();
+    let error = run.run_until(2.0, &mut ()).unwrap_err();
+    assert!(matches!(error, Error::Stiffened { contact: Some(id), .. } if id.feature == 1), "{error:?}");
+    assert!(run.statistics().contact_changes >= 2 && run.time() > 0.35, "{}", run.time());
+}
+
 /// Neither the bar nor the spring at its end is beyond the limit, but both together are.
 #[test]
 fn meshes_and_contacts_are_judged_together() {
