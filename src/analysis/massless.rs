@@ -44,9 +44,9 @@ pub(crate) fn massless_follow(tableau: &Tableau) -> bool {
     })
 }
 
-/// Whether every stage of a scheme changes v by the mean of two accelerations, and u by that of two velocities but for a
-/// multiple of the change of a, the same in all stages; the balance holds at these states. The energy that such a scheme
-/// conserves changes by the work of the mean force of contact over each stage (theory, section 15.1).
+/// Whether every stage of a scheme changes v by the mean of two accelerations, and u by that of two velocities but for
+/// a multiple of the change of a, the same in all stages; the balance holds at these states. The energy that such a
+/// scheme conserves changes by the work of the mean force of contact over each stage (theory, section 15.1).
 pub(crate) fn steps_by_means(tableau: &Tableau) -> bool {
     // Each value is a combination of u, h v and h² a at the start of the step, and of the unknowns of its stages.
     type Values = Vec<f64>;

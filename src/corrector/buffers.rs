@@ -50,12 +50,12 @@ pub(crate) struct Buffers<T> {
     pub(super) damping: Vec<T>,
     pub(super) before: Vec<T>,
     /// Contacts on dofs without mass that close or open.
-    pub(crate) switching: Switching<T>,
+    pub(crate) switching: Box<Switching<T>>,
 }
 
 impl<T: Real> Buffers<T> {
-    /// Room for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), and for those of `switching`
-    /// dofs by contacts without mass, if these are corrected.
+    /// Room for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), and for those of
+    /// `switching` dofs by contacts without mass, if these are corrected.
     pub(crate) fn new(rows: usize, damped: usize, switching: Option<usize>) -> Self {
         let reals = |n| Vec::with_capacity(n);
         Self {
@@ -81,7 +81,7 @@ impl<T: Real> Buffers<T> {
             change: vec![T::zero(); damped],
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
-            switching: Switching::new(rows, switching),
+            switching: Box::new(Switching::new(rows, switching)),
         }
     }
 
@@ -114,8 +114,14 @@ impl<T: Real> Buffers<T> {
         sets.reserve(rows.saturating_sub(sets.len()));
     }
 
+    /// Notes the contacts before a stage, the first of its step or another one.
+    pub(crate) fn begin(&mut self, contacts: &ContactState<T>, first: bool) {
+        self.report(contacts, first);
+        self.switching.begin(contacts, first);
+    }
+
     /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
-    pub(crate) fn report(&mut self, contacts: &ContactState<T>, first: bool) {
+    fn report(&mut self, contacts: &ContactState<T>, first: bool) {
         if first {
             self.reported.clone_from(&contacts.lambda);
         }

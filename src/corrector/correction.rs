@@ -7,7 +7,7 @@ mod parts;
 mod past;
 
 use super::group_problem::Jumps;
-use super::{Buffers, JumpProjection};
+use super::{Buffers, Corrector, JumpProjection};
 use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
@@ -150,9 +150,16 @@ impl<T: Real> std::fmt::Debug for Erased<'_, T> {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Whether there is something for a corrector of contacts without mass, or for one of jumps.
-    pub(crate) fn concerns(&self, of_massless: bool) -> bool {
-        if of_massless { self.buffers.switching.is_pending() } else { self.buffers.has_jumps() }
+    /// Lets those correctors act for which there is something: jumps, or contacts without mass that close or open.
+    pub(crate) fn correct(&mut self, correctors: &[Box<dyn Corrector<T> + '_>]) -> Result<()> {
+        let [jumps, switches] = [self.buffers.has_jumps(), self.buffers.switching.is_pending()];
+        for corrector in correctors {
+            let concerns = if corrector.corrects_massless() { switches } else { jumps };
+            if concerns {
+                corrector.correct(self)?;
+            }
+        }
+        Ok(())
     }
 
     /// Whether a row is pressed: its jumps vanish both ways.
@@ -200,9 +207,9 @@ impl<T: Real> Correction<'_, T> {
         per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row])
     }
 
-    /// A share of the rates that a jump is made of. Nodes that face each other, each of them on the facets of the other,
-    /// have rows that differ by the angle between these facets, and so do their rates: a square of it in S that is below
-    /// ε^⅔ counts as none ([`DenseCholesky`](crate::dense::DenseCholesky)).
+    /// A share of the rates that a jump is made of. Nodes that face each other, each of them on the facets of the
+    /// other, have rows that differ by the angle between these facets, and so do their rates: a square of it in S that
+    /// is below ε^⅔ counts as none ([`DenseCholesky`](crate::dense::DenseCholesky)).
     fn share_of_rate(&self, row: usize, jump: Jump) -> T {
         let (values, own) = jump.terms(self.new, &self.buffers.rates[row]);
         T::epsilon().cbrt() * (self.g.magnitude(row, values) + own.abs())

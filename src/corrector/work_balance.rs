@@ -30,20 +30,21 @@ use std::ops::Range;
 /// with W what the contact has taken from the bodies (½ g λ', or −½ g' λ), ġ the rate of its gap if its dofs followed
 /// the others statically, y what a unit impulse of the contact makes of the velocities of the dofs with mass, and one α
 /// near 1 for those that give and one for those that take, by which the kinetic energy changes by Σ J ġ to rounding.
-/// What a contact cannot return so (where ġ is small, or has the wrong sign) it owes, and returns when it closes or opens
-/// again: [`ContactState::dissipated`] has it, positive where the bodies are to get it. Momentum changes by the
-/// impulses, which are booked as those of the contacts. Friction on such contacts gets the same share of its impulse.
+/// What a contact cannot return so (where ġ is small, or has the wrong sign) it owes, and returns when it closes or
+/// opens again: [`dissipated`](crate::ContactState::dissipated) has it, positive where the bodies are to get it.
+/// Momentum changes by the impulses, which are booked as those of the contacts. Friction on such contacts gets the same
+/// share of its impulse.
 ///
 /// Costs two or three solves with the matrix of the stage in a step in which a contact closes or opens, and nothing in
 /// others.
 ///
 /// Known failure: modes far faster than the step (ω h ≫ 1) that open and close many contacts in every step leave more
-/// than can be returned, and forces are wrong by several times (without the correction: by thousands). Choose a scheme
-/// that damps them, as [`GeneralizedAlpha`](crate::GeneralizedAlpha).
+/// than can be returned: energy and forces grow, if less than without the correction. Choose a scheme that damps them,
+/// as [`GeneralizedAlpha`](crate::GeneralizedAlpha).
 ///
-/// For the trapezoidal rule, Newmark's schemes with γ = ½ (central differences, [`CdLagrange`](crate::CdLagrange)
-/// among them) and [`Bathe`](crate::Bathe) with ρ∞ = 1; rows under [`ContactLaw::Rigid`]. Part of the default for
-/// these, where contact dofs have no mass, and of the presets `conservative()` and `explicit()`.
+/// For the trapezoidal rule, Newmark's schemes with γ = ½ (central differences, [`CdLagrange`](crate::CdLagrange) among
+/// them) and [`Bathe`](crate::Bathe) with ρ∞ = 1; rows under [`ContactLaw::Rigid`](crate::ContactLaw::Rigid). Part of
+/// the default for these, where contact dofs have no mass, and of the presets `conservative()` and `explicit()`.
 ///
 /// ```
 /// use contact_dynamics::corrector::{Corrector, WorkBalance};
@@ -190,7 +191,7 @@ impl<T: Real> Correction<'_, T> {
     /// Counts what has closed or opened in this stage: its work, and by how much its impulse may have been too large.
     fn count_switches(&mut self) {
         let Self { buffers, contacts, scheme, h, .. } = self;
-        let Switching { start: Some([gaps, forces]), rows, switches, .. } = &mut buffers.switching else { return };
+        let Switching { start: Some([gaps, forces]), rows, switches, .. } = &mut *buffers.switching else { return };
         let half = T::of(0.5);
         for row in rows.drain(..) {
             let closes = contacts.lambda_raw[row] > T::zero();
@@ -219,9 +220,9 @@ impl<T: Real> Correction<'_, T> {
             return Ok(());
         }
         self.read_rates()?;
-        let mut switching = std::mem::replace(&mut self.buffers.switching, Switching::new(0, None));
+        let mut switching = std::mem::replace(&mut *self.buffers.switching, Switching::new(0, None));
         let result = self.return_to(&mut switching);
-        self.buffers.switching = switching;
+        *self.buffers.switching = switching;
         result
     }
 
@@ -267,7 +268,7 @@ impl<T: Real> Correction<'_, T> {
         let all: T = group().map(|switch| switch.returned).sum();
         let by_friction: T = group().map(|switch| switch.by_friction).sum();
         let (part, left) = nearest([-all, first + by_obstacles - by_friction, second]);
-        if !(part > T::zero()) {
+        if part <= T::zero() {
             self.keep(group(), T::one());
             return Ok(());
         }
@@ -279,7 +280,9 @@ impl<T: Real> Correction<'_, T> {
         }
         self.keep(group(), -left / all);
         *self.energy += part * (first + part * second);
-        change.iter_mut().for_each(|x| *x *= part);
+        for x in change.iter_mut() {
+            *x *= part;
+        }
         T::axpy(T::one(), change, &mut self.new.v);
         self.damp_change(change)
     }
@@ -323,15 +326,14 @@ impl<T: Real> Correction<'_, T> {
         for &dof in *prescribed {
             change[dof] = T::zero();
         }
-        match block {
-            Some(block) => {
-                block.pass_on(change)?;
-                projection.apply_inverse(change)?;
-            }
-            None => {
-                operator.solve(change)?;
-                let scale = T::of(scheme.balance / (*h * *h));
-                change.iter_mut().for_each(|x| *x *= scale);
+        if let Some(block) = block {
+            block.pass_on(change)?;
+            projection.apply_inverse(change)?;
+        } else {
+            operator.solve(change)?;
+            let scale = T::of(scheme.balance / (*h * *h));
+            for x in change.iter_mut() {
+                *x *= scale;
             }
         }
         for &dof in massless.iter().chain(*prescribed) {

@@ -8,7 +8,7 @@ use super::massless::MasslessBlock;
 use super::massless_start::Balanced;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
-    check_corrections, check_lagged_damping, check_massless, check_path, is_balanceable, is_correctable, local_error,
+    check_corrections, check_lagged_damping, check_massless, check_path, default_corrections, local_error,
 };
 use super::path::PathWork;
 use super::program::{Compiler, Program};
@@ -30,7 +30,7 @@ use crate::analysis;
 use crate::contact::ContactLaw;
 use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
-use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
+use crate::corrector::Corrector;
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
@@ -184,9 +184,11 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Adds a corrector; several act in the order given, and in place of the default one:
-    /// [`PersistencyCorrection::with_history_projection`], where contact is rigid, on dofs with mass, and imposed on
-    /// the displacements of the state. (Contact on velocities or ahead of the state leaves nothing to correct,
+    /// Adds a corrector; several act in the order given, and in place of the default ones:
+    /// [`PersistencyCorrection::with_history_projection`](crate::PersistencyCorrection::with_history_projection), where
+    /// contact is rigid, on dofs with mass, and imposed on the displacements of the state, and
+    /// [`WorkBalance`](crate::corrector::WorkBalance), where contact dofs have no mass and the scheme conserves energy.
+    /// (Contact on velocities or ahead of the state leaves nothing to correct,
     /// compliant laws, [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] suppress oscillation by
     /// themselves.)
     #[must_use]
@@ -429,11 +431,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;
         contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
-        if self.correction == DefaultCorrection::Wanted && is_correctable(&scheme.tableau, &constraints, &massless) {
-            correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
-        }
-        if self.correction == DefaultCorrection::Wanted && is_balanceable(&scheme.tableau, &constraints, &massless) {
-            correctors.push(Box::new(WorkBalance));
+        if self.correction == DefaultCorrection::Wanted {
+            correctors.extend(default_corrections(&scheme.tableau, &constraints, &massless));
         }
         let limit = match self.stability {
             Stability::Checked => {

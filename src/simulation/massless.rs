@@ -298,8 +298,8 @@ impl<T: Real> MasslessBlock<T> {
 }
 
 impl<T: Real> MasslessBlock<T> {
-    /// Writes the velocities with which the dofs without mass follow those of the others, −K_bb⁻¹ K_bi v_i, without loads
-    /// and contact; the others keep theirs.
+    /// Writes the velocities with which the dofs without mass follow those of the others, −K_bb⁻¹ K_bi v_i, without
+    /// loads and contact; the others keep theirs.
     pub(crate) fn follow(&mut self, v: &[T], out: &mut [T]) -> Result<()> {
         out.copy_from_slice(v);
         for (j, &dof) in self.dofs.iter().enumerate() {

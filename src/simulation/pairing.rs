@@ -5,7 +5,7 @@ use super::constraints::Constraints;
 use super::scheme::Scheme;
 use crate::analysis::{self, LocalError};
 use crate::contact::ContactLaw;
-use crate::corrector::Corrector;
+use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
@@ -115,9 +115,25 @@ pub(super) fn check_lagged_damping<T: Real>(
     Ok(())
 }
 
-/// Whether the default correction has something to do: contact on displacements of the state, of a rigid law (or not
+/// The correctors of a run that names none: of jumps, and of contacts without mass, where each has something to do.
+pub(super) fn default_corrections<'a, T: Real>(
+    tableau: &Tableau,
+    constraints: &Constraints<'_, T>,
+    massless: &[usize],
+) -> Vec<Box<dyn Corrector<T> + 'a>> {
+    let mut correctors: Vec<Box<dyn Corrector<T> + 'a>> = Vec::new();
+    if is_correctable(tableau, constraints, massless) {
+        correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
+    }
+    if is_balanceable(tableau, constraints, massless) {
+        correctors.push(Box::new(WorkBalance));
+    }
+    correctors
+}
+
+/// Whether the correction of jumps has something to do: contact on displacements of the state, of a rigid law (or not
 /// known yet), on dofs with mass.
-pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
         && constraints.may_press()
@@ -127,7 +143,7 @@ pub(super) fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constrain
 
 /// Whether the work of contacts without mass is balanced by default: contact dofs have none, and the scheme conserves
 /// energy but for the steps in which contacts close or open.
-pub(super) fn is_balanceable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+fn is_balanceable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let has_none = |dof: &usize| massless.binary_search(dof).is_ok();
     constraints.may_press() && constraints.interface().iter().any(has_none) && analysis::steps_by_means(tableau)
 }

@@ -210,8 +210,7 @@ impl<T: Real> Simulation<'_, T> {
             predict(stage, clock, &mut **system, new, past, &mut work.vectors)?;
             if let Some(projection) = &mut work.correction.projection {
                 refresh(projection, &mut work.correction.projected_rows, constraints.version());
-                work.correction.buffers.report(&work.contact.trial, stages_before == 0);
-                work.correction.buffers.switching.begin(&work.contact.trial, stages_before == 0);
+                work.correction.buffers.begin(&work.contact.trial, stages_before == 0);
                 if !work.correction.shifted.is_empty() {
                     let mut prediction = Prediction {
                         h: clock.h * stage.end,
@@ -288,11 +287,7 @@ impl<T: Real> Simulation<'_, T> {
                         buffers: &mut work.correction.buffers,
                         energy: &mut work.correction.energy,
                     };
-                    for corrector in correctors.iter() {
-                        if correction.concerns(corrector.corrects_massless()) {
-                            corrector.correct(&mut correction)?;
-                        }
-                    }
+                    correction.correct(correctors)?;
                 }
             }
         }

@@ -258,7 +258,8 @@ impl<T: Real> ContactState<T> {
     }
 
     /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in
-    /// the frame of the obstacle, where there is one that moves.
+    /// the frame of the obstacle, where there is one that moves. Of contacts without mass what
+    /// [`WorkBalance`](crate::corrector::WorkBalance) still owes to the bodies, negative where they owe.
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
     }

@@ -148,8 +148,8 @@ fn the_rebound_comes_closer_to_the_exact_one_than_without() {
 
 #[test]
 fn what_closes_and_what_opens_in_the_same_step_is_told_apart() {
-    // Two falls in one system, the second one later by a contact and some of a step: their switches meet in a step. Each
-    // keeps its energy as it does alone, but for the one number that they share.
+    // Two falls in one system, the second one later by a contact and some of a step: their switches meet in a step.
+    // Each keeps its energy as it does alone, but for the one number that they share.
     let springs = [(0, 1, 300.0), (1, 2, 200.0), (3, 4, 300.0), (4, 5, 200.0)];
     let stiffness = || matrix::<f64>(6, springs.into_iter().flat_map(|(i, j, k)| spring(i, j, k)));
     let (h, mass) = (0.02, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]);

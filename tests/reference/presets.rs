@@ -155,8 +155,8 @@ fn the_explicit_preset_takes_any_courant_number() {
     // 0.1, 0.2, 0.5 and the limit.
     for (n, error) in [(10, 0.08), (20, 0.04), (50, 0.02), (100, 0.006)] {
         let found = sweep(n, 1.0, |bars| by_preset(Preset::explicit(), bars));
-        assert!(found.mean[L1] < error && found.worst[MAX] < 1.09, "{n}: {:?}", found.mean);
-        assert!(found.mean[LOSS].abs() < 0.002 && found.mean[VARIATION] < 3.0, "{n}: {:?}", found.mean);
+        assert!(found.mean[L1] < error && found.worst[MAX] < 1.12, "{n}: {:?} {:?}", found.mean, found.worst);
+        assert!(found.mean[LOSS].abs() < 0.002 && found.mean[VARIATION] < 3.2, "{n}: {:?}", found.mean);
     }
 }
 

@@ -33,8 +33,8 @@ fn presets_show_the_force_and_keep_the_energy() {
     // Force L1, largest force, energy loss: the worst of ten phases of table 1, and a tenth.
     for (preset, h, force, largest, loss) in [
         (Preset::smooth(), H, 0.0073, 1.036, 2.27e-3),
-        (Preset::conservative(), H, 0.0037, 1.027, 4.8e-4),
-        (Preset::explicit(), 0.9 * H, 0.0055, 1.05, 2.1e-3),
+        (Preset::conservative(), H, 0.0037, 1.027, 1e-5),
+        (Preset::explicit(), 0.9 * H, 0.0055, 1.062, 2.1e-3),
     ] {
         for phase in [0.05, 0.45, 0.95] {
             let (figures, impact) = collide(preset, 100, h, phase);
@@ -64,7 +64,12 @@ fn mass_on_the_contact_nodes_starts_with_its_impulse_and_none_does_not() {
 fn presets_bounce_with_the_energy_that_is_claimed() {
     let bar = WallBar::bouncing(100);
     let h = 0.5 * bar.element_size() / bar.wave_speed();
-    for (preset, least) in [(Preset::smooth(), 0.985), (Preset::conservative(), 0.9990), (Preset::explicit(), 0.85)] {
+    // (That of central differences, kinetic and elastic, is larger than what they conserve where there are waves.)
+    for (preset, [least, most]) in [
+        (Preset::smooth(), [0.985, 1.0]),
+        (Preset::conservative(), [1.0 - 1e-5, 1.0 + 1e-5]),
+        (Preset::explicit(), [1.0 - 1e-3, 1.005]),
+    ] {
         let mass = preset_mass(preset, &bar.body(), h);
         let masses = mass.row_sums();
         let mut run = Simulation::builder(bar.system_with(mass), preset.integrator(), h)
@@ -74,7 +79,7 @@ fn presets_bounce_with_the_energy_that_is_claimed() {
             .unwrap();
         let load = preset.integrator().tableau().stages.last().unwrap().load;
         let bounces = bar.bounces(&masses, &mut run, h, load).unwrap();
-        assert!(bounces.energy[5] > least && bounces.energy[5] < 1.0, "{preset:?}: {:?}", bounces.energy);
+        assert!(bounces.energy[5] > least && bounces.energy[5] < most, "{preset:?}: {:?}", bounces.energy);
         assert!(bounces.ramp < 0.003 && bounces.force_max < 1.1 && bounces.changes == 4, "{preset:?}: {bounces:?}");
     }
 }

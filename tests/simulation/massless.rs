@@ -468,8 +468,8 @@ fn newtons_method_finds_dofs_without_mass_at_large_strains() {
     }
 }
 
-/// A node without mass on a spring whose end A is inside of a disc of radius 1: wherever on the disc it begins, it starts
-/// at the nearest point to A, A/|A|, pressed with k (1 − |A|).
+/// A node without mass on a spring whose end A is inside of a disc of radius 1: wherever on the disc it begins, it
+/// starts at the nearest point to A, A/|A|, pressed with k (1 − |A|).
 #[test]
 fn static_balance_is_found_on_curved_obstacles() {
     let (k, anchor) = (2.0, [0.54, 0.72]);
