@@ -64,7 +64,8 @@ fn keeping(extent: &Extent) -> Vec<Row> {
     };
     let asked = [
         ("energy after 12 impacts over that of the start, undamped schemes, massless contact dofs", AtLeast(0.99)),
-        ("the same, from above", AtMost(1.001)),
+        // (The energy of explicit schemes trembles about what they conserve, by Ω²/4 of the elastic one.)
+        ("the same, from above", AtMost(1.02)),
     ];
     rows("H8", asked, &each(&massless.chain(of_presets).collect::<Vec<_>>(), run))
 }
