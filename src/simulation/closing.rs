@@ -73,7 +73,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
             // Compliant contacts, and those on dofs without mass, leave no jump to correct.
-            if law.leaves_jumps() && (massless.is_empty() || !g.acts_on(row, massless)) {
+            let has_mass = massless.is_empty() || !g.acts_on(row, massless);
+            if law.leaves_jumps() && has_mass {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),
                     (false, true) => buffers.opened.push(row),
@@ -83,7 +84,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     buffers.released.push(row);
                 }
             }
-            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && g.acts_on(row, massless);
+            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && !has_mass;
             if is_balanced {
                 buffers.switching.note(row, trial);
             }
