@@ -11,6 +11,7 @@ mod persistency;
 mod prediction;
 mod release;
 mod rubbing_problem;
+mod switching;
 mod work_balance;
 mod zero_acceleration;
 
@@ -28,6 +29,7 @@ pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
 pub(crate) use rubbing_problem::{Block, Rubbing, slides};
+pub(crate) use switching::Switching;
 pub use work_balance::WorkBalance;
 pub use zero_acceleration::ZeroAcceleration;
 

@@ -20,6 +20,7 @@ mod curved_rows;
 mod curved_step;
 mod derived;
 mod energy;
+mod excess_forces;
 mod finite;
 mod gaps;
 mod interface;

@@ -153,8 +153,7 @@ fn costs(records: &[Record]) -> Result<String, Box<dyn Error>> {
 
 /// Largest force and opening of some joints, of the meshes and of the reduced blocks.
 fn joints(records: &[Record]) -> Result<String, Box<dyn Error>> {
-    // (What grows beyond all bounds is in the table before.)
-    let is_shown = |record: &Record| record.is_damped || record.is_reduced && !record.runs_away;
+    let is_shown = |record: &Record| record.is_damped || record.is_reduced;
     let shown: Vec<&Record> = records.iter().take(1).chain(records.iter().filter(|r| is_shown(r))).collect();
     let heads = shown.iter().map(|record| format!(" {}: force, MN | opening, mm |", record.name));
     let mut table =

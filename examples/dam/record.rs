@@ -11,8 +11,6 @@ pub(crate) struct Record {
     pub(crate) is_reduced: bool,
     /// Whether the scheme damps: it is then compared with meshes under the same scheme.
     pub(crate) is_damped: bool,
-    /// Whether contact dofs have no mass and the scheme does not damp: forces grow beyond all bounds.
-    pub(crate) runs_away: bool,
     pub(crate) unknowns: usize,
     /// Seconds before the first step, and of all steps.
     pub(crate) build: f64,

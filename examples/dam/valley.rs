@@ -61,8 +61,8 @@ pub(crate) enum Scheme {
     Damped,
 }
 
-/// Without a choice of softening, by the scheme that suits the boundary: contact dofs without mass open and close, and
-/// under the trapezoidal rule the energy that this makes stays.
+/// Without a choice of softening, by the scheme that suits the boundary: contact dofs without mass that rattle keep the
+/// noise of all modes that the step does not resolve, unless the scheme damps it.
 const fn way(boundary: Boundary, modes: usize) -> Way {
     let scheme = if matches!(boundary, CraigBampton) { Scheme::Trapezoidal } else { Scheme::Damped };
     Way { boundary, softening: None, modes, scheme }

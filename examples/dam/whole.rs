@@ -118,8 +118,7 @@ pub(crate) fn reduced(dam: &Dam, loading: &Loading, plan: &Plan, way: Way) -> Re
     let has_mass = boundary == Boundary::CraigBampton;
     let softened = softening.map_or(String::new(), |softening| format!(", softening {softening}"));
     let mut name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
-    let runs_away = !has_mass && scheme == Scheme::Trapezoidal;
-    if runs_away {
+    if !has_mass && scheme == Scheme::Trapezoidal {
         name += ", trapezoidal rule";
     }
     let mut record = Record::of(&name, dam, plan.steps, || {
@@ -142,17 +141,11 @@ pub(crate) fn reduced(dam: &Dam, loading: &Loading, plan: &Plan, way: Way) -> Re
         let builder = Simulation::builder(under(blocks.system()?, loading, loads), scheme.integrator()?, plan.step)
             .constraint(rows(&places, plan.friction))
             .start_at_rest();
-        // Contact dofs without mass leave nothing to correct.
-        let run = match has_mass {
-            true => builder.corrector(PersistencyCorrection::new()),
-            false => builder.uncorrected(),
-        }
-        .build()?;
+        let run = if has_mass { builder.corrector(PersistencyCorrection::new()) } else { builder }.build()?;
         let places = if plan.friction > 0.0 { places } else { Vec::new() };
         Ok(Whole { run, unknowns: blocks.dofs(), places })
     })?;
     record.is_reduced = true;
     record.is_damped = scheme == Scheme::Damped;
-    record.runs_away = runs_away;
     Ok(record)
 }

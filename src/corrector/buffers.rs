@@ -2,7 +2,7 @@
 
 use super::group_problem::GroupProblem;
 use super::rubbing_problem::Rubbing;
-use super::work_balance::Switching;
+use super::switching::Switching;
 use crate::contact::GapRates;
 use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::real::Real;

@@ -3,6 +3,7 @@
 use super::admitted::admitted;
 use super::constraints::Constraints;
 use super::energy::Ledger;
+use super::excess_forces::ExcessForces;
 use super::judge::{Judge, StepControl};
 use super::massless::MasslessBlock;
 use super::massless_start::Balanced;
@@ -455,6 +456,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             let (name, interface) = (scheme.integrator.name(), constraints.interface());
             work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, interface)?);
             work.contact.rows.on_massless = vec![false; rows];
+        } else if work.correction.buffers.switching.is_on() && work.correction.shifted.is_empty() {
+            let size = (constraints.interface(), rows);
+            work.excess = ExcessForces::new(&mut *system, &program, &massless, &state.motion, size)?;
         }
         work.keep_massless(massless);
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;

@@ -282,6 +282,16 @@ impl<T: Real> MasslessBlock<T> {
                  damping proportional to mass or an implicit scheme, or give the dofs a mass",
             );
         }
+        Self::of_statics(system, dofs, at, interface)
+    }
+
+    /// Factorizes K_bb.
+    pub(super) fn of_statics(
+        system: &mut dyn System<T>,
+        dofs: &[usize],
+        at: &Motion<T>,
+        interface: &[usize],
+    ) -> Result<Self> {
         let columns = Columns::of(system, dofs, at)?;
         let factor = Embedded::factorized(&columns, dofs, interface)?;
         let massive = interface.iter().enumerate().filter(|(_, dof)| dofs.binary_search(dof).is_err());

@@ -235,6 +235,11 @@ impl<T: Real> Simulation<'_, T> {
                     }
                 }
             }
+            let is_first = stages_before == 0;
+            if let Some(excess) = &mut work.excess {
+                excess.begin(constraints.len(), is_first);
+                excess.shift(stage, clock.h, is_first, new);
+            }
             work.contact.rows.read_start(constraints, g, past, clock.h)?;
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let mut solve =
@@ -243,6 +248,16 @@ impl<T: Real> Simulation<'_, T> {
             match (&mut work.newton, &mut work.block) {
                 (Some(newton), None) => solve.by_iteration(newton, new, past, vectors, contact)?,
                 (_, block) => solve.directly(block.as_mut(), new, past, vectors, contact)?,
+            }
+            if let (Some(excess), Some(projection)) = (&mut work.excess, &mut work.correction.projection) {
+                let switching = &mut *work.correction.buffers.switching;
+                work.correction.energy += excess.solve_again(
+                    &mut solve,
+                    (new, past),
+                    (vectors, contact),
+                    (switching, projection),
+                    is_first,
+                )?;
             }
             for (&dof, support) in work.vectors.supports.dofs.iter().zip(&work.vectors.supports.state) {
                 new.a[dof] = support[2];
@@ -257,10 +272,13 @@ impl<T: Real> Simulation<'_, T> {
                 let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None, part };
                 let booking = Booking {
                     impulse_weight: impulse_weight(stage.response, covector),
-                    is_first: stages_before == 0,
+                    is_first,
                     is_last: stages_before + 1 == program.stages.len(),
                 };
                 contact.close(new, &booking, &work.massless, &mut work.correction.buffers, &mut work.contact)?;
+                if let Some(excess) = &work.excess {
+                    excess.book(stage, clock.h, &work.correction.buffers.switching, &mut work.contact.trial);
+                }
                 if let Some(projection) =
                     work.correction.projection.as_mut().filter(|_| work.correction.buffers.has_touched())
                 {

@@ -4,6 +4,7 @@
 use super::constraints::Constraints;
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::ContactWork;
+use super::excess_forces::ExcessForces;
 use super::interface::InterfaceWork;
 use super::massless::MasslessBlock;
 use super::newton::NewtonWork;
@@ -28,6 +29,8 @@ pub(super) struct Workspace<T: Real> {
     pub(super) massless: Vec<usize>,
     /// For explicit schemes, if there are dofs without mass.
     pub(super) block: Option<MasslessBlock<T>>,
+    /// For implicit schemes, if the work of contacts on such dofs is balanced.
+    pub(super) excess: Option<Box<ExcessForces<T>>>,
     pub(super) correction: CorrectionWork<T>,
     pub(super) rate_check: RateCheck<T>,
     /// For schemes that are stable up to some frequency, which may be met in the run.
@@ -109,6 +112,7 @@ impl<T: Real> Workspace<T> {
             newton: None,
             massless: Vec::new(),
             block: None,
+            excess: None,
             correction: CorrectionWork {
                 buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
@@ -139,6 +143,9 @@ impl<T: Real> Workspace<T> {
             flags.reserve(rows.saturating_sub(flags.len()));
         }
         self.correction.buffers.make_room(rows);
+        if let Some(excess) = &mut self.excess {
+            excess.make_room(rows);
+        }
         self.rate_check.make_room(rows);
     }
 }

@@ -5,9 +5,7 @@ use crate::masses::{Takers, Treatment};
 use crate::wall_bar::WallBar;
 use contact_dynamics::reduction::{Blocks, Boundary, Reduction};
 use contact_dynamics::reference::{Bar, BouncingBar, CollidingBars};
-use contact_dynamics::{
-    Corrector, LinearRows, LinearSystem, PersistencyCorrection, Result, Simulation, TimeIntegrator,
-};
+use contact_dynamics::{LinearRows, LinearSystem, PersistencyCorrection, Result, Simulation, TimeIntegrator};
 
 /// Elements of the bars that are reduced.
 pub const PARENT: usize = 1000;
@@ -55,7 +53,8 @@ pub struct Striker {
     pub uniform: Vec<f64>,
     /// Its weight.
     pub load: Vec<f64>,
-    correctors: Vec<Box<dyn Corrector<f64>>>,
+    /// Whether its contact dof has mass.
+    inert: bool,
 }
 
 impl Striker {
@@ -75,7 +74,7 @@ impl Striker {
             let mass = treatment.mass(&body, &scheme.tableau(), body.courant(h)?)?;
             let load = mass.row_sums().iter().map(|m| -bar.gravity * m).collect();
             let uniform = vec![1.0; unknowns];
-            return Ok(Self { system: bar.system_with(mass), contact: 0, uniform, load, correctors: Vec::new() });
+            return Ok(Self { system: bar.system_with(mass), contact: 0, uniform, load, inert: false });
         };
         let bar = WallBar { elements: PARENT, ..*bar };
         let (mass, stiffness) = (bar.consistent_mass(), bar.stiffness());
@@ -83,17 +82,12 @@ impl Striker {
         let reduction = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(boundary);
         let reduction = reduction.exponent(exponent).softening(softening);
         let body = reduction.constant_load(&weight).modes(unknowns - 1)?;
-        // Contact dofs with mass take the correction that belongs to them.
-        let correctors: Vec<Box<dyn Corrector<f64>>> = match boundary {
-            Boundary::CraigBampton => vec![Box::new(PersistencyCorrection::new())],
-            _ => Vec::new(),
-        };
         Ok(Self {
             system: body.system()?,
             contact: body.contact_dofs().start,
             uniform: body.velocity(&vec![1.0; PARENT + 1])?,
             load: body.constant_load().unwrap_or(&[]).to_vec(),
-            correctors,
+            inert: boundary == Boundary::CraigBampton,
         })
     }
 
@@ -104,12 +98,12 @@ impl Striker {
         scheme: Box<dyn TimeIntegrator>,
         h: f64,
     ) -> Result<Simulation<'static, f64>> {
-        let Self { system, contact, uniform, correctors, .. } = self;
-        Simulation::builder(system, scheme, h)
+        let Self { system, contact, uniform, inert, .. } = self;
+        let run = Simulation::builder(system, scheme, h)
             .velocity(uniform.iter().map(|v| velocity * v).collect())
-            .constraint(LinearRows::new().unilateral(&[(contact, 1.0)], gap))
-            .correctors(correctors)
-            .build()
+            .constraint(LinearRows::new().unilateral(&[(contact, 1.0)], gap));
+        // Contact dofs with mass take the correction of the literature, those without what is theirs by default.
+        if inert { run.corrector(PersistencyCorrection::new()).build() } else { run.build() }
     }
 }
 
