@@ -1,5 +1,7 @@
 //! Which rows of G are those of friction: tangential rows stand behind all normal ones, in the order of their contacts.
 
+use super::ContactJacobian;
+use crate::real::Real;
 use std::ops::Range;
 
 /// The tangential rows of the contacts of a run that have friction. Nothing is stored where none has.
@@ -82,6 +84,11 @@ impl Tangents {
     /// The contacts that have friction.
     pub(crate) fn contacts(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.friction.len()).filter(|&contact| !self.of(contact).is_empty())
+    }
+
+    /// Whether a contact acts on any of the dofs given (ascending), by its gap or by its friction.
+    pub(crate) fn act_on<T: Real>(&self, g: &ContactJacobian<T>, contact: usize, dofs: &[usize]) -> bool {
+        !dofs.is_empty() && std::iter::once(contact).chain(self.of(contact)).any(|row| g.acts_on(row, dofs))
     }
 
     /// The contact that a row belongs to: that of a gap is its own.

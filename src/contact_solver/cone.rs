@@ -104,6 +104,11 @@ fn slip_direction<T: Real>(
     [bound, change]: [&dyn Fn([T; 2]) -> T; 2],
 ) -> [T; 2] {
     let (two, size) = (T::of(2.0), (schur[0][0] + schur[1][1]).abs());
+    if size == T::zero() {
+        // Nothing that the friction does changes the slip (that of dofs without mass does not): it is against it.
+        let length = norm(c);
+        return c.map(|c| -c / length);
+    }
     let (mut low, mut high) = (T::zero(), T::infinity());
     // The slip S g + c of the guess g is −γ g for the solution.
     let along = |k: usize| guess[k] * (schur[k][0] * guess[0] + schur[k][1] * guess[1] + c[k]);
@@ -130,7 +135,7 @@ fn slip_direction<T: Real>(
         } else if high.is_finite() {
             low + (high - low) / two
         } else {
-            two * two * low.max(if size > T::zero() { size } else { T::one() })
+            two * two * low.max(size)
         };
         let moved = (next - gamma).abs();
         gamma = next;

@@ -5,6 +5,7 @@ use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
+use std::ops::Range;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), begun from sweeps over
 /// the blocks, and from more of them where it does not end. On redundant rows neither may end: then the problem is
@@ -127,14 +128,29 @@ impl<T: Real> ConeNewton<T> {
         }
         if solved {
             multipliers.copy_from_slice(&tried);
-            // What is held without a force may be pulled by rounding: it is open then, if that does as well.
+            // What is held without a force may be pulled by rounding: it is open then, if that does as well. (All that
+            // are pulled, or else those of them for which it does.)
+            let pulled = |multipliers: &[T], rows: &Range<usize>, set: AdmissibleSet| {
+                !set.is_bilateral() && multipliers[rows.start] < T::zero()
+            };
             for (rows, set) in problem.blocks() {
-                if set.friction().is_some() && !set.is_bilateral() && tried[rows.start] < T::zero() {
+                if pulled(&tried, &rows, set) {
                     tried[rows].fill(T::zero());
                 }
             }
             if acceptance.accepts(problem, &tried) {
                 multipliers.copy_from_slice(&tried);
+            } else {
+                for (rows, set) in problem.blocks() {
+                    if pulled(multipliers, &rows, set) {
+                        let kept = std::array::from_fn(|k| multipliers[(rows.start + k).min(rows.end - 1)]);
+                        multipliers[rows.clone()].fill(T::zero());
+                        if !acceptance.accepts(problem, multipliers) {
+                            let kept: [T; 3] = kept;
+                            multipliers[rows.clone()].copy_from_slice(&kept[..rows.len()]);
+                        }
+                    }
+                }
             }
         }
         self.tried = tried;

@@ -51,6 +51,36 @@ pub(crate) struct Buffers<T> {
     pub(super) before: Vec<T>,
     /// Contacts on dofs without mass that close or open.
     pub(crate) switching: Box<Switching<T>>,
+    /// Contacts that get energy together.
+    pub(super) given: Given<T>,
+}
+
+/// Rows that get energy together, and the impulses that give it.
+#[derive(Debug, Default)]
+pub(super) struct Given<T> {
+    pub(super) rows: Vec<usize>,
+    pub(super) energies: Vec<T>,
+    pub(super) impulses: Vec<T>,
+    /// Those of a group that S couples.
+    pub(super) group: Vec<usize>,
+}
+
+impl<T: Real> Given<T> {
+    fn make_room(&mut self, rows: usize) {
+        for list in [&mut self.rows, &mut self.group] {
+            list.reserve(rows.saturating_sub(list.len()));
+        }
+        for values in [&mut self.energies, &mut self.impulses] {
+            values.reserve(rows.saturating_sub(values.len()));
+        }
+    }
+
+    /// Forgets all rows.
+    pub(super) fn clear(&mut self) {
+        self.rows.clear();
+        self.energies.clear();
+        self.impulses.clear();
+    }
 }
 
 impl<T: Real> Buffers<T> {
@@ -58,6 +88,8 @@ impl<T: Real> Buffers<T> {
     /// `switching` dofs by contacts without mass, if these are corrected.
     pub(crate) fn new(rows: usize, damped: usize, switching: Option<usize>) -> Self {
         let reals = |n| Vec::with_capacity(n);
+        let mut given = Given { rows: Vec::new(), energies: Vec::new(), impulses: Vec::new(), group: Vec::new() };
+        given.make_room(rows);
         Self {
             closed: Vec::with_capacity(rows),
             engaged: Vec::with_capacity(rows),
@@ -82,6 +114,7 @@ impl<T: Real> Buffers<T> {
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
             switching: Box::new(Switching::new(rows, switching)),
+            given,
         }
     }
 
@@ -90,6 +123,7 @@ impl<T: Real> Buffers<T> {
         self.rates.resize(rows, GapRates::default());
         self.gaps.resize(rows, T::zero());
         self.switching.make_room(rows);
+        self.given.make_room(rows);
         let Self {
             closed,
             engaged,

@@ -277,7 +277,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// ```text
     /// a ← a − M⁻¹ C δv               by schemes that read no a: the balance holds at the corrected state
-    /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others: it holds to order h
+    /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others, and where dofs without mass are damped: it holds to order h
     /// ```
     ///
     /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of
@@ -369,7 +369,8 @@ impl<T: Real> Correction<'_, T> {
     fn accelerate_by_damping(&mut self) -> Result<()> {
         let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
         let change = &mut buffers.damping;
-        if !scheme.read.iter().any(|[.., a]| *a) {
+        let reaches = massless.iter().all(|&dof| change[dof] == T::zero());
+        if reaches && !scheme.read.iter().any(|[.., a]| *a) {
             // No step starts from a.
             projection.apply_inverse(change)?;
             T::axpy(-T::one(), change, &mut new.a);

@@ -1,5 +1,6 @@
 //! What velocities become where a contact opens.
 
+use super::buffers::Given;
 use super::{Correction, Corrector, Edits};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
@@ -17,7 +18,8 @@ use crate::real::Real;
 /// ```
 ///
 /// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also
-/// the velocity that the exact solution jumps to. Accelerations need no correction: those of the first open step hold
+/// the velocity that the exact solution jumps to. Contacts that open in the same step and move the same nodes get these
+/// impulses times one factor, by which their energies together are what they took together. Accelerations need no correction: those of the first open step hold
 /// no contact force. Linear momentum is conserved. ⟦v⟧ and what was taken are relative, so that a velocity common to
 /// all changes nothing. Kinetic energy never exceeds what it was before the impact by more than the scheme makes of it,
 /// and without numerical damping the run keeps what is given back (`docs/theory.md`, section 16).
@@ -48,18 +50,30 @@ impl<T: Real> Corrector<T> for Release {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        for i in 0..step.released().len() {
-            let row = step.released()[i];
-            let taken = step.contacts().dissipated()[row];
-            if taken > T::zero() && !step.opens_by_rounding(row, taken)? {
-                let impulse = step.exchange_energy(row, taken)?;
-                if impulse != T::zero() {
-                    step.move_past(row, impulse)?;
-                }
-            }
-        }
-        Ok(())
+        // (All from the same velocities: contacts that open together have no order.)
+        let mut given = std::mem::take(&mut step.buffers.given);
+        given.clear();
+        let result = give_back(step, &mut given);
+        step.buffers.given = given;
+        result
     }
+}
+
+/// Gives back at all contacts that open what each of them took.
+fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
+    for i in 0..step.released().len() {
+        let row = step.released()[i];
+        let taken = step.contacts().dissipated()[row];
+        if taken > T::zero() && !step.opens_by_rounding(row, taken)? {
+            given.rows.push(row);
+            given.energies.push(taken);
+        }
+    }
+    step.exchange_energies(given)?;
+    for (&row, &impulse) in given.rows.iter().zip(&given.impulses).filter(|(_, impulse)| **impulse != T::zero()) {
+        step.move_past(row, impulse)?;
+    }
+    Ok(())
 }
 
 /// Impact and release conditions from waves in the contact elements (Hughes, Taylor, Sackman, Curnier, Kanoknukulchai,

@@ -72,8 +72,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
-            // Compliant contacts, and those on dofs without mass, leave no jump to correct.
-            let has_mass = massless.is_empty() || !g.acts_on(row, massless);
+            // Compliant contacts, and those on dofs without mass, leave no jump to correct. (Impulses do not reach such
+            // dofs: friction there would be taken from one side alone.)
+            let is_static = !massless.is_empty() && g.acts_on(row, massless);
+            let has_mass = !is_static && !constraints.tangents().act_on(g, row, massless);
             if law.leaves_jumps() && has_mass {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),
@@ -84,7 +86,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     buffers.released.push(row);
                 }
             }
-            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && !has_mass;
+            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && is_static;
             if is_balanced {
                 buffers.switching.note(row, trial);
             }

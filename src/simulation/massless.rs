@@ -111,7 +111,7 @@ impl<T: Real> Columns<T> {
     }
 
     /// The couplings to other dofs alone.
-    fn without(&self, dofs: &[usize]) -> Self {
+    pub(super) fn without(&self, dofs: &[usize]) -> Self {
         let mut others = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
         for j in 0..dofs.len() {
             for (row, value) in self.column(j).filter(|(row, _)| dofs.binary_search(row).is_err()) {

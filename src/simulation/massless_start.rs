@@ -175,6 +175,50 @@ pub(super) fn balance_rates<T: Real>(system: &mut dyn System<T>, dofs: &[usize],
     Ok(())
 }
 
+/// Replaces forces on dofs without mass, which nothing balances, by those on the dofs with mass that they go on to, as
+/// these dofs would move to balance them: at rates by damping, or by stiffness. Says whether there are any beyond what
+/// rounding leaves of a balance; not where neither part is symmetric positive definite.
+pub(super) fn pass_on<T: Real>(
+    system: &mut dyn System<T>,
+    dofs: &[usize],
+    at: &Motion<T>,
+    forces: &mut [T],
+) -> Result<bool> {
+    if dofs.iter().all(|&dof| forces[dof] == T::zero()) || system.pattern().row_idx().is_empty() {
+        return Ok(false);
+    }
+    let prescribed = system.prescribed().to_vec();
+    for by_damping in [true, false] {
+        if by_damping && !is_damped(system, dofs)? {
+            continue;
+        }
+        let (columns, known) = match by_damping {
+            true => (Columns::of_damping(system, dofs, at)?, &at.v),
+            false => (Columns::of(system, dofs, at)?, &at.u),
+        };
+        let mut factor = match Embedded::factorized(&columns, dofs, &[]) {
+            Ok(factor) => factor,
+            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => continue,
+            Err(other) => return Err(other),
+        };
+        let mut moved = forces.to_vec();
+        factor.solve(&mut moved)?;
+        let size = dofs.iter().fold(T::zero(), |size, &dof| size.max(moved[dof].abs()));
+        if !size.is_finite() || size <= T::of(1e4) * T::epsilon() * T::largest(known) {
+            return Ok(false);
+        }
+        let others = columns.without(dofs);
+        for (j, &dof) in dofs.iter().enumerate() {
+            forces[dof] = T::zero();
+            for (row, k) in others.column(j).filter(|(row, _)| prescribed.binary_search(row).is_err()) {
+                forces[row] -= k * moved[dof];
+            }
+        }
+        return Ok(true);
+    }
+    Ok(false)
+}
+
 /// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns
 /// the largest tolerance of a gap, as a displacement.
 fn press_start<T: Real>(

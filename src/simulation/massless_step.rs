@@ -93,14 +93,24 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Finds the rows that act on dofs without mass, and refuses laws there that depend on more than the gap.
+    /// Finds the rows that act on dofs without mass, and refuses laws there that depend on more than the gap, and
+    /// friction there of contacts whose normal force is found after these dofs, with the others.
     fn sort_rows(&self, block: &mut MasslessBlock<T>, on_massless: &mut [bool]) -> Result<()> {
         if block.sorted == self.constraints.version() {
             return Ok(());
         }
         for (row, on_massless) in on_massless.iter_mut().enumerate().take(self.constraints.len()) {
             *on_massless = self.g.acts_on(row, &block.dofs);
-            let law = self.constraints.law(row);
+            let (law, tangents) = (self.constraints.law(row), self.constraints.tangents());
+            let rubs = tangents.friction(row) > 0.0 && tangents.of(row).any(|k| self.g.acts_on(k, &block.dofs));
+            if rubs && !*on_massless {
+                return Err(Error::Incompatible {
+                    part: format!("friction of contact {} on dofs without mass", self.constraints.ids[row]),
+                    reason: "its normal force acts on dofs with mass, and explicit stages find that after the balance \
+                             of those without; choose an implicit scheme, or take the mass from the normal direction \
+                             of a contact, or from all",
+                });
+            }
             if *on_massless && (law.rebounds() || law.inertia() > 0.0) {
                 return Err(Error::Incompatible {
                     part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),

@@ -165,8 +165,10 @@ impl<T: Real> Simulation<'_, T> {
             velocity[dof] = newest.v[dof];
         }
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        let rigid: Vec<usize> =
-            closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate()).collect();
+        let tangents = constraints.tangents();
+        let corrected =
+            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
+        let rigid: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
         if !rigid.is_empty() {
             let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
             projection.close_rows(g, &rigid, |row| no_response(newest.t, constraints.ids[row]))?;
@@ -187,7 +189,7 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Past states 1, 2, … known − 1 at the spacing h.
     fn resampled(&mut self, h: f64) -> Result<Vec<Motion<T>>> {
-        let Self { system, constraints, g, state, history, scheme, together, linear_solver, .. } = self;
+        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
         let known = history.known;
         let newest = &state.motion;
         let nodes = computed(state, history);
@@ -204,9 +206,12 @@ impl<T: Real> Simulation<'_, T> {
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        // Rows whose law reads the gap where a stage starts may hold it anywhere.
-        let rigid = closed.map(|(_, row)| row).filter(|&row| !constraints.law(row).may_penetrate());
-        let closed: Vec<usize> = rigid.collect();
+        // Rows whose law reads the gap where a stage starts may hold it anywhere; those on dofs without mass have
+        // nothing to correct, and would move the other side alone.
+        let tangents = constraints.tangents();
+        let corrected =
+            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
+        let closed: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
         if history.smooth < known && !closed.is_empty() {
             let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
             projection.close_rows(g, &closed, |row| no_response(newest.t, constraints.ids[row]))?;

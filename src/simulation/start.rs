@@ -2,12 +2,12 @@
 
 use super::constraints::Constraints;
 use super::finite::check_state;
-use super::massless_start::{Balanced, StartAdjustment, balance_rates, balance_start};
+use super::massless_start::{Balanced, StartAdjustment, balance_rates, balance_start, pass_on};
 use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
 use super::scheme::Scheme;
-use super::start_problem::{StartProblem, sliding};
+use super::start_problem::{StartProblem, rubbed, sliding};
 use super::supports::put_initial_supports;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
@@ -110,7 +110,8 @@ impl<T: Real> Start<'_, T> {
         if self.is_smooth {
             for (row, &force) in contacts.lambda.iter().enumerate() {
                 let owner = constraints.tangents().owner(row);
-                if constraints.law(owner).leaves_jumps() && !g.acts_on(owner, self.massless) {
+                let is_massless = constraints.tangents().act_on(g, owner, self.massless);
+                if constraints.law(owner).leaves_jumps() && !is_massless {
                     projection.push(g, (&[row], &[force]), -T::one(), &mut motion.a)?;
                 }
             }
@@ -228,7 +229,7 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        rub_springs(constraints, g, &mut **contact_solver, projection, &mut motion, &mut contacts)?;
+        rub_springs(constraints, g, &mut **contact_solver, (&mut *projection, massless), &mut motion, &mut contacts)?;
         if !massless.is_empty() {
             // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
             let mut forces = vec![T::zero(); dofs];
@@ -241,7 +242,7 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| g.acts_on(row, massless));
             problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
-            problem.solve(t, constraints, g, &mut unit, &mut **contact_solver)?;
+            problem.solve(t, constraints, g, (&mut unit, &[]), &mut **contact_solver)?;
             problem.press(g, projection, &mut motion, &mut contacts)?;
         }
         let mut problem = match looks_ahead {
@@ -254,8 +255,24 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
-        problem.solve(t, constraints, g, projection, &mut **contact_solver)?;
+        problem.solve(t, constraints, g, (&mut *projection, massless), &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts)?;
+        if unbalanced.iter().any(|&force| force != T::zero()) {
+            // What contact has not balanced either goes on to the dofs with mass: it comes from inside of the bodies.
+            let mut forces = vec![T::zero(); dofs];
+            for (&dof, &force) in massless.iter().zip(&unbalanced) {
+                forces[dof] = force;
+            }
+            for row in 0..g.rows() {
+                for (dof, weight) in g.row(row).filter(|(dof, _)| massless.binary_search(dof).is_ok()) {
+                    forces[dof] += weight * contacts.lambda[row];
+                }
+            }
+            if pass_on(&mut **system, massless, &motion, &mut forces)? {
+                projection.apply_inverse(&mut forces)?;
+                T::axpy(T::one(), &forces, &mut motion.a);
+            }
+        }
         Ok(Found { motion, contacts, adjustment })
     }
 }
@@ -279,7 +296,7 @@ fn rub_springs<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
     solver: &mut dyn ContactSolver<T>,
-    projection: &mut JumpProjection<T>,
+    (projection, massless): (&mut JumpProjection<T>, &[usize]),
     motion: &mut Motion<T>,
     contacts: &mut ContactState<T>,
 ) -> Result<()> {
@@ -288,6 +305,9 @@ fn rub_springs<T: Real>(
     let sliding = sliding(constraints, (g, &slips), motion);
     let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
     for row in tangents.contacts().filter(|&row| constraints.law(row).is_spring() && contacts.closed[row]) {
+        if rubbed(tangents, g, massless, row).is_empty() {
+            continue;
+        }
         let friction = T::of(tangents.friction(row));
         let direction = sliding.iter().find(|(other, _)| *other == row).map(|(_, along)| along.map(|f| friction * f));
         let block = Block::new(row, tangents.of(row).len(), constraints.set(row));

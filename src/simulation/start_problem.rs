@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::supports::finite_supports;
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
+use crate::contact::{ContactJacobian, ContactLaw, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
 use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, rounding, slides};
 use crate::error::Result;
@@ -10,6 +10,7 @@ use crate::real::Real;
 use crate::state::{ContactState, Motion};
 use crate::system::System;
 use crate::tableau::ContactLevel;
+use std::ops::Range;
 
 /// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0. q is the acceleration of the gap without contact, or, for a
 /// scheme that imposes contact ahead of the state, the violation of that condition as an acceleration.
@@ -224,12 +225,13 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
+    /// Solves. Friction along dofs that are `unreached` by the projection is left out.
     pub(super) fn solve(
         &mut self,
         t: f64,
         constraints: &Constraints<'_, T>,
         g: &ContactJacobian<T>,
-        projection: &mut JumpProjection<T>,
+        (projection, unreached): (&mut JumpProjection<T>, &[usize]),
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         self.solved.clear();
@@ -237,7 +239,7 @@ impl<T: Real> StartProblem<T> {
             match (self.rows.is_empty(), constraints.tangents().is_empty()) {
                 (true, _) => {}
                 (_, true) => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
-                (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection), solver)?,
+                (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection, unreached), solver)?,
             }
             let Self { rows, waiting, offset, tolerance, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];
@@ -286,17 +288,19 @@ impl<T: Real> StartProblem<T> {
         &mut self,
         t: f64,
         constraints: &Constraints<'_, T>,
-        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        (g, projection, unreached): (&ContactJacobian<T>, &mut JumpProjection<T>, &[usize]),
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         let Self { rows, offset, tolerance, compliance, sliding, solved, lambda, .. } = self;
         let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
         for &row in rows.iter() {
-            let direction = sliding.iter().find(|(other, _)| *other == row).map(|(_, direction)| *direction);
-            let direction = direction.map(|along| along.map(|f| T::of(tangents.friction(row)) * f));
-            let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
+            let own = rubbed(tangents, g, unreached, row);
+            let slides = sliding.iter().find(|(other, _)| *other == row && !own.is_empty());
+            let direction = slides.map(|(_, along)| along.map(|f| T::of(tangents.friction(row)) * f));
+            let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
+            let block = Block::new(row, own.len(), set);
             problem.push(&Block { direction, compliance: compliance[row], ..block });
-            for row in std::iter::once(row).chain(tangents.of(row)) {
+            for row in std::iter::once(row).chain(own) {
                 problem.demand(row, offset[row], tolerance[row], T::zero());
             }
         }
@@ -306,6 +310,19 @@ impl<T: Real> StartProblem<T> {
         *lambda = problem.totals;
         Ok(())
     }
+}
+
+/// The tangential rows of a contact along which forces reach the bodies: none if they act on dofs without mass, which
+/// respond to no impulse, for what the body on one side got the other would not lose.
+pub(super) fn rubbed<T: Real>(
+    tangents: &Tangents,
+    g: &ContactJacobian<T>,
+    unreached: &[usize],
+    contact: usize,
+) -> Range<usize> {
+    let own = tangents.of(contact);
+    let reaches = unreached.is_empty() || !own.clone().any(|row| g.acts_on(row, unreached));
+    if reaches { own } else { 0..0 }
 }
 
 /// The contacts with friction that slide at the start, with the direction of their friction: against the slip.

@@ -128,7 +128,11 @@ fn blocks_alone_are_the_same_in_any_unit() {
     let mut random = Congruential(12);
     let [compliance, length] = [40, 20].map(|exponent| 2.0_f64.powi(exponent));
     for trial in 0..1000 {
-        let w = semidefinite(&mut random, 3, 3, 0.05);
+        let mut w = semidefinite(&mut random, 3, 3, 0.05);
+        if trial % 2 == 0 {
+            // Friction moves nothing.
+            w[1..].fill(0.0);
+        }
         let q = random.vector(3, 1.0);
         let sets = [cone(3, 0.6)];
         let found = solve(&mut GaussSeidel::default(), (&w, &q, &sets)).unwrap();
@@ -265,6 +269,63 @@ fn directions_without_compliance() {
             }
         }
     }
+}
+
+/// What is rounding of a slip is none of a gap: a contact that is violated beyond the rounding of its gap is pressed,
+/// though its slip may be all rounding.
+#[test]
+fn the_rounding_of_a_slip_does_not_excuse_a_gap() {
+    let (w, q, tolerance) = ([0.0726, -0.0012, -0.0012, 0.144], [-7e-21, -9e-19], [2e-34, 7e-17]);
+    for friction in [0.0, 0.3, 1e6] {
+        let sets = [AdmissibleSet::Cone2 { friction }];
+        for solver in [&mut ActiveSet::default() as &mut dyn ContactSolver<f64>, &mut GaussSeidel::default()] {
+            let mut found = [0.0; 2];
+            solver.solve(&ContactProblem::new(&w, &q, &sets, &tolerance).unwrap(), &mut found).unwrap();
+            let gap = q[0] + w[0] * found[0] + w[1] * found[1];
+            assert!(found[0] > 0.0 && gap.abs() < 1e-12 * 7e-21, "{friction} {solver:?}: {found:?}, gap {gap:e}");
+        }
+    }
+}
+
+/// In single precision, with rows that depend on one another beside friction without bound: Newton's method may end with
+/// rows that pull by what is rounding.
+#[test]
+fn no_row_pulls_by_rounding() {
+    let w = [
+        0.246_016_13_f32,
+        0.0,
+        1.075_345,
+        0.057_296_775,
+        -0.058_668_237, //
+        0.0,
+        0.246_016_14,
+        8.940_697e-8,
+        0.058_668_237,
+        0.057_296_775, //
+        1.075_345,
+        5.960_464_5e-8,
+        4.700_370_3,
+        0.250_446_2,
+        -0.256_440_88, //
+        0.057_296_775,
+        0.058_668_237,
+        0.250_446_2,
+        0.246_016_14,
+        0.0, //
+        -0.058_668_237,
+        0.057_296_775,
+        -0.256_440_88,
+        0.0,
+        0.246_016_14,
+    ];
+    let q = [5.659_221_6e-5, -0.002_006_731_5, 0.000_247_376_3, -0.000_352_111_8, -0.002_444_287];
+    let tolerance = [3.626_326_4e-6, 3.086_443_5e-8, 1.585_079_7e-5, 1.978_123e-6, 5.229_096e-8];
+    let sets = [cone(2, 1e6), AdmissibleSet::NonNegative, cone(2, 2.0)];
+    let mut found = [0.0; 5];
+    let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();
+    ActiveSet::default().solve(&problem, &mut found).unwrap();
+    assert!([0, 2, 3].iter().all(|&normal| found[normal] >= 0.0), "{found:?}");
+    assert!(problem.residual(&found).1 < 1e-4, "{found:?}");
 }
 
 /// Sweeps take W for symmetric until its result is refused: by much and by little, in all rows and in one entry.

@@ -131,6 +131,36 @@ fn release_does_not_depend_on_a_velocity_common_to_all() {
     }
 }
 
+/// A mass that hits another one as this hits a wall: both contacts open together, and share a mass. Whichever is named
+/// first, the bodies get the same back.
+#[test]
+fn contacts_that_open_together_have_no_order() {
+    let mut together = 0;
+    for (make, _) in schemes() {
+        let end = |swapped: bool| {
+            let k = matrix(2, [(0, 0, 4.6), (1, 1, 4.6)]);
+            let rows = [(vec![(0, -1.0), (1, 1.0)], 0.0), (vec![(0, 1.0)], 2e-7)];
+            let named = if swapped { [&rows[1], &rows[0]] } else { [&rows[0], &rows[1]] };
+            let contact = named.iter().fold(LinearRows::new(), |contact, (row, gap)| contact.unilateral(row, *gap));
+            let system = LinearSystem::lumped(vec![1.0, 0.4], k).unwrap();
+            let builder = Simulation::builder(system, make(), 0.05).velocity(vec![0.0, -1e-5]).constraint(contact);
+            let mut run = corrected(builder, With::Release).build().unwrap();
+            let mut both = false;
+            for _ in 0..24 {
+                let before = run.state().contacts().closed().to_vec();
+                run.step().unwrap();
+                both |= before == [true; 2] && run.state().contacts().closed() == [false; 2];
+            }
+            (run.state().velocity().to_vec(), both)
+        };
+        let ([(one, both), (other, _)], name) = ([end(false), end(true)], make().name());
+        let same = one.iter().zip(&other).all(|(x, y)| (x - y).abs() < 1e-9 * 1e-5);
+        assert!(same, "{name}: {one:?} {other:?}");
+        together += usize::from(both);
+    }
+    assert!(together > 10, "they open together in {together} runs");
+}
+
 /// Two masses that have met move on together, without any force between them: whichever way their gap is rounded, what
 /// the impact took is not given back.
 #[test]

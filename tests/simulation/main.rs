@@ -8,6 +8,7 @@ mod finite;
 mod limits;
 mod many_contacts;
 mod massless;
+mod massless_momentum;
 mod messages;
 mod newton;
 mod properties;

@@ -2,20 +2,13 @@
 
 use contact_dynamics_scenes::random_scenes::{KINDS, Recipe, shrunk};
 
-/// Known failures (docs/reliability.md), which are noticed once they are cured: momentum where corrections move what
-/// damps a dof without mass.
-const KNOWN: [u64; 1] = [2130];
-
 #[test]
 fn scenes_by_chance_hold_what_must_hold() {
     let (mut built, mut closed, mut compared) = (0, 0, 0);
     for seed in 0..3000 {
         let recipe = Recipe::of_seed(seed);
         let verdict = recipe.examine();
-        let finding = verdict.finding;
-        if KNOWN.contains(&seed) {
-            assert!(finding.is_some_and(|finding| finding.what == "momentum changes"), "{seed} is cured");
-        } else if let Some(finding) = finding {
+        if let Some(finding) = verdict.finding {
             panic!("`--example random_scenes -- --scene {seed}`: {finding}\n{}", recipe.summary());
         }
         built += usize::from(verdict.built);

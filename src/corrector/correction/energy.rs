@@ -1,6 +1,7 @@
 //! Impulses that change the kinetic energy by a given amount.
 
 use super::{Correction, rounding};
+use crate::corrector::buffers::Given;
 use crate::error::Result;
 use crate::real::Real;
 
@@ -13,6 +14,15 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn exchange_energy(&mut self, row: usize, energy: T) -> Result<T> {
+        let impulse = self.impulse_of(row, energy)?;
+        if impulse != T::zero() {
+            self.apply(&[row], &[impulse])?;
+        }
+        Ok(impulse)
+    }
+
+    /// The impulse of [`exchange_energy`](Self::exchange_energy).
+    fn impulse_of(&mut self, row: usize, energy: T) -> Result<T> {
         let (s, rate) = (self.compliance(row)?, self.rate(row)?);
         // The gap rate is a small difference of larger numbers; this is their rounding.
         let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
@@ -21,12 +31,62 @@ impl<T: Real> Correction<'_, T> {
         }
         // ½ S j² + j rate = energy, without cancellation; beyond what the rate holds, all of it.
         let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
-        let impulse = match rate > T::zero() {
+        Ok(match rate > T::zero() {
             true if root > T::zero() => T::of(2.0) * energy / (root + rate),
             _ => (root - rate) / s,
-        };
-        self.apply(&[row], &[impulse])?;
-        Ok(impulse)
+        })
+    }
+
+    /// Applies impulses that give energies (positive) to the bodies at several rows, all found from the same
+    /// velocities. Where they act on each other one factor makes up for that: together they change the energy by the
+    /// sum.
+    pub(in crate::corrector) fn exchange_energies(&mut self, given: &mut Given<T>) -> Result<()> {
+        let Given { rows, energies, impulses, group } = given;
+        for (&row, &energy) in rows.iter().zip(&*energies) {
+            impulses.push(self.impulse_of(row, energy)?);
+        }
+        // (One row alone leaves the projection its factor.)
+        let mut groups = 0;
+        if rows.len() > 1 {
+            self.projection.sort(self.g, rows);
+            groups = self.projection.groups().len();
+        }
+        for number in 0..groups {
+            let positions = self.projection.groups().group(number);
+            if positions.len() < 2 {
+                continue;
+            }
+            let coupled = |place: &usize| impulses[*place] != T::zero();
+            group.clear();
+            group.extend(positions.iter().copied().filter(coupled));
+            let factor = self.factor_of(group, rows, [energies, impulses])?;
+            for &place in &*group {
+                impulses[place] *= factor;
+            }
+        }
+        self.apply(rows, impulses)
+    }
+
+    /// The factor of the impulses at some places by which they give the sum of their energies.
+    fn factor_of(&mut self, places: &[usize], rows: &[usize], [energies, impulses]: [&[T]; 2]) -> Result<T> {
+        let (mut energy, mut first, mut second) = (T::zero(), T::zero(), T::zero());
+        for &place in places {
+            let (row, impulse) = (rows[place], impulses[place]);
+            let rate = self.g.product(row, &self.new.v) + self.buffers.rates[row].rate;
+            energy += energies[place];
+            first += impulse * rate;
+        }
+        for (i, &place) in places.iter().enumerate() {
+            for &other in &places[..=i] {
+                self.projection.assemble(self.g, &[rows[place], rows[other]], &mut self.buffers.s)?;
+                let twice = if place == other { T::one() } else { T::of(2.0) };
+                second += twice * impulses[place] * self.buffers.s[1] * impulses[other];
+            }
+        }
+        // ½ second x² + first x = energy.
+        let root = (first * first + T::of(2.0) * second * energy).max(T::zero()).sqrt();
+        let factor = if first > T::zero() { T::of(2.0) * energy / (root + first) } else { (root - first) / second };
+        Ok(if factor.is_finite() { factor } else { T::one() })
     }
 
     /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force

@@ -4,6 +4,9 @@
 use super::recipe::Rubber;
 use contact_dynamics::{Error, Real, Result};
 
+/// How the words of an error end where there is no number for what is asked.
+pub(super) const BEYOND: &str = "beyond all numbers";
+
 type Tensor<T> = [[T; 2]; 2];
 
 /// A triangle in the units of a run.
@@ -68,7 +71,7 @@ impl<T: Real> Triangle<T> {
             (true, _) if det > T::zero() => return Ok(h),
             (true, _) => format!("det F = {:e}", det.value()),
             // (A diverging iteration may overflow here; what is handed in must be numbers all the same.)
-            (false, None) => "det F is beyond all numbers".into(),
+            (false, None) => format!("det F is {BEYOND}"),
             (false, Some(u)) => format!("a displacement is {u}"),
         };
         Err(Error::Inadmissible { callback, source: words.into() })

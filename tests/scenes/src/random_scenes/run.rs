@@ -2,6 +2,7 @@
 
 use super::apart::{by_files, on_threads};
 use super::recipe::{Precision, Recipe, Twin};
+use super::rubber;
 use super::twins::{self, Trace};
 use super::watch::Watch;
 use contact_dynamics::{Error, Real, Result, Simulation};
@@ -124,7 +125,7 @@ impl Recipe {
         };
         verdict.built = true;
         let mut watch = Watch::new(self, &mut run.run);
-        traces.push(Trace::of(self, run.run.state()));
+        traces.push(Trace::of(self, &run.run));
         while run.step < self.steps {
             if let Err(error) = run.change() {
                 verdict.refused = Some(named(&error));
@@ -133,7 +134,7 @@ impl Recipe {
             let (before, history) = (run.run.state().clone(), run.run.history().clone());
             match run.advance() {
                 Ok(()) => {
-                    traces.push(Trace::of(self, run.run.state()));
+                    traces.push(Trace::of(self, &run.run));
                     verdict.finding = watch.look(&mut run, verdict);
                     verdict.steps += 1;
                     verdict.closed += usize::from(run.run.state().contacts().closed().iter().any(|closed| *closed));
@@ -161,6 +162,10 @@ impl Recipe {
 pub(super) fn named(error: &Error) -> (String, String) {
     match error {
         Error::StepRefused { source, .. } => named(source),
+        // (Whether displacements or what is made of them are beyond all numbers first depends on their unit.)
+        Error::Inadmissible { source, .. } if source.to_string().ends_with(rubber::BEYOND) => {
+            ("StepNotFinite".into(), error.to_string())
+        }
         _ => {
             let name = format!("{error:?}");
             (name.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().into(), error.to_string())
