@@ -157,9 +157,6 @@ impl<T: Real> ContactState<T> {
                 for (i, j) in std::iter::once((i, j)).chain(tangential) {
                     self.lambda[i] = old.lambda[j];
                     self.lambda_raw[i] = old.lambda_raw[j];
-                    self.impulse[i] = old.impulse[j];
-                    self.lambda_v[i] = old.lambda_v[j];
-                    self.lambda_a[i] = old.lambda_a[j];
                 }
                 if let (Some(now), Some(&before)) = (self.sliding.get_mut(i), old.sliding.get(j)) {
                     *now = before;
