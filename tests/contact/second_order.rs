@@ -270,6 +270,26 @@ fn pressures_are_those_of_the_forces_of_second_order() {
     }
 }
 
+/// Where linear facets follow upon such of second order: L/6, 4L/6, L/6 of a pressure go to the nodes of one of these,
+/// and half of it to either node of the others.
+#[test]
+fn a_pressure_is_the_same_on_facets_of_both_orders() {
+    let nodes = [[0.0_f64, 0.0], [0.6, 0.0], [1.2, 0.0], [1.7, 0.0], [2.0, 0.0]];
+    let pressure = 0.7_f64;
+    // Outward is down: facets run to the right.
+    let quadratic = Facet::of_quadratic_segment([0, 2, 1]);
+    let surface = Surface::new(&nodes, quadratic.into_iter().chain([[2, 3], [3, 4]].map(Facet::from))).unwrap();
+    let up = [1.2 / 6.0, 1.2 * 4.0 / 6.0, 1.2 / 6.0 + 0.25, 0.25 + 0.15, 0.15].map(|length| [0.0, pressure * length]);
+    let normals = surface.normals(&nodes).unwrap();
+    assert!(normals.iter().all(|[x, y]| x.abs() < 1e-15 && (y + 1.0).abs() < 1e-15), "{normals:?}");
+    for found in surface.pressures(&nodes, &up).unwrap() {
+        assert!((found / pressure - 1.0).abs() < 1e-13, "{found}");
+    }
+    for [x, y] in surface.shears(&nodes, &up).unwrap() {
+        assert!(x.abs() + y.abs() < 1e-13);
+    }
+}
+
 #[test]
 fn ties_of_curved_surfaces_turn_freely() {
     let dome = |[x, y, z]: [f64; 3]| [x, y, z + 0.2 * (x * (1.0 - x) + y * y) * z * (2.0 - z)];
