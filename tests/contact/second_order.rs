@@ -270,6 +270,38 @@ fn pressures_are_those_of_the_forces_of_second_order() {
     }
 }
 
+/// A slave whose three nodes are on the parabola 4 s x (1 − x), 0.1 above a line, and a line that is 0.1 above such a
+/// parabola, or below: the gaps are the means of what is between, with the linear functions of the nodes. (Normals of
+/// the parts lean by 2 s.)
+#[test]
+fn gaps_are_the_means_between_facets_of_both_orders() {
+    let s = 1e-4;
+    let gaps = |nodes: &[[f64; 2]], slave: Vec<Facet>, master: Vec<Facet>| {
+        let dofs: Vec<[usize; 2]> = (0..nodes.len()).map(|node| [2 * node, 2 * node + 1]).collect();
+        let mut contact = Mortar::<f64>::new(nodes, &dofs, slave, master).unwrap();
+        let still = vec![0.0; contact.dofs().len()];
+        contact.search(0.0, &still, &still, 0.0).unwrap();
+        let contacts = Contacts::of(&contact);
+        let mut gaps = vec![0.0; contacts.len()];
+        contact.gaps(0.0, &still, &mut gaps).unwrap();
+        (0..contacts.len()).map(|row| (contacts.name(row).0, gaps[row])).collect::<Vec<_>>()
+    };
+    // Facets of the upper body run to the right, those of the lower one to the left.
+    let nodes = [[0.0, 0.1], [0.5, 0.1 + s], [1.0, 0.1], [2.0, 0.0], [-1.0, 0.0]];
+    let found = gaps(&nodes, Facet::of_quadratic_segment([0, 2, 1]).into(), vec![Facet::from([3, 4])]);
+    assert_eq!(found.len(), 3);
+    for (node, gap) in found {
+        let mean = [s / 2.0, s * 5.0 / 6.0, s / 2.0][node];
+        assert!((gap - 0.1 - mean).abs() < 10.0 * s * s, "{node}: {gap}");
+    }
+    let nodes = [[0.0, 0.1], [1.0, 0.1], [1.0, 0.0], [0.5, -s], [0.0, 0.0]];
+    let found = gaps(&nodes, vec![Facet::from([0, 1])], Facet::of_quadratic_segment([2, 4, 3]).into());
+    assert_eq!(found.len(), 2);
+    for (node, gap) in found {
+        assert!((gap - 0.1 - s * 2.0 / 3.0).abs() < 10.0 * s * s, "{node}: {gap}");
+    }
+}
+
 /// Where linear facets follow upon such of second order: L/6, 4L/6, L/6 of a pressure go to the nodes of one of these,
 /// and half of it to either node of the others.
 #[test]
