@@ -373,7 +373,7 @@ fn a_step_into_the_other_surface_is_refused_and_mended() {
     assert!(up > -1e3, "{up}");
 }
 
-/// What is wrong with a step in which the upper body goes by a way, all rows having these flags at its start and its end.
+/// What is wrong with a step in which the upper body goes by a way, all rows with these flags at its start and its end.
 fn look(contact: &mut Mortar<f64>, stack: &Stack<2>, t: [f64; 2], way: [f64; 2], closed: [bool; 2]) -> Option<String> {
     let dofs = contact.dofs().to_vec();
     let (start, h) = (vec![0.0; dofs.len()], t[1] - t[0]);

@@ -551,8 +551,8 @@ fn obstacles_that_turn_too_far_in_a_step_are_refused_near_nodes() {
     assert!(matches!(far.inspect(&stride), Err(Error::PassedThrough { .. })));
 }
 
-/// A disc on a rod turns by 34 degrees in a step, while its center goes out and comes back, at a constant acceleration a:
-/// by a h²/8, which is 1 here. What it may meet on this way is looked at, whatever the unit of time.
+/// A disc turns by 34 degrees in a step, while its center goes out and comes back, at a constant acceleration a: by
+/// a h²/8, which is 1 here. What it may meet on this way is looked at, whatever the unit of time.
 #[test]
 fn ways_beside_bodies_that_turn_are_as_long_in_any_unit_of_time() {
     for h in [1e-2, 1.0, 1e2] {

@@ -63,7 +63,7 @@ fn a_bar_hangs_in_its_weight_on_a_wall_it_reaches_or_not() {
     }
 }
 
-/// A gap in another unit than displacements have: the same rest, by a force that is as much smaller as the gap is larger.
+/// A gap in another unit than displacements have: the same rest, by a force as much smaller as the gap is larger.
 #[test]
 fn rests_do_not_depend_on_the_unit_of_the_gap() {
     for unit in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
