@@ -101,10 +101,11 @@ fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> 
     }
 }
 
-/// Whether the direction in which a body comes presses on two normals so differently that the impact along one is not
-/// that along the other: the shares of its kinetic energy that a plastic impact takes differ by more than a tenth.
-pub(crate) fn press_differently(directions: [f64; 2]) -> bool {
-    (directions[0] * directions[0] - directions[1] * directions[1]).abs() > 0.1
+/// Whether a body that comes with these speeds along two normals presses on them so differently that the impact along
+/// one is not that along the other: the shares of its kinetic energy (`square` is that of its velocity) that a plastic
+/// impact takes differ by more than a tenth.
+pub(crate) fn press_differently(speeds: [f64; 2], square: f64) -> bool {
+    (speeds[0] * speeds[0] - speeds[1] * speeds[1]).abs() > 0.1 * square
 }
 
 /// Share of the way that must lead into a body for a contact to be missed if it comes out again: the cosine of the

@@ -67,8 +67,8 @@ const BEYOND: f64 = 0.25;
 /// What is close enough is found by boxes around the facets, as far as velocities take them. A node that slides over
 /// the rim of the master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet
 /// since the search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone
-/// into or through the other surface by more than a tenth of its way is refused ([`Error::PassedThrough`], which a
-/// smaller step mends). Geometry is computed in `f64` in every run.
+/// into or through the other surface by more than a tenth of its way, or half of the [reach](Self::reach), is refused
+/// ([`Error::PassedThrough`], which a smaller step mends). Geometry is computed in `f64` in every run.
 ///
 /// Facets that look toward each other through the material of both bodies do not meet, so that bodies beside each other
 /// may be thinner than the [reach](Self::reach): give the whole surfaces of thin bodies.
@@ -460,10 +460,8 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             let name = (self.slave.nodes()[place], 0);
             let mut contact = contacts.push_row(name, self.law, (&affine.jacobian, row));
             contact.magnitude(T::of(size)).position(spot.position.map(T::of)).normal(spot.normal.map(T::of));
-            if count > 0 {
-                contact.friction(self.friction);
-                (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
-            }
+            contact.friction(self.friction);
+            (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
         }
         if let Some(bonds) = &self.bonds {
             bonds.tie().contacts(contacts);

@@ -157,9 +157,6 @@ impl<T: Real> ContactState<T> {
                 for (i, j) in std::iter::once((i, j)).chain(tangential) {
                     self.lambda[i] = old.lambda[j];
                     self.lambda_raw[i] = old.lambda_raw[j];
-                    self.impulse[i] = old.impulse[j];
-                    self.lambda_v[i] = old.lambda_v[j];
-                    self.lambda_a[i] = old.lambda_a[j];
                 }
                 if let (Some(now), Some(&before)) = (self.sliding.get_mut(i), old.sliding.get(j)) {
                     *now = before;
@@ -262,5 +259,67 @@ impl<T: Real> ContactState<T> {
     /// [`WorkBalance`](crate::corrector::WorkBalance) still owes to the bodies, negative where they owe.
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contacts with these features, each with a tangent and a coefficient of its own.
+    fn named(features: &[usize], friction: f64) -> (Vec<ContactId>, Tangents) {
+        let ids = features.iter().map(|&feature| ContactId { constraint: 0, feature, candidate: 0 }).collect();
+        let mut tangents = Tangents::default();
+        tangents.begin(features.len());
+        features.iter().for_each(|_| tangents.push(friction, 1));
+        (ids, tangents)
+    }
+
+    /// A state whose entries tell their contact: ten times its feature, with the tangent one more.
+    fn filled(features: &[usize], friction: f64) -> ContactState<f64> {
+        let (ids, tangents) = named(features, friction);
+        let mut state = ContactState::with_capacity(0);
+        state.reset(&ids, &tangents);
+        let count = features.len();
+        for (k, &feature) in features.iter().enumerate() {
+            let value = 10.0 * feature as f64;
+            for values in [&mut state.lambda, &mut state.lambda_raw] {
+                (values[k], values[count + k]) = (value, value + 1.0);
+            }
+            (state.gap[k], state.dissipated[k], state.closed[k], state.sliding[k]) = (value, value, true, true);
+        }
+        state
+    }
+
+    fn entries(state: &ContactState<f64>) -> [&[f64]; 4] {
+        [&state.lambda, &state.lambda_raw, &state.gap, &state.dissipated]
+    }
+
+    #[test]
+    fn contacts_keep_what_they_had_and_new_ones_are_open() {
+        let old = filled(&[1, 4, 6], 0.2);
+        // (In memory that had others before.)
+        let mut state = filled(&[9, 8, 7], 0.2);
+        let (ids, tangents) = named(&[4, 5, 6], 0.3);
+        state.carry_over(&old, (&ids, Names(3)), &tangents);
+        let (rows, gaps) = ([40.0, 0.0, 60.0, 41.0, 0.0, 61.0], [40.0, 0.0, 60.0]);
+        assert_eq!(entries(&state), [&rows[..], &rows, &gaps, &gaps]);
+        assert_eq!(
+            (state.closed.as_slice(), state.sliding.as_slice()),
+            (&[true, false, true][..], &[true, false, true][..])
+        );
+        assert_eq!((&state.ids, &state.tangents), (&ids, &tangents));
+    }
+
+    #[test]
+    fn contacts_of_the_same_names_are_copied_with_new_coefficients() {
+        let (mut old, mut state) = (filled(&[1, 4], 0.2), filled(&[7, 8], 0.2));
+        (old.names, state.names) = (Names(5), Names(5));
+        (old.sliding[0], old.closed[1]) = (false, false);
+        let (ids, tangents) = named(&[1, 4], 0.4);
+        state.ids.clone_from(&ids);
+        state.carry_over(&old, (&ids, Names(5)), &tangents);
+        assert_eq!(entries(&state), entries(&old));
+        assert_eq!((&state.closed, &state.sliding, &state.tangents), (&old.closed, &old.sliding, &tangents));
     }
 }

@@ -90,6 +90,8 @@ impl Pair {
         let mut gaps = vec![0.0; found.len()];
         contact.gap(0.0, &[0.0; 24], &mut gaps);
         let row = |k: usize| {
+            // (What a row acts on is known beforehand.)
+            assert!(found.row(k).all(|(place, _)| !contact.only_reads(place)));
             let mut row: Vec<_> = found.row(k).map(|(place, weight)| (dofs[place], weight)).collect();
             row.sort_unstable_by_key(|&(dof, _)| dof);
             row
@@ -293,28 +295,83 @@ fn step_down(contact: &mut EdgeToEdge<f64>, way: Vector, closed: [bool; 2]) -> O
 }
 
 #[test]
-fn steps_through_an_edge_are_refused() {
-    let refused = |gap: f64, way: Vector, closed: [bool; 2]| {
-        let pair = Pair::new(1.1, [0.5, 0.5], gap);
-        match step_down(&mut pair.contact(), way, closed) {
-            None => false,
-            Some(Error::PassedThrough { way: found, .. }) => {
-                assert!((found / dot(way, way).sqrt() - 1.0).abs() < 1e-12);
-                true
+fn steps_through_an_edge_are_refused_in_any_unit() {
+    for unit in [1e-3, 1.0, 1e3] {
+        let refused = |gap: f64, way: Vector, closed: [bool; 2]| {
+            let pair = Pair::new(1.1, [0.5, 0.5], gap).mapped(|x| x.map(|x| unit * x));
+            match step_down(&mut pair.contact(), way.map(|x| unit * x), closed) {
+                None => false,
+                Some(Error::PassedThrough { way: found, .. }) => {
+                    assert!((found / (unit * dot(way, way).sqrt()) - 1.0).abs() < 1e-12);
+                    true
+                }
+                Some(error) => panic!("{error}"),
             }
-            Some(error) => panic!("{error}"),
-        }
+        };
+        let open = [false; 2];
+        // Straight through, and by so fast a way that it was out of reach.
+        assert!(refused(0.2, [0.0, 0.0, -0.6], open) && refused(7.0, [0.0, 0.0, -20.0], open));
+        // Up to the edge, beside it, away from it, along it.
+        assert!(!refused(0.6, [0.0, 0.0, -0.6], open) && !refused(0.2, [0.0, 5.0, -0.6], open));
+        assert!(!refused(0.01, [0.0, 0.0, 0.6], open) && !refused(0.01, [0.3, 0.0, 0.0], open));
+        // In by less than a tenth of the way, and by more.
+        assert!(!refused(0.6, [0.0, 0.0, -0.65], open) && refused(0.6, [0.0, 0.0, -0.7], open));
+        // Stopped away from the edge, and beyond its end; stopped where it is.
+        let stops = [false, true];
+        assert!(refused(0.9, [0.0, 0.0, -0.6], stops) && refused(0.6, [3.0, 0.0, -0.6], stops));
+        assert!(!refused(0.6, [0.0, 0.0, -0.6], stops) && !refused(0.64, [0.0, 0.0, -0.6], stops));
+    }
+}
+
+/// Rows of edges that turn until they are parallel, which have no common normal, go on as they were last.
+#[test]
+fn rows_of_edges_that_become_parallel_stay_as_they_were() {
+    let angle = 0.3;
+    let pair = Pair::new(angle, [0.45, 0.6], 0.04);
+    let mut contact = pair.contact::<f64>();
+    contact.search_on(0.0, &[0.0; 24], &[0.0; 24], 0.0).unwrap();
+    let row = ridges(&contact).unwrap();
+    let seen = |contact: &mut EdgeToEdge<f64>, u: &[f64]| {
+        let mut gaps = vec![0.0; contact.candidates()];
+        contact.gap(0.0, u, &mut gaps);
+        let found = Contacts::of(&*contact);
+        (gaps[row], found.name(row), found.normal(row), found.row(row).collect::<Vec<_>>())
     };
-    let open = [false; 2];
-    // Straight through, and by so fast a way that it was out of reach.
-    assert!(refused(0.2, [0.0, 0.0, -0.6], open) && refused(7.0, [0.0, 0.0, -20.0], open));
-    // Up to the edge, beside it, away from it, along it.
-    assert!(!refused(0.6, [0.0, 0.0, -0.6], open) && !refused(0.2, [0.0, 5.0, -0.6], open));
-    assert!(!refused(0.01, [0.0, 0.0, 0.6], open) && !refused(0.01, [0.3, 0.0, 0.0], open));
-    // Stopped away from the edge, and beyond its end; stopped where it is.
-    let stops = [false, true];
-    assert!(refused(0.9, [0.0, 0.0, -0.6], stops) && refused(0.6, [3.0, 0.0, -0.6], stops));
-    assert!(!refused(0.6, [0.0, 0.0, -0.6], stops));
+    // The first body turns about the upright axis through the ridges' closest points, and comes down.
+    let turned_by = |by: f64, down: f64| -> Vec<f64> {
+        let moved = |node: usize| {
+            let x = pair.nodes[node];
+            let to = turned([by, 0.0], x);
+            if node < 4 { sum(sum(to, -1.0, x), -down, [0.0, 0.0, 1.0]) } else { [0.0; 3] }
+        };
+        (0..8).flat_map(moved).collect()
+    };
+    let still = vec![0.0; 24];
+    let (gap, name, normal, weights) = seen(&mut contact, &still);
+    assert!((gap - 0.04).abs() < 1e-13);
+    let dofs = contact.dofs().to_vec();
+    let parallel = turned_by(-angle, 0.01);
+    contact.follow_on(0.0, &parallel).unwrap();
+    let affine = gap + weights.iter().map(|&(place, weight)| weight * parallel[dofs[place]]).sum::<f64>();
+    let after = seen(&mut contact, &parallel);
+    assert!((after.0 - affine).abs() < 1e-15, "{} {affine}", after.0);
+    assert_eq!((after.1, after.2, &after.3), (name, normal, &weights));
+    // And as they are where they cross again.
+    let crossed = turned_by(0.1, 0.01);
+    contact.follow_on(0.0, &crossed).unwrap();
+    let again = seen(&mut contact, &crossed);
+    assert!((again.0 - 0.03).abs() < 1e-13 && again.1 == name && again.3.len() == weights.len(), "{}", again.0);
+}
+
+#[test]
+fn the_reach_is_a_distance_of_edges_whichever_way_they_lean() {
+    for angles in [[0.0, 0.0], [0.4, -0.8], [1.0, 0.9]] {
+        for (gap, near) in [(0.095, true), (0.105, false)] {
+            let pair = Pair::new(0.9, [0.4, 0.55], gap).mapped(|x| turned(angles, x));
+            let rows = Pair::rows(&mut pair.contact().reach(0.1).unwrap());
+            assert_eq!(rows.len(), usize::from(near), "{angles:?} {gap}");
+        }
+    }
 }
 
 #[test]
@@ -327,6 +384,16 @@ fn edges_that_may_come_to_meet_have_rows() {
     assert_eq!(ridges(&contact), None);
     contact.search_on(0.0, &[0.0; 24], &v, 0.7).unwrap();
     let row = ridges(&contact).unwrap();
+    // As far away as they are, whichever of the two flies.
+    for flies in [0..12, 12..24] {
+        let mut far = Pair::new(1.3, [0.5, 0.4], 9.0).contact::<f64>().reach(0.1).unwrap();
+        let down = if flies.start == 0 { -10.0 } else { 10.0 };
+        let v: Vec<f64> = (0..24).map(|dof| if flies.contains(&dof) && dof % 3 == 2 { down } else { 0.0 }).collect();
+        far.search_on(0.0, &[0.0; 24], &v, 0.8).unwrap();
+        assert_eq!(ridges(&far), None);
+        far.search_on(0.0, &[0.0; 24], &v, 1.0).unwrap();
+        assert!(ridges(&far).is_some());
+    }
     // Where they do not meet the gap is open by more; where they do it is that of the lines.
     for (time, meets) in [(0.0, false), (0.1, false), (0.45, true), (0.1, false), (0.55, true)] {
         let u: Vec<f64> = v.iter().map(|v| time * v).collect();

@@ -1,7 +1,7 @@
 //! Weighted gaps: patch tests, derivatives, momentum, impacts, what is covered in part, what is refused.
 
 use super::two_bodies::check_impact;
-use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
 use contact_dynamics::{Composite, Error, Real, Simulation, StepControl, verify};
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -371,6 +371,100 @@ fn a_step_into_the_other_surface_is_refused_and_mended() {
     // It came back.
     let up: f64 = run.state().velocity().iter().skip(1).step_by(2).sum();
     assert!(up > -1e3, "{up}");
+}
+
+/// What is wrong with a step in which the upper body goes by a way, all rows with these flags at its start and its end.
+fn look(contact: &mut Mortar<f64>, stack: &Stack<2>, t: [f64; 2], way: [f64; 2], closed: [bool; 2]) -> Option<String> {
+    let dofs = contact.dofs().to_vec();
+    let (start, h) = (vec![0.0; dofs.len()], t[1] - t[0]);
+    let end: Vec<f64> = dofs.iter().map(|&dof| if dof >= 2 * stack.split { way[dof % 2] } else { 0.0 }).collect();
+    let velocity: Vec<f64> = end.iter().map(|u| u / h).collect();
+    contact.search(t[0], &start, &velocity, h).unwrap();
+    let flags = closed.map(|closed| vec![closed; Contacts::of(&*contact).len()]);
+    match contact.inspect(&Stride::new(t, [&start, &end], &velocity, [&flags[0], &flags[1]])) {
+        Ok(()) => None,
+        Err(Error::PassedThrough { what, way: found, .. }) => {
+            assert!((found / way[0].hypot(way[1]) - 1.0).abs() < 1e-12);
+            Some(what.to_owned())
+        }
+        Err(other) => panic!("{other}"),
+    }
+}
+
+#[test]
+fn steps_into_the_other_surface_are_told_from_steps_up_to_it_in_any_unit() {
+    for unit in [1e-3, 1.0, 1e3] {
+        let stack = |gap: f64| Stack::new(plates(3, 4), gap, |x| x.map(|x| unit * x));
+        let of = |stack: &Stack<2>| stack.mortar(true).unwrap().reach(0.3 * unit).unwrap();
+        let looked = |gap: f64, way: [f64; 2], closed: [bool; 2]| {
+            let stack = stack(gap);
+            look(&mut of(&stack), &stack, [0.0, 1.0], way.map(|x| unit * x), closed)
+        };
+        let is = |found: Option<String>, words: &str| found.is_some_and(|what| what.contains(words));
+        let (open, stops) = ([false; 2], [false, true]);
+        // Up to the other surface, and in by less than a tenth of the way; by more, to the far side, far beyond it.
+        assert_eq!(looked(0.2, [0.0, -0.2], open), None);
+        assert_eq!(looked(0.2, [0.0, -0.21], open), None);
+        for down in [0.3, 1.0, 9.0] {
+            let found = looked(0.2, [0.0, -down], open);
+            assert!(is(found.clone(), "went into"), "{unit} {down}: {found:?}");
+        }
+        assert!(is(looked(0.2, [0.0, -40.0], open), "too fast"));
+        // Beside it, and away from it.
+        assert_eq!(looked(0.2, [2.0, -0.1], open), None);
+        assert_eq!(looked(0.01, [0.0, 5.0], open), None);
+        // What was inside goes as it may.
+        assert_eq!(looked(-0.1, [0.0, -0.05], open), None);
+        assert_eq!(looked(-0.1, [0.0, 0.05], open), None);
+        // Stopped at the surface, or above it.
+        for (down, right) in [(0.2, true), (0.19, true), (0.21, true), (0.16, false), (0.1, false)] {
+            let found = looked(0.2, [0.0, -down], stops);
+            assert!(if right { found.is_none() } else { is(found, "away from the surface") }, "{unit} {down}");
+        }
+        // What was closed stays as it is, whatever its way.
+        assert_eq!(looked(0.2, [0.0, -0.1], [true; 2]), None);
+        // A spring is to be compressed.
+        let soft = stack(0.2);
+        let mut contact = of(&soft).with_law(ContactLaw::Penalty { stiffness: 1.0 });
+        assert_eq!(look(&mut contact, &soft, [0.0, 1.0], [0.0, -0.3 * unit], open), None);
+        // Coatings that grow during the second one of two steps are in the way of that one alone.
+        let offsets = vec![0.1 * unit; soft.solid.nodes.len()];
+        let mut contact = of(&soft).offsets(&offsets).unwrap().ramp([1.0, 2.0], [0.0, 1.0]).unwrap();
+        let way = [0.0, -0.15 * unit];
+        assert_eq!(look(&mut contact, &soft, [0.0, 1.0], way, open), None);
+        assert!(is(look(&mut contact, &soft, [1.0, 2.0], way, open), "went into"));
+        assert!(is(look(&mut contact, &soft, [2.0, 3.0], way, open), "went into"));
+    }
+}
+
+/// Whichever surface is the finer one, a quarter of its facets is how far what presses may go beyond the rim.
+#[test]
+fn what_presses_is_lost_beyond_the_rim_as_soon_as_it_is_a_quarter_of_the_finer_facets_away() {
+    for (lower, upper, shared, slide, gap, lost) in [
+        (1, 8, 0.05, 0.06, 0.0, true),
+        (8, 1, 0.05, 0.06, 0.0, true),
+        (1, 8, 0.01, 0.02, 0.0, false),
+        (8, 1, 0.01, 0.02, 0.0, false),
+        // What is open may go where it will.
+        (1, 8, 0.05, 0.06, 0.05, false),
+        (8, 1, 0.05, 0.06, 0.05, false),
+    ] {
+        let [below, above] = plates(lower, upper);
+        let stack = Stack::new([below, above.moved([1.0 - shared, 0.0])], gap, |x| x);
+        let mut contact = mortar(&stack, true);
+        let dofs = contact.dofs().to_vec();
+        let still = vec![0.0; dofs.len()];
+        contact.search(0.0, &still, &still, 0.0).unwrap();
+        let before = Contacts::of(&contact).len();
+        assert!(before >= 1);
+        let slid: Vec<f64> =
+            dofs.iter().map(|&dof| if dof >= 2 * stack.split && dof % 2 == 0 { slide } else { 0.0 }).collect();
+        match contact.follow(0.0, &slid) {
+            Ok(_) => assert!(!lost && Contacts::of(&contact).len() == before, "{lower} {upper} {slide}"),
+            Err(Error::ContactLost { .. }) => assert!(lost, "{lower} {upper} {slide}"),
+            Err(other) => panic!("{other}"),
+        }
+    }
 }
 
 /// Name, gap, and (dof, weight) pairs of a row.

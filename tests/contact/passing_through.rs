@@ -278,7 +278,7 @@ fn compliant_contacts_may_be_deep() {
 #[cfg(feature = "search")]
 mod facets {
     use super::*;
-    use contact_dynamics::contact::{Facet, NodeToFacet};
+    use contact_dynamics::contact::{Contacts, Facet, NodeToFacet, Stride};
 
     /// The first meeting with the box [0, size].
     fn with_box<const D: usize>(start: [f64; D], v: [f64; D], size: [f64; D]) -> Meeting<D> {
@@ -365,6 +365,55 @@ mod facets {
         }
         println!("{name}: {tally:?}");
         assert!(tally.right > tally.refused, "{name}: {tally:?}");
+    }
+
+    /// What is wrong with the straight way of a node in a step against a square at rest, whose row, if it has one, has
+    /// these flags at its start and its end.
+    fn look(unit: f64, law: ContactLaw, start: [f64; 2], way: [f64; 2], closed: [bool; 2]) -> Option<String> {
+        let (nodes, facets) = body(start.map(|x| unit * x), [unit; 2], false);
+        let dofs: Vec<[usize; 2]> = (0..nodes.len()).map(|n| [2 * n, 2 * n + 1]).collect();
+        let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets).unwrap();
+        let mut contact = contact.reach(0.3 * unit).unwrap().with_law(law);
+        let own: Vec<usize> = contact.dofs().to_vec();
+        let still = vec![0.0; own.len()];
+        let end: Vec<f64> = own.iter().map(|&dof| if dof < 2 { unit * way[dof] } else { 0.0 }).collect();
+        contact.search(0.0, &still, &end, 1.0).unwrap();
+        let flags = closed.map(|closed| vec![closed; Contacts::of(&contact).len()]);
+        match contact.inspect(&Stride::new([0.0, 1.0], [&still, &end], &end, [&flags[0], &flags[1]])) {
+            Ok(()) => None,
+            Err(Error::PassedThrough { what, .. }) => Some(what.to_owned()),
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn ways_against_a_square_are_judged_alike_in_any_unit() {
+        for unit in [1e-3, 1.0, 1e3] {
+            let rigid = |start, way, closed| look(unit, ContactLaw::Rigid, start, way, closed);
+            let (open, stops) = ([false; 2], [false, true]);
+            let is = |found: Option<String>, words: &str| found.is_some_and(|what| what.contains(words));
+            // Up to the upper side, in from above as its row says, along it; through the square and out again.
+            assert_eq!(rigid([0.4, 1.2], [0.0, -0.2], open), None);
+            assert_eq!(rigid([0.4, 1.2], [0.0, -0.4], open), None);
+            assert_eq!(rigid([0.4, 1.01], [0.5, 0.0], open), None);
+            assert!(is(rigid([0.4, 1.2], [0.0, -1.5], open), "went through a facet"));
+            assert!(is(rigid([0.4, 9.0], [0.0, -20.0], open), "went through a facet"));
+            // Over a corner: far inside of it, and around it where the node was.
+            assert!(is(rigid([0.7, 1.1], [0.4, -0.4], open), "went through a facet"));
+            assert!(is(rigid([0.75, 1.15], [0.26, -0.46], open), "went through a facet"));
+            assert_eq!(rigid([0.9, 1.01], [0.11, -0.11], open), None);
+            // Stopped at the side, above it, where another side is.
+            for (down, right) in [(0.2, true), (0.19, true), (0.21, true), (0.16, false), (0.1, false)] {
+                let found = rigid([0.4, 1.2], [0.2, -down], stops);
+                assert!(if right { found.is_none() } else { is(found, "away from the surface") }, "{unit} {down}");
+            }
+            assert!(is(rigid([0.9, 1.1], [0.1, -0.2], stops), "along a normal"));
+            // A spring lets nodes in, and back out, not through the body.
+            let soft = |start, way| look(unit, ContactLaw::Penalty { stiffness: 1.0 }, start, way, open);
+            assert_eq!(soft([0.4, 0.95], [0.0, -0.35]), None);
+            assert_eq!(soft([0.4, 0.95], [0.0, 0.3]), None);
+            assert!(is(soft([0.4, 0.95], [0.0, -0.9]), "went through the body that it was in"));
+        }
     }
 
     #[test]

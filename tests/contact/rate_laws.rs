@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactLaw, GapOffset, Side, Sphere};
-use contact_dynamics::tableau::{ContactLevel, Rows, U, V, Z};
+use contact_dynamics::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
     Bathe, Bdf2, Composite, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
     NodesOnObstacle, PersistencyCorrection, Real, Simulation, TimeIntegrator,
@@ -622,4 +622,11 @@ fn schemes_take_the_laws_they_can_serve() {
     assert!(build(Box::new(lagging.clone()), ContactLaw::RateCondition).is_ok());
     let refused = build(Box::new(lagging), ContactLaw::PersistencySwitch).unwrap_err();
     assert!(refused.to_string().contains("do not contain the unknown"), "{refused}");
+    // With contact on these velocities nothing rigid can be stopped, and springs may press.
+    let level = ContactLevel::Velocity { lead: 0.0, forecast: U[0] + V[0], forecast_at: 1.0 };
+    let stage = Stage::new(Rows { u: Z, v: U[0] - U[1], a: Z - U[0] - V[0] }).with_contact(level);
+    let late = Tabulated("late", Tableau::single(stage));
+    assert!(build(Box::new(late.clone()), ContactLaw::Penalty { stiffness: 1.0 }).is_ok());
+    let refused = build(Box::new(late), ContactLaw::Rigid).unwrap_err();
+    assert!(refused.to_string().contains("cannot stop an approach"), "{refused}");
 }

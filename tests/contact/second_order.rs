@@ -270,6 +270,58 @@ fn pressures_are_those_of_the_forces_of_second_order() {
     }
 }
 
+/// A slave whose three nodes are on the parabola 4 s x (1 − x), 0.1 above a line, and a line that is 0.1 above such a
+/// parabola, or below: the gaps are the means of what is between, with the linear functions of the nodes. (Normals of
+/// the parts lean by 2 s.)
+#[test]
+fn gaps_are_the_means_between_facets_of_both_orders() {
+    let s = 1e-4;
+    let gaps = |nodes: &[[f64; 2]], slave: Vec<Facet>, master: Vec<Facet>| {
+        let dofs: Vec<[usize; 2]> = (0..nodes.len()).map(|node| [2 * node, 2 * node + 1]).collect();
+        let mut contact = Mortar::<f64>::new(nodes, &dofs, slave, master).unwrap();
+        let still = vec![0.0; contact.dofs().len()];
+        contact.search(0.0, &still, &still, 0.0).unwrap();
+        let contacts = Contacts::of(&contact);
+        let mut gaps = vec![0.0; contacts.len()];
+        contact.gaps(0.0, &still, &mut gaps).unwrap();
+        (0..contacts.len()).map(|row| (contacts.name(row).0, gaps[row])).collect::<Vec<_>>()
+    };
+    // Facets of the upper body run to the right, those of the lower one to the left.
+    let nodes = [[0.0, 0.1], [0.5, 0.1 + s], [1.0, 0.1], [2.0, 0.0], [-1.0, 0.0]];
+    let found = gaps(&nodes, Facet::of_quadratic_segment([0, 2, 1]).into(), vec![Facet::from([3, 4])]);
+    assert_eq!(found.len(), 3);
+    for (node, gap) in found {
+        let mean = [s / 2.0, s * 5.0 / 6.0, s / 2.0][node];
+        assert!((gap - 0.1 - mean).abs() < 10.0 * s * s, "{node}: {gap}");
+    }
+    let nodes = [[0.0, 0.1], [1.0, 0.1], [1.0, 0.0], [0.5, -s], [0.0, 0.0]];
+    let found = gaps(&nodes, vec![Facet::from([0, 1])], Facet::of_quadratic_segment([2, 4, 3]).into());
+    assert_eq!(found.len(), 2);
+    for (node, gap) in found {
+        assert!((gap - 0.1 - s * 2.0 / 3.0).abs() < 10.0 * s * s, "{node}: {gap}");
+    }
+}
+
+/// Where linear facets follow upon such of second order: L/6, 4L/6, L/6 of a pressure go to the nodes of one of these,
+/// and half of it to either node of the others.
+#[test]
+fn a_pressure_is_the_same_on_facets_of_both_orders() {
+    let nodes = [[0.0_f64, 0.0], [0.6, 0.0], [1.2, 0.0], [1.7, 0.0], [2.0, 0.0]];
+    let pressure = 0.7_f64;
+    // Outward is down: facets run to the right.
+    let quadratic = Facet::of_quadratic_segment([0, 2, 1]);
+    let surface = Surface::new(&nodes, quadratic.into_iter().chain([[2, 3], [3, 4]].map(Facet::from))).unwrap();
+    let up = [1.2 / 6.0, 1.2 * 4.0 / 6.0, 1.2 / 6.0 + 0.25, 0.25 + 0.15, 0.15].map(|length| [0.0, pressure * length]);
+    let normals = surface.normals(&nodes).unwrap();
+    assert!(normals.iter().all(|[x, y]| x.abs() < 1e-15 && (y + 1.0).abs() < 1e-15), "{normals:?}");
+    for found in surface.pressures(&nodes, &up).unwrap() {
+        assert!((found / pressure - 1.0).abs() < 1e-13, "{found}");
+    }
+    for [x, y] in surface.shears(&nodes, &up).unwrap() {
+        assert!(x.abs() + y.abs() < 1e-13);
+    }
+}
+
 #[test]
 fn ties_of_curved_surfaces_turn_freely() {
     let dome = |[x, y, z]: [f64; 3]| [x, y, z + 0.2 * (x * (1.0 - x) + y * y) * z * (2.0 - z)];

@@ -551,6 +551,28 @@ fn obstacles_that_turn_too_far_in_a_step_are_refused_near_nodes() {
     assert!(matches!(far.inspect(&stride), Err(Error::PassedThrough { .. })));
 }
 
+/// A disc turns by 34 degrees in a step, while its center goes out and comes back, at a constant acceleration a: by
+/// a h²/8, which is 1 here. What it may meet on this way is looked at, whatever the unit of time.
+#[test]
+fn ways_beside_bodies_that_turn_are_as_long_in_any_unit_of_time() {
+    for h in [1e-2, 1.0, 1e2] {
+        let motion = move |t: f64| {
+            let s = t / h;
+            let out = [4.0 * s * (1.0 - s), 4.0 * (1.0 - 2.0 * s) / h, -8.0 / (h * h)];
+            RigidMotion::about_point([0.0; 2], [0.6 * s, 0.6 / h, 0.0]).translated(out.map(|x| [0.0, x]))
+        };
+        for (place, meets) in [(1.0, true), (4.0, false)] {
+            let disc = Sphere::new([0.0; 2], 0.05, Side::Outside).unwrap();
+            let mut contact = on(disc, &[[0.0, place]]).turning(motion);
+            contact.search(0.0, &[0.0; 2], &[0.0; 2], 0.0).unwrap();
+            let flags = vec![false; contact.candidates()];
+            let stride = Stride::new([0.0, h], [&[0.0; 2]; 2], &[0.0; 2], [&flags; 2]);
+            let looked = contact.inspect(&stride);
+            assert_eq!(matches!(looked, Err(Error::PassedThrough { .. })), meets, "{h} {place}: {looked:?}");
+        }
+    }
+}
+
 /// A rod sweeps over particles at rest: it hits them, whatever the step, the phase and the reach, or the step is
 /// refused.
 #[test]

@@ -257,6 +257,34 @@ fn many_contacts_by_newton_and_by_sweeps() {
 }
 
 /// Where friction moves nothing in one direction, or in none, the block still slides against its slip.
+/// Contacts along a string that stand, some of them without friction: how far they may slide is nothing then, and so is
+/// what they slide, which is no direction.
+#[test]
+fn contacts_that_do_not_slide_are_solved_in_few_iterations() {
+    let count = 24;
+    let size = 2 * count;
+    // The flexibility of the string is badly conditioned; tangents are alone.
+    let entry = |i: usize, j: usize| match (i % 2, j % 2) {
+        (0, 0) => (i / 2).min(j / 2) as f64 + 1.0,
+        _ if i == j => 1.0,
+        _ => 0.0,
+    };
+    let w: Vec<f64> = (0..size * size).map(|e| entry(e / size, e % size)).collect();
+    let expected = |row: usize| if row.is_multiple_of(2) { 1.0 + 0.1 * (row as f64).sin() } else { 0.0 };
+    let q: Vec<f64> = (0..size).map(|i| -(0..size).map(|j| entry(i, j) * expected(j)).sum::<f64>()).collect();
+    for frictions in [[0.0, 0.0], [0.0, 0.3], [0.3, 0.3]] {
+        let sets: Vec<_> = (0..count).map(|k| cone(2, frictions[k % 2])).collect();
+        let tolerance = vec![0.0; size];
+        let mut found = vec![0.0; size];
+        let problem = ContactProblem::new(&w, &q, &sets, &tolerance).unwrap();
+        let iterations = ActiveSet::default().solve(&problem, &mut found).unwrap();
+        assert!(iterations < 60, "{frictions:?}: {iterations}");
+        for (row, found) in found.iter().enumerate() {
+            assert!((found - expected(row)).abs() < 1e-9, "{frictions:?}, {row}: {found}");
+        }
+    }
+}
+
 #[test]
 fn directions_without_compliance() {
     for tangential in [[0.0, 3.0], [3.0, 0.0], [0.0, 0.0], [1e-300, 3.0], [3.0, 1e-12]] {

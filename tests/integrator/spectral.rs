@@ -238,6 +238,19 @@ fn zero_stability_tells_weak_and_unstable_schemes() {
     let v = (Z + 4.0 * U[0] - 5.0 * U[1] - 2.0 * V[1] - 4.0 * V[0] + 2.0 * V[1]) / 2.0;
     let unstable = Tableau::single(Stage::new(Rows { u: Z, v, a: v - V[0] }));
     assert_eq!(zero_stability(&unstable), ZeroStability::Unstable);
+    // Two-step differences whose second root is r: bodies without forces go on as r^n beside their motion.
+    for (r, expected) in [
+        (0.5, ZeroStability::Strong),
+        (-0.99, ZeroStability::Strong),
+        (-1.0, ZeroStability::Weak),
+        (-1.01, ZeroStability::Unstable),
+        (-1.8, ZeroStability::Unstable),
+        (1.5, ZeroStability::Unstable),
+    ] {
+        let v = (Z - (1.0 + r) * U[0] + r * U[1]) / (1.0 - r);
+        let scheme = Tableau::single(Stage::new(Rows { u: Z, v, a: v - V[0] }));
+        assert_eq!(zero_stability(&scheme), expected, "{r}");
+    }
     assert!(eigenvalues(&unstable, 1e-3, 0.0).iter().any(|root| root.re.hypot(root.im) > 1.5));
 }
 

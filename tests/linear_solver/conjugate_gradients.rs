@@ -252,6 +252,34 @@ fn zero_and_nan_come_back_as_they_are() {
     }
 }
 
+/// pᵀAp over pᵀdiag(A)p along any direction is between the eigenvalues of A with its diagonal scaled to one.
+#[test]
+fn the_curvature_that_refuses_a_matrix_is_one_that_it_has() {
+    // (Of so many dofs that they are not taken for nodes of two or three.)
+    let cases = [5, 7, 11, 13].into_iter().flat_map(|n| [0.6, 0.9, 1.7, 4.0].map(|coupling| (n, coupling)));
+    for (preconditioner, (n, coupling)) in
+        ALL.into_iter().flat_map(|which| cases.clone().map(move |case| (which, case)))
+    {
+        let chain: Vec<Entry> = (0..n)
+            .map(|i| (i, i, 1.0))
+            .chain((1..n).flat_map(|i| [(i - 1, i, coupling), (i, i - 1, coupling)]))
+            .collect();
+        // (The eigenvalues of a chain are 1 + 2 c cos(k π/(n + 1)).)
+        let least = 1.0 - 2.0 * coupling * (std::f64::consts::PI / (n as f64 + 1.0)).cos();
+        let a = matrix::<f64>(n, chain);
+        let solver = ConjugateGradients::default().preconditioner(preconditioner);
+        let mut factor = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap();
+        let found = factor.factorize(a.as_ref()).and_then(|()| factor.solve(&mut rhs::<f64>(n)));
+        match found {
+            Err(Error::Indefinite { curvature, .. }) => assert!(
+                curvature < 0.0 && curvature > least - 1e-12,
+                "{preconditioner:?} {n} {coupling}: {curvature}, not above {least}"
+            ),
+            other => panic!("{preconditioner:?} {n} {coupling}: {other:?}"),
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_solved_is_refused() {
     let refused = |solver: ConjugateGradients, n: usize, entries: Vec<Entry>| {

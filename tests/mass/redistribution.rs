@@ -452,6 +452,25 @@ fn wrong_input_of_redistribution_is_refused_with_its_numbers() {
     assert!(mass::affine_motions::<f64, 2>(0, &[], &[]).is_ok());
 }
 
+#[test]
+fn least_squares_do_not_depend_on_the_unit_of_mass() {
+    let lumped = [0.5, 1.0, 1.0, 1.0, 1.0, 1.0];
+    let dofs: [[usize; 1]; 6] = std::array::from_fn(|node| [node]);
+    let motions = mass::affine_motions(6, &dofs.map(|[x]| [x as f64]), &dofs).unwrap();
+    for unit in [1e-18, 1e-9, 1.0, 1e9, 1e18] {
+        let masses = lumped.map(|m| unit * m);
+        let cut = |receivers| {
+            mass::redistribute(&masses, &[0], &[0; 6], Redistribution::LeastSquares { motions: &motions, receivers })
+        };
+        let found = cut(Some(&[1, 2, 3, 4])).unwrap();
+        let expected = [0.0, 2.125, 0.625, 0.375, 1.375, 1.0].map(|m| unit * m);
+        close(&found, &expected, 1e-14 * unit);
+        // Two cannot keep three motions, and all at one height not what has a height.
+        refused!(cut(Some(&[1, 2])), Error::Incompatible { .. });
+        refused!(cut(Some(&[3])), Error::Incompatible { .. });
+    }
+}
+
 /// Dofs and mass of every element of a solid.
 fn element_masses<const D: usize>(solid: &Solid<D>) -> Vec<(Vec<usize>, Vec<f64>)> {
     let of = |element: &Vec<usize>| {

@@ -233,6 +233,27 @@ fn jumps_of_rates_conserve_momentum_and_lose_energy() {
     }
 }
 
+/// Bodies that touch do so wherever they are: what rounding leaves of a gap between large coordinates is none.
+#[test]
+fn bodies_that_touch_are_closed_far_from_the_origin() {
+    let flexibility = [1.0];
+    let rows = [Coupling::unilateral(&[(0, 0, -1.0), (1, 0, 1.0)])];
+    let mut assembly = Assembly::new(&[&flexibility, &flexibility], &rows).unwrap();
+    for far in [0.0, 1e3, 1e6, 1e9] {
+        for k in 1..40 {
+            // The gap is the place of the second body less that of the first, and the length of the first.
+            let (place, length) = (0.37 * f64::from(k), 0.11 * f64::from(k));
+            let (first, second) = ([far + place], [far + (place + length)]);
+            let found = assembly.solve(&[&first, &second], &[-length]).unwrap();
+            assert!(found.closed()[0], "{far} {k}: {:e}", found.gaps()[0]);
+            assert!(found.multipliers()[0].abs() < 1e-14 * (1.0 + far));
+        }
+        // What is apart is open.
+        let (first, second) = ([far + 0.5], [far + 1.5 + 1e-9 * (far + 1e3)]);
+        assert!(!assembly.solve(&[&first, &second], &[-1.0]).unwrap().closed()[0]);
+    }
+}
+
 #[test]
 fn assemblies_refuse_what_is_no_interface() {
     let (one, two) = ([1.0], [2.0, 1.0, 1.0, 2.0]);

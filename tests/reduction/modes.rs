@@ -281,6 +281,9 @@ fn modes_of_another_code_are_checked() {
     // What comes next is said to come before the last.
     let early = take(omega, all.clone(), 0.5 * (omega[4] + omega[5]));
     assert!(matches!(early, Err(Error::Parameter { .. })), "{early:?}");
+    // Or with it: a cluster that is cut.
+    let cut = take(omega, all.clone(), omega[5]);
+    assert!(matches!(cut, Err(Error::Parameter { value, .. }) if value <= omega[5]), "{cut:?}");
     // An elastic mode that is said to be rigid.
     let named = take(&[0.0, 0.0], shapes(&[0, 1]), omega[2]);
     assert!(matches!(named, Err(Error::ModeResidual { mode: 1, .. })), "{named:?}");

@@ -12,6 +12,7 @@ use contact_dynamics_scenes::hosts::Bare;
 use contact_dynamics_scenes::masses::{Takers, Treatment};
 use contact_dynamics_scenes::measure::{Figures, figures, record_run};
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 /// The paper's bars with tapered massless contact dofs: figures, and the loss of the energy that central differences
 /// conserve, ½ v·M v + ½ u·K u − h²/8 a·M a.
@@ -137,41 +138,83 @@ fn a_block_bounces_on_a_plane_that_is_not_along_an_axis() {
     assert!((kept - 1.0).abs() < 0.01, "{kept}");
 }
 
+/// Near the origin, and so far from it that gaps are rounded more coarsely than displacements are.
 #[test]
 fn rows_follow_the_dofs_over_a_curved_obstacle() {
-    let solid = Solid::block([0.6, 0.6, 0.4], [6, 6, 4], RUBBER);
-    let (mass, bottom) = without_bottom(&solid);
-    let center = [0.33, 0.27, -1.01];
-    let ball = Sphere::new(center, 1.0, Side::Outside).unwrap();
-    let rows = NodesOnObstacle::new(ball, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
-    let h = 0.3 * 0.1 / RUBBER.wave_speed();
-    let mut run =
-        Simulation::builder(LinearSystem::lumped(mass.clone(), solid.stiffness()).unwrap(), CentralDifference, h)
-            .velocity(solid.uniform([0.1, 0.0, -1.0]))
-            .constraint(rows)
+    for far in [0.0, 1e3] {
+        let mut solid = Solid::block([0.6, 0.6, 0.4], [6, 6, 4], RUBBER);
+        let (mass, bottom) = without_bottom(&solid);
+        solid = solid.moved([far; 3]);
+        let center = [0.33, 0.27, -1.01].map(|x| x + far);
+        let ball = Sphere::new(center, 1.0, Side::Outside).unwrap();
+        let rows = NodesOnObstacle::new(ball, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+        let h = 0.3 * 0.1 / RUBBER.wave_speed();
+        let mut run =
+            Simulation::builder(LinearSystem::lumped(mass.clone(), solid.stiffness()).unwrap(), CentralDifference, h)
+                .velocity(solid.uniform([0.1, 0.0, -1.0]))
+                .constraint(rows)
+                .uncorrected()
+                .build()
+                .unwrap();
+        let mut pressed = 0;
+        while run.time() < 0.3 {
+            run.step().unwrap();
+            let contacts = run.state().contacts();
+            pressed = pressed.max(contacts.forces().iter().filter(|force| **force > 0.0).count());
+            let u = run.state().displacement();
+            let normals: Vec<[f64; 3]> = contacts
+                .ids()
+                .iter()
+                .map(|id| {
+                    let away: [f64; 3] = std::array::from_fn(|axis| {
+                        solid.nodes[id.feature][axis] + u[3 * id.feature + axis] - center[axis]
+                    });
+                    let size = away.iter().map(|x| x * x).sum::<f64>().sqrt();
+                    away.map(|x| x / size)
+                })
+                .collect();
+            let [residual, depth] = balance(&solid, &run, &mass, &normals);
+            let rounding = 1e-15 * far;
+            assert!(residual < 1e-9 + 1e3 * rounding && depth < 1e-12 + rounding, "{far}: {residual:e} {depth:e}");
+        }
+        assert!(pressed >= 4, "{far}: {pressed}");
+    }
+}
+
+/// A node without mass between a driven node and an obstacle: the one goes as it is driven, the other follows at once,
+/// with a lumped mass and with a consistent one.
+#[test]
+fn dofs_without_mass_follow_driven_ones_and_do_not_move_them() {
+    let (k, h, load) = (400.0, 5e-3, -3.0);
+    // Dof 0 has no mass, dof 1 is driven, two more swing.
+    let drive = |t: f64| [0.1 * (2.0 * t).sin(), 0.2 * (2.0 * t).cos(), -0.4 * (2.0 * t).sin()];
+    let consistent = [(1, 1, 1.0), (1, 2, 0.2), (2, 1, 0.2), (2, 2, 1.0), (2, 3, 0.2), (3, 2, 0.2), (3, 3, 0.6)];
+    let stiffness = || matrix::<f64>(4, springs(4, k));
+    let systems: [LinearSystem<'static, f64>; 2] = [
+        LinearSystem::lumped(vec![0.0, 1.2, 1.4, 0.8], stiffness()).unwrap(),
+        LinearSystem::new(matrix(4, consistent), stiffness()).unwrap(),
+    ];
+    for system in systems {
+        let system = system.drive(1, drive).unwrap().load(move |_, f| f[0] = load);
+        let start = vec![load / k, 0.0, 0.0, 0.0];
+        let mut run = Simulation::builder(system, CdLagrange, h)
+            .displacement(start)
+            .velocity(vec![0.2, 0.2, 0.0, 0.0])
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.05))
             .uncorrected()
             .build()
             .unwrap();
-    let mut pressed = 0;
-    while run.time() < 0.3 {
-        run.step().unwrap();
-        let contacts = run.state().contacts();
-        pressed = pressed.max(contacts.forces().iter().filter(|force| **force > 0.0).count());
-        let u = run.state().displacement();
-        let normals: Vec<[f64; 3]> = contacts
-            .ids()
-            .iter()
-            .map(|id| {
-                let away: [f64; 3] =
-                    std::array::from_fn(|axis| solid.nodes[id.feature][axis] + u[3 * id.feature + axis] - center[axis]);
-                let size = away.iter().map(|x| x * x).sum::<f64>().sqrt();
-                away.map(|x| x / size)
-            })
-            .collect();
-        let [residual, depth] = balance(&solid, &run, &mass, &normals);
-        assert!(residual < 1e-9 && depth < 1e-12, "{residual:e} {depth:e}");
+        let mut pressed = 0;
+        while run.time() < 4.0 {
+            run.step().unwrap();
+            let (u, [driven, ..]) = (run.state().displacement(), drive(run.time()));
+            let floor = -0.05;
+            assert!((u[1] - driven).abs() < 1e-15, "{} {driven}", u[1]);
+            assert!((u[0] - (driven + load / k).max(floor)).abs() < 1e-13, "{} {driven}", u[0]);
+            pressed += usize::from(run.state().contacts().closed()[0]);
+        }
+        assert!(pressed > 100, "{pressed}");
     }
-    assert!(pressed >= 4, "{pressed}");
 }
 
 #[test]

@@ -135,6 +135,37 @@ fn what_is_in_balance_or_damped_is_left_alone() {
     assert!(run.start_adjustment().is_none() && run.state().displacement()[0].to_bits() == 0.1_f64.to_bits());
 }
 
+/// Three nodes without mass on springs under loads, off their balance by as little as one likes: what they are moved by
+/// is that, until it is rounding.
+#[test]
+fn starts_as_near_to_balance_as_one_likes_are_balanced() {
+    let (k, n, loads) = (0.3, 6, [0.01, -0.02, 0.05]);
+    // From the first node with mass on, each spring bears the loads of those before it.
+    let mut exact = vec![0.7; n];
+    exact[n - 1] = 0.0;
+    let mut borne: f64 = loads.iter().sum();
+    for node in (0..3).rev() {
+        exact[node] = exact[node + 1] + borne / k;
+        borne -= loads[node];
+    }
+    let mass: Vec<f64> = (0..n).map(|node| if node < 3 { 0.0 } else { 1.0 }).collect();
+    let load = |_: f64, f: &mut [f64]| f[..3].copy_from_slice(&loads);
+    for power in 1..15 {
+        let off = 10.0_f64.powi(-power);
+        let mut u = exact.clone();
+        (0..3).for_each(|node| u[node] += off * [1.0, -0.9, 0.7][node]);
+        let system = LinearSystem::lumped(mass.clone(), matrix(n, springs(n, k))).unwrap().fix(n - 1).unwrap();
+        let run = Simulation::builder(system.load(load), Newmark::trapezoidal(), 0.1).displacement(u).build().unwrap();
+        for (found, exact) in run.state().displacement().iter().zip(&exact) {
+            assert!((found - exact).abs() < 1e-14 + off.min(1e-12), "{power}: {found} {exact}");
+        }
+        match run.start_adjustment() {
+            Some(adjustment) => assert!(adjustment.dof == 0 && (adjustment.largest - off).abs() < 1e-14, "{power}"),
+            None => assert!(off < 1e-12, "{power}"),
+        }
+    }
+}
+
 const RUBBER: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
 
 #[test]

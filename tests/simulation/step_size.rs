@@ -454,6 +454,30 @@ fn a_run_with_step_changes_is_resumed_bit_for_bit() {
     }
 }
 
+/// Begun anew where it has begun, once or twice, and while a multistep scheme makes its past: as if nothing had been
+/// said, and as if it had been said once.
+#[test]
+fn a_run_that_is_begun_anew_twice_is_as_one_that_is_begun_once() {
+    for listed in all() {
+        let run = |restarts: [usize; 3]| {
+            let mut run = oscillator((listed.make)(), 0.01);
+            for times in restarts {
+                for _ in 0..times {
+                    run.restart().unwrap();
+                }
+                run.step().unwrap();
+            }
+            for _ in 0..6 {
+                run.step().unwrap();
+            }
+            run.state().clone()
+        };
+        let name = listed.name();
+        assert_eq!(run([0; 3]), run([2, 0, 0]), "{name}");
+        assert_eq!(run([0, 1, 1]), run([1, 3, 2]), "{name}");
+    }
+}
+
 /// A past is made from the motions that were computed, whatever sizes were set in between.
 #[test]
 fn a_step_size_without_a_step_leaves_no_trace() {

@@ -276,6 +276,39 @@ fn springs_that_harden_do_not_grow_without_a_word() {
     }
 }
 
+/// A host that tells nothing of its stiffness: a frequency one percent beyond that of the step is refused while it has
+/// grown by no more than a few steps do, one as much below it runs on.
+#[test]
+fn frequencies_just_beyond_the_step_are_told_from_those_just_below() {
+    for n in [1, 8] {
+        // (A chain that is held at one end: ω = 2 √k cos(π/(2 n + 1)), √k of one mass.)
+        let highest = 2.0 * (std::f64::consts::PI / (2.0 * n as f64 + 1.0)).cos();
+        for (beyond, h) in [0.99, 1.01].into_iter().flat_map(|beyond| [1e-3, 0.1, 10.0].map(|h| (beyond, h))) {
+            let k = (2.0 * beyond / (h * highest)).powi(2);
+            let mut velocity = vec![0.0; n];
+            velocity[0] = 1.0;
+            let mut run = Simulation::builder(Hardening::new(n, k, 0.0), CentralDifference, h)
+                .velocity(velocity)
+                .build()
+                .unwrap();
+            let start = run.energy().total();
+            let mut most = 0.0_f64;
+            let outcome = (0..400).try_for_each(|_| {
+                run.step()?;
+                most = most.max(run.energy().total() / start);
+                Ok::<(), Error>(())
+            });
+            match outcome {
+                Ok(()) => assert!(beyond < 1.0, "{n} {h}: {most:e}"),
+                Err(Error::Stiffened { contact: None, .. }) => {
+                    assert!(beyond > 1.0 && most < 100.0, "{n} {h} {beyond}: {most:e}");
+                }
+                Err(error) => panic!("{n} {h} {beyond}: {error}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn step_control_follows_a_spring_that_hardens() {
     let control = StepControl::halving(1e-4).unwrap();

@@ -98,9 +98,8 @@ impl<T: Real> EdgeToEdge<T> {
             return Err(("was stopped away from the other edge", way, gap));
         }
         let speed = motion(pair.ends(&|node| self.nodes.vector(node, step.v)), from.shares);
-        let size = norm(speed);
-        let shares = || [from.normal, to.normal].map(|normal| dot(normal, speed) / size);
-        if way > COARSE * self.finest && size > 0.0 && press_differently(shares()) {
+        let speeds = [from.normal, to.normal].map(|normal| dot(normal, speed));
+        if way > COARSE * self.finest && press_differently(speeds, dot(speed, speed)) {
             return Err(("was stopped along a normal that is not the one where the edges met", way, gap));
         }
         Ok(())

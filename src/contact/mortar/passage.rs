@@ -55,6 +55,9 @@ impl<T: Real> Mortar<T> {
         if !swept[0].inflated(reach).intersects(&swept[1]) {
             return Ok(());
         }
+        // (What is deeper is not found, however long the way.)
+        let deepest = 0.5 * depth;
+        let (fine, limit) = (fine.min(deepest), -deepest.min(LARGEST_MISS * way));
         let name = |place: usize| (self.slave.nodes()[place], 0);
         let Some(looks) = (1..=LOOKS).find(|&looks| f64::from(looks) * fine >= way) else {
             return Err(step.refuse(name(0), "is too fast for its facets to be followed", way, f64::INFINITY));
@@ -64,7 +67,6 @@ impl<T: Real> Mortar<T> {
         pairs.build(surfaces, positions, reach + way);
         outside.clear();
         outside.resize(self.slave.nodes().len(), true);
-        let limit = -LARGEST_MISS * way;
         for look in 0..=looks {
             let share = f64::from(look) / f64::from(looks);
             for &node in self.nodes.bodies().iter().flatten() {
@@ -87,7 +89,7 @@ impl<T: Real> Mortar<T> {
         for (row, &place) in self.rows.places.iter().enumerate() {
             let sums = &integrals.sums[place];
             let stopped = !step.closed[0][row] && step.closed[1][row];
-            if stopped && sums.is_covered() && sums.gap() > -limit {
+            if stopped && sums.is_covered() && sums.gap() > LARGEST_MISS * way {
                 return Err(step.refuse(name(place), "was stopped away from the surface", way, sums.gap()));
             }
         }

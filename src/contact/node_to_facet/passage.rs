@@ -134,11 +134,8 @@ impl Crossing<'_> {
                 return Err(("was stopped away from the surface", length, gap));
             }
             let speed = against(&velocity);
-            let size = norm(speed);
-            if coarse
-                && size > 0.0
-                && press_differently([from.normal, to.normal].map(|normal| dot(normal, speed) / size))
-            {
+            let speeds = [from.normal, to.normal].map(|normal| dot(normal, speed));
+            if coarse && press_differently(speeds, dot(speed, speed)) {
                 return Err(("was stopped along a normal that is not the one where it met the surface", length, gap));
             }
         }

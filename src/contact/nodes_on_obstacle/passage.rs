@@ -33,9 +33,8 @@ pub(super) fn look_at<T: Real, const D: usize>(
         if dot(start_normal, normal) < T::of(LARGEST_TURN) {
             return Err(("presses on a surface that turns by more than 30 degrees on the way", start));
         }
-        let speed = dot(velocity, velocity).sqrt();
-        let shares = [start_normal, normal].map(|n| (dot(n, velocity) / speed).value());
-        if !was_closed && speed > T::zero() && press_differently(shares) {
+        let speeds = [start_normal, normal].map(|n| dot(n, velocity).value());
+        if !was_closed && press_differently(speeds, dot(velocity, velocity).value()) {
             return Err(("was stopped along a normal that is not the one where it met the surface", start));
         }
         return Ok(());
