@@ -180,9 +180,17 @@ fn what_closes_and_what_opens_in_the_same_step_is_told_apart() {
     assert!(met > 5, "{met}");
 }
 
-/// Forty masses in a row rattle between two walls that they meet by dofs without mass, in steps many times as long as
-/// their fastest periods. The largest and the last energy over that at the start.
-fn rattle(scheme: Scheme, correctors: Vec<Box<dyn Corrector<f64>>>) -> [f64; 2] {
+/// What a run of forty masses in a row did that rattle between two walls, which they meet by dofs without mass, in steps
+/// many times as long as their fastest periods.
+#[derive(Debug)]
+struct Rattled {
+    /// The largest change of the energy, over that at the start.
+    change: f64,
+    /// The same of what contacts have and bodies have not, together.
+    of_all: f64,
+}
+
+fn rattle(scheme: Scheme, correctors: Vec<Box<dyn Corrector<f64>>>) -> Rattled {
     const MASSES: usize = 40;
     let (stiffness, h) = (1e4_f64, 0.3);
     let dofs = MASSES + 2;
@@ -197,14 +205,16 @@ fn rattle(scheme: Scheme, correctors: Vec<Box<dyn Corrector<f64>>>) -> [f64; 2] 
         .build()
         .unwrap();
     let start = run.energy().total();
-    let (mut most, mut switches) = (0.0_f64, 0);
+    let mut rattled = Rattled { change: 0.0, of_all: 0.0 };
     for _ in 0..2000 {
         run.step().unwrap();
-        most = most.max(run.energy().total() / start);
-        switches = run.statistics().contact_changes;
+        let own = run.energy().total();
+        let owed: f64 = run.state().contacts().dissipated().iter().sum();
+        rattled.change = rattled.change.max((own / start - 1.0).abs());
+        rattled.of_all = rattled.of_all.max(((own + owed) / start - 1.0).abs());
     }
-    assert!(switches > 500, "{switches}");
-    [most, run.energy().total() / start]
+    assert!(run.statistics().contact_changes > 500);
+    rattled
 }
 
 #[test]
@@ -212,10 +222,10 @@ fn modes_that_steps_do_not_resolve_keep_their_energy() {
     let makes: [fn() -> Scheme; 2] =
         [|| Box::new(Newmark::trapezoidal()), || Box::new(Bathe::with_radius(1.0).unwrap())];
     for make in makes {
-        let [kept, raw] = [rattle(make(), correctors(true)), rattle(make(), correctors(false))];
-        println!("{}: {kept:?} {raw:?}", make().name());
-        assert!((kept[0] - 1.0).abs() < 1e-6 && (kept[1] - 1.0).abs() < 1e-6, "{}: {kept:?}", make().name());
-        assert!((raw[0] - 1.0).abs() > 1e-2, "{}: {raw:?}", make().name());
+        let [kept, raw] = [true, false].map(|balanced| rattle(make(), correctors(balanced)));
+        // What is missing is owed, and stays small; without it the run goes up without bound.
+        assert!(kept.change < 0.1 && kept.of_all < 1e-10, "{}: {kept:?}", make().name());
+        assert!(raw.change > 10.0, "{}: {raw:?}", make().name());
     }
 }
 
