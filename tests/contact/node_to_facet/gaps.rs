@@ -353,7 +353,7 @@ fn nodes_in_a_dent_have_a_row_for_each_side() {
         assert_eq!((dent.facet(0), dent.facet(1)), (0, 1));
         assert!(now.iter().zip(heights(x, y)).all(|(gap, height)| (gap - height).abs() < 1e-15), "{x} {y}: {now:?}");
     }
-    // Up one side and over its end, which is the shorter one: its row goes on, for the node has not left the other side.
+    // Up one side and over its end, the shorter one: its row goes on, for the node has not left the other side.
     let coordinates = [[2.0, 0.5], [1.0, 0.0], [0.8, 0.1], [1.0, 0.02]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
     let mut short = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(1.0).unwrap();
