@@ -271,7 +271,9 @@ mod tests {
         let ids = features.iter().map(|&feature| ContactId { constraint: 0, feature, candidate: 0 }).collect();
         let mut tangents = Tangents::default();
         tangents.begin(features.len());
-        features.iter().for_each(|_| tangents.push(friction, 1));
+        for _ in features {
+            tangents.push(friction, 1);
+        }
         (ids, tangents)
     }
 

@@ -353,6 +353,19 @@ fn nodes_in_a_dent_have_a_row_for_each_side() {
         assert_eq!((dent.facet(0), dent.facet(1)), (0, 1));
         assert!(now.iter().zip(heights(x, y)).all(|(gap, height)| (gap - height).abs() < 1e-15), "{x} {y}: {now:?}");
     }
+    // Up one side and over its end, the shorter one: its row goes on, for the node has not left the other side.
+    let coordinates = [[2.0, 0.5], [1.0, 0.0], [0.8, 0.1], [1.0, 0.02]];
+    let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    let mut short = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(1.0).unwrap();
+    assert_eq!(gaps(&mut short, &zero).len(), 2);
+    for s in [0.1, 0.3, 0.5] {
+        let mut u = zero;
+        (u[6], u[7]) = (-s, 0.5 * s - 0.02);
+        short.follow_on(0.0, &u).unwrap();
+        let mut now = [0.0; 2];
+        short.gap(0.0, &u, &mut now);
+        assert!(now[0] > 0.0 && now[1].abs() < 1e-15, "{s}: {now:?}");
+    }
     // At the bottom neither is nearer: the first facet has the first row.
     for x in [1.0 - 1e-12, 1.0 + 1e-12] {
         let found = gaps(&mut contact(0.5, [x, 0.0]), &zero);
