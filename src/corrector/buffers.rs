@@ -33,7 +33,7 @@ pub(crate) struct Buffers<T> {
     /// Forces that remove the acceleration jumps, one an engaged row.
     pub(super) forces: Vec<T>,
     /// The same of a group of rows.
-    pub(super) group: GroupProblem<T>,
+    pub(super) group: Box<GroupProblem<T>>,
     /// S = G M⁻¹ Gᵀ of some rows.
     pub(super) s: Vec<T>,
     /// Contacts with friction among the others.
@@ -52,7 +52,7 @@ pub(crate) struct Buffers<T> {
     /// Contacts on dofs without mass that close or open.
     pub(crate) switching: Box<Switching<T>>,
     /// Contacts that get energy together.
-    pub(super) given: Given<T>,
+    pub(super) given: Box<Given<T>>,
 }
 
 /// Rows that get energy together, and the impulses that give it.
@@ -103,7 +103,7 @@ impl<T: Real> Buffers<T> {
             by_straight: reals(rows),
             impulses: reals(rows),
             forces: reals(rows),
-            group: GroupProblem::new(rows),
+            group: Box::new(GroupProblem::new(rows)),
             s: reals(rows.min(FORESEEN) * rows.min(FORESEEN)),
             rubbing: Box::default(),
             slips: Vec::new(),
@@ -114,7 +114,7 @@ impl<T: Real> Buffers<T> {
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
             switching: Box::new(Switching::new(rows, switching)),
-            given,
+            given: Box::new(given),
         }
     }
 

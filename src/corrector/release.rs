@@ -51,10 +51,10 @@ impl<T: Real> Corrector<T> for Release {
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         // (All from the same velocities: contacts that open together have no order.)
-        let mut given = std::mem::take(&mut step.buffers.given);
+        let mut given = std::mem::take(&mut *step.buffers.given);
         given.clear();
         let result = give_back(step, &mut given);
-        step.buffers.given = given;
+        *step.buffers.given = given;
         result
     }
 }

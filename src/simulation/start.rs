@@ -257,24 +257,37 @@ impl<T: Real> Start<'_, T> {
         }
         problem.solve(t, constraints, g, (&mut *projection, massless), &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts)?;
-        if unbalanced.iter().any(|&force| force != T::zero()) {
-            // What contact has not balanced either goes on to the dofs with mass: it comes from inside of the bodies.
-            let mut forces = vec![T::zero(); dofs];
-            for (&dof, &force) in massless.iter().zip(&unbalanced) {
-                forces[dof] = force;
-            }
-            for row in 0..g.rows() {
-                for (dof, weight) in g.row(row).filter(|(dof, _)| massless.binary_search(dof).is_ok()) {
-                    forces[dof] += weight * contacts.lambda[row];
-                }
-            }
-            if pass_on(&mut **system, massless, &motion, &mut forces)? {
-                projection.apply_inverse(&mut forces)?;
-                T::axpy(T::one(), &forces, &mut motion.a);
-            }
-        }
+        pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), &contacts, &mut motion)?;
         Ok(Found { motion, contacts, adjustment })
     }
+}
+
+/// What of the forces on dofs without mass contact has not balanced either goes on to the dofs with mass, and accelerates
+/// them: it comes from inside of the bodies.
+fn pass_on_rest<T: Real>(
+    system: &mut dyn System<T>,
+    (massless, unbalanced): (&[usize], &[T]),
+    (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+    contacts: &ContactState<T>,
+    motion: &mut Motion<T>,
+) -> Result<()> {
+    if unbalanced.iter().all(|&force| force == T::zero()) {
+        return Ok(());
+    }
+    let mut forces = vec![T::zero(); motion.u.len()];
+    for (&dof, &force) in massless.iter().zip(unbalanced) {
+        forces[dof] = force;
+    }
+    for row in 0..g.rows() {
+        for (dof, weight) in g.row(row).filter(|(dof, _)| massless.binary_search(dof).is_ok()) {
+            forces[dof] += weight * contacts.lambda[row];
+        }
+    }
+    if pass_on(system, massless, motion, &mut forces)? {
+        projection.apply_inverse(&mut forces)?;
+        T::axpy(T::one(), &forces, &mut motion.a);
+    }
+    Ok(())
 }
 
 /// The free dofs of a run that starts at rest. Refuses what moves, and ranks, none of which has all of the stiffness.
