@@ -19,10 +19,11 @@ use crate::real::Real;
 ///
 /// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also
 /// the velocity that the exact solution jumps to. Contacts that open in the same step and move the same nodes get these
-/// impulses times one factor, by which their energies together are what they took together. Accelerations need no correction: those of the first open step hold
-/// no contact force. Linear momentum is conserved. ⟦v⟧ and what was taken are relative, so that a velocity common to
-/// all changes nothing. Kinetic energy never exceeds what it was before the impact by more than the scheme makes of it,
-/// and without numerical damping the run keeps what is given back (`docs/theory.md`, section 16).
+/// impulses times one factor, by which their energies together are what they took together. Accelerations need no
+/// correction: those of the first open step hold no contact force. Linear momentum is conserved. ⟦v⟧ and what was taken
+/// are relative, so that a velocity common to all changes nothing. Kinetic energy never exceeds what it was before the
+/// impact by more than the scheme makes of it, and without numerical damping the run keeps what is given back
+/// (`docs/theory.md`, section 16).
 ///
 /// Known failure: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping removes
 /// again. A contact that is pushed shut for good keeps what it took, and so does one of bodies that stay together

@@ -60,8 +60,8 @@ fn is_trapezoidal<T: Real>(stage: &CompiledStage<T>) -> bool {
 }
 
 impl<T: Real> ExcessForces<T> {
-    /// For a linear system, its dofs without mass, and so many contacts. None where there are no such dofs, or none that
-    /// stiffness holds, and for schemes whose forces are not those of the state.
+    /// For a linear system, its dofs without mass, and so many contacts. None where there are no such dofs, or stiffness
+    /// alone does not hold them, and for schemes whose forces are not those of the state.
     pub(super) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
@@ -80,8 +80,8 @@ impl<T: Real> ExcessForces<T> {
         }
         let statics = match MasslessBlock::of_statics(system, massless, at, interface) {
             Ok(statics) => statics,
-            Err(error @ Error::OutOfMemory { .. }) => return Err(error),
-            Err(_) => return Ok(None),
+            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => return Ok(None),
+            Err(error) => return Err(error),
         };
         let (dofs, stages) = (system.dofs(), program.stages.len());
         let vector = || vec![T::zero(); dofs];
@@ -135,8 +135,8 @@ impl<T: Real> ExcessForces<T> {
         }
     }
 
-    /// Solves a stage again until contacts that close or open in it leave the energy as it is, or nearly so. Says by how
-    /// much the energy has changed by what they exert less.
+    /// Solves a stage again until contacts that close or open in it leave the energy as it is, or nearly so. Says by
+    /// how much the energy has changed by what they exert less.
     pub(super) fn solve_again(
         &mut self,
         solve: &mut StageSolve<'_, '_, T>,

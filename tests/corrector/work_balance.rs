@@ -180,8 +180,8 @@ fn what_closes_and_what_opens_in_the_same_step_is_told_apart() {
     assert!(met > 5, "{met}");
 }
 
-/// What a run of forty masses in a row did that rattle between two walls, which they meet by dofs without mass, in steps
-/// many times as long as their fastest periods.
+/// What forty masses in a row did that rattle between two walls, which they meet by dofs without mass, in steps many
+/// times as long as their fastest periods.
 #[derive(Debug)]
 struct Rattled {
     /// The largest change of the energy, over that at the start.
