@@ -207,7 +207,11 @@ impl<T: Real> ExcessForces<T> {
             let at_start = switching.gap(row);
             let (before, after, excess) = switching.forces(row, contacts);
             let closes_or_opens = (before > T::zero()) != (after > T::zero());
-            let counts = closes_or_opens && constraints.law(row) == ContactLaw::Rigid && g.acts_on(row, &statics.dofs);
+            let is_balanced = || constraints.law(row) == ContactLaw::Rigid && g.acts_on(row, &statics.dofs);
+            // (What rests may close and open by rounding, in every step.)
+            let gap = if before > T::zero() { gaps[row] } else { at_start };
+            let is_open = || gap > constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
+            let counts = closes_or_opens && is_balanced() && is_open();
             if !counts && excess.force == T::zero() {
                 *miss = T::zero();
                 continue;

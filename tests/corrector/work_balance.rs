@@ -230,6 +230,77 @@ fn modes_that_steps_do_not_resolve_keep_their_energy() {
 }
 
 #[test]
+fn what_damped_bodies_lose_they_lose_to_damping_alone() {
+    // (The dof without mass is damped as well.)
+    let (h, gap) = (0.02, 0.25);
+    for scheme in [0, 1] {
+        for phase in 0..10 {
+            let stiffness = matrix(3, spring(0, 1, 300.0).into_iter().chain(spring(1, 2, 200.0)));
+            let system = LinearSystem::lumped(vec![0.0, 1.0, 2.0], stiffness).unwrap().rayleigh(0.1, 0.01).unwrap();
+            let mut run = Simulation::builder(system, schemes().swap_remove(scheme).0, h)
+                .velocity(vec![-Fall::SPEED; 3])
+                .constraint(LinearRows::new().unilateral(&[(0, 1.0)], gap + 0.1 * h * Fall::SPEED * f64::from(phase)))
+                .corrector(WorkBalance)
+                .energy_balance()
+                .build()
+                .unwrap();
+            (0..60).for_each(|_| run.step().unwrap());
+            let works = run.energy().works.unwrap();
+            let owed = run.state().contacts().dissipated()[0];
+            assert!(run.statistics().contact_changes == 2 && works.damping < -0.1, "{scheme} {phase}: {works:?}");
+            // (The work of contact is booked by whole steps: stages add to it, and to the remainder.)
+            let is_staged = schemes()[scheme].0.tableau().stages.len() > 1;
+            let left = works.contact + works.corrections + owed;
+            assert!(is_staged || left.abs() < 1e-12, "{scheme} {phase}: {left:e} {works:?}");
+            assert!(works.contact.abs() > 1e-4, "{scheme} {phase}: nothing to correct: {works:?}");
+        }
+    }
+}
+
+#[test]
+fn friction_is_left_out_with_the_force_that_it_belongs_to() {
+    // A mass (2 and 3) on a point without mass (0 along the gap, 1 along the floor) falls at a slant, and slides.
+    for scheme in [0, 1] {
+        for phase in 0..10 {
+            let h = 0.02;
+            let stiffness = matrix(4, spring(0, 2, 300.0).into_iter().chain(spring(1, 3, 200.0)));
+            let gap = (3.0 + 0.1 * f64::from(phase)) * h;
+            let rows = LinearRows::new().unilateral(&[(0, 1.0)], gap).friction(0.3, &[&[(1, 1.0)]]);
+            let system = LinearSystem::lumped(vec![0.0, 0.0, 1.0, 1.0], stiffness).unwrap();
+            let mut run = Simulation::builder(system, schemes().swap_remove(scheme).0, h)
+                .velocity(vec![-1.0, 3.0, -1.0, 3.0])
+                .constraint(rows)
+                .corrector(WorkBalance)
+                .build()
+                .unwrap();
+            let (before, mut impulses) = (run.energy().total(), [0.0; 2]);
+            let momentum = |run: &mut Simulation<'_, f64>| {
+                [[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]].map(|along| run.momentum(&along).unwrap())
+            };
+            let start = momentum(&mut run);
+            for _ in 0..40 {
+                run.step().unwrap();
+                let contacts = run.state().contacts();
+                impulses[0] += contacts.impulses()[0];
+                impulses[1] += contacts.friction_impulses(0)[0];
+            }
+            let end = momentum(&mut run);
+            for k in 0..2 {
+                assert!(
+                    (end[k] - start[k] - impulses[k]).abs() < 1e-12,
+                    "{scheme} {phase}: {start:?} {end:?} {impulses:?}"
+                );
+            }
+            // It slides all the time: friction has the share of the impulse that it has of the force.
+            assert!((impulses[1] + 0.3 * impulses[0]).abs() < 1e-12 * impulses[0], "{scheme} {phase}: {impulses:?}");
+            let v = run.state().velocity();
+            assert!(run.statistics().contact_changes == 2 && (v[2] - 1.0).abs() < 1e-12, "{scheme} {phase}: {v:?}");
+            assert!(run.energy().total() < before, "{scheme} {phase}");
+        }
+    }
+}
+
+#[test]
 fn a_bar_that_bounces_for_long_keeps_its_energy() {
     for (preset, bound) in [(Preset::conservative(), 5e-3), (Preset::explicit(), 0.34)] {
         let (bar, courant) = (WallBar::bouncing(8), 0.5);
