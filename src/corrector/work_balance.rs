@@ -31,8 +31,9 @@ use crate::tableau::Tableau;
 /// near 1 for those that give and one for those that take, by which the kinetic energy changes by Σ J ġ to rounding.
 /// What a contact cannot return so (where ġ is small, or has the wrong sign) it owes, and returns when it closes or
 /// opens again: [`dissipated`](crate::ContactState::dissipated) has it, positive where the bodies are to get it.
-/// Momentum changes by the impulses, which are booked as those of the contacts. Friction on such contacts gets the same
-/// share of its impulse.
+/// Momentum changes by the impulses, which are booked as those of the contacts:
+/// [`impulses`](crate::ContactState::impulses) is what was exerted over a step, [`forces`](crate::ContactState::forces)
+/// what is there at its end. Friction on such contacts gets the same share of its impulse.
 ///
 /// Implicit steps of linear systems are solved again with what such contacts exert too much left out, all through the
 /// step, until the energy stays as it is but for a thousandth of the work (theory, section 15.2); what is left is

@@ -56,7 +56,9 @@ pub struct Impact {
 pub struct Course {
     /// Total contact force over time.
     pub forces: Vec<(f64, f64)>,
-    /// ∫ F dt.
+    /// The impulses of the steps. (A contact that closes or opens in a step exerts its force for a part of it.)
+    pub impulses: Vec<f64>,
+    /// All of them.
     pub impulse: f64,
     /// Mean velocity of each body at the end.
     pub velocities: Vec<f64>,
@@ -165,7 +167,9 @@ impl Impact {
             let contacts = run.state().contacts();
             let force: f64 = contacts.forces().iter().sum();
             course.forces.push((run.time(), force));
-            course.impulse += contacts.impulses().iter().sum::<f64>();
+            let impulse = contacts.impulses().iter().sum::<f64>();
+            course.impulses.push(impulse);
+            course.impulse += impulse;
             touched.iter_mut().zip(contacts.forces()).for_each(|(touched, force)| *touched |= *force > 0.0);
             if force > 0.0 {
                 course.last = run.time();
@@ -223,8 +227,9 @@ impl Course {
     /// The impulse up to a time.
     fn impulse_until(&self, t: f64) -> f64 {
         let whole = self.forces.partition_point(|of| of.0 <= t);
-        let rest = self.forces.get(whole).map_or(0.0, |&(end, force)| (t - end + self.h).max(0.0) * force);
-        self.h * self.forces[..whole].iter().map(|of| of.1).sum::<f64>() + rest
+        let part = |end: f64| ((t - end) / self.h + 1.0).max(0.0);
+        let rest = self.forces.get(whole).map_or(0.0, |&(end, _)| part(end) * self.impulses[whole]);
+        self.impulses[..whole].iter().sum::<f64>() + rest
     }
 
     /// Mean forces in windows of such a width, one after the other, as long as the reference is in contact.
