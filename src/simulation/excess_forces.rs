@@ -213,7 +213,7 @@ impl<T: Real> ExcessForces<T> {
             let is_open = || gap > constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
             let counts = closes_or_opens && is_balanced() && is_open();
             if !counts && excess.force == T::zero() {
-                *miss = T::zero();
+                (*miss, excess.work) = (T::zero(), T::zero());
                 continue;
             }
             let moved = gaps[row] - at_start;

@@ -287,14 +287,14 @@ fn friction_is_left_out_with_the_force_that_it_belongs_to() {
             let end = momentum(&mut run);
             for k in 0..2 {
                 assert!(
-                    (end[k] - start[k] - impulses[k]).abs() < 1e-12,
+                    (end[k] - start[k] - impulses[k]).abs() < 1e-11,
                     "{scheme} {phase}: {start:?} {end:?} {impulses:?}"
                 );
             }
             // It slides all the time: friction has the share of the impulse that it has of the force.
-            assert!((impulses[1] + 0.3 * impulses[0]).abs() < 1e-12 * impulses[0], "{scheme} {phase}: {impulses:?}");
+            assert!((impulses[1] + 0.3 * impulses[0]).abs() < 1e-11 * impulses[0], "{scheme} {phase}: {impulses:?}");
             let v = run.state().velocity();
-            assert!(run.statistics().contact_changes == 2 && (v[2] - 1.0).abs() < 1e-12, "{scheme} {phase}: {v:?}");
+            assert!(run.statistics().contact_changes == 2 && (v[2] - 1.0).abs() < 1e-11, "{scheme} {phase}: {v:?}");
             assert!(run.energy().total() < before, "{scheme} {phase}");
         }
     }
