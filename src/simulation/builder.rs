@@ -3,9 +3,7 @@
 use super::admitted::admitted;
 use super::constraints::Constraints;
 use super::energy::Ledger;
-use super::excess_forces::ExcessForces;
 use super::judge::{Judge, StepControl};
-use super::massless::MasslessBlock;
 use super::massless_start::Balanced;
 use super::newton::{Newton, NewtonWork};
 use super::pairing::{
@@ -452,15 +450,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let slots = history.slots.len();
         let size = ContactSize::new(rows, &g, &constraints);
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
-        if follows {
-            let (name, interface) = (scheme.integrator.name(), constraints.interface());
-            work.block = Some(MasslessBlock::new(&mut *system, &name, &massless, &state.motion, interface)?);
-            work.contact.rows.on_massless = vec![false; rows];
-        } else if work.correction.buffers.switching.is_on() && work.correction.shifted.is_empty() {
-            let size = (constraints.interface(), rows);
-            work.excess = ExcessForces::new(&mut *system, &program, &massless, &state.motion, size)?;
-        }
-        work.keep_massless(massless);
+        let follower = follows.then(|| scheme.integrator.name());
+        work.keep_massless(massless, &mut *system, (&program, follower), &state.motion, constraints.interface())?;
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
         let checked = self.stability == Stability::Checked && together.is_alone();

@@ -1,6 +1,7 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything as it was.
 
 use super::closing::{Booking, note_slips};
+use super::constraints::Constraints;
 use super::contact_rows::Part;
 use super::contact_step::ContactStep;
 use super::energy::StepBooks;
@@ -12,10 +13,14 @@ use super::run::Simulation;
 use super::stage::StageSolve;
 use super::stage_vectors::predict;
 use super::stiffening::Taken;
-use crate::corrector::{Correction, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
+use super::workspace::{CorrectionWork, Workspace};
+use crate::contact::ContactJacobian;
+use crate::contact_solver::ContactSolver;
+use crate::corrector::{Correction, Corrector, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::real::Real;
+use crate::state::{Clock, Motion};
 use crate::tableau::impulse_weight;
 
 impl<T: Real> Simulation<'_, T> {
@@ -208,34 +213,9 @@ impl<T: Real> Simulation<'_, T> {
             let operator = &mut program.operators[stage.operator];
             operator.follow(constraints.version());
             predict(stage, clock, &mut **system, new, past, &mut work.vectors)?;
-            if let Some(projection) = &mut work.correction.projection {
-                refresh(projection, &mut work.correction.projected_rows, constraints.version());
-                work.correction.buffers.begin(&work.contact.trial, stages_before == 0);
-                if !work.correction.shifted.is_empty() {
-                    let mut prediction = Prediction {
-                        h: clock.h * stage.end,
-                        t: new.t,
-                        balance_share: balance_share(stage),
-                        g,
-                        projection,
-                        solver: &mut **contact_solver,
-                        constraints: ErasedGaps(constraints),
-                        start: &past[0],
-                        new,
-                        balance: work.vectors.balance.as_mut().filter(|_| stage.balance.is_some()),
-                        was_closed: &work.contact.trial.closed,
-                        massless: &work.massless,
-                        prescribed: &work.vectors.supports.dofs,
-                        ids: &work.contact.trial.ids,
-                        buffers: &mut work.correction.buffers,
-                        shifted: &mut work.correction.shifted,
-                    };
-                    for corrector in correctors.iter() {
-                        corrector.predict(&mut prediction)?;
-                    }
-                }
-            }
             let is_first = stages_before == 0;
+            let (rows, motions, at) = ((&mut *constraints, &*g), (&mut *new, &*past), (stage, clock, is_first));
+            begin_corrections(work, correctors, &mut **contact_solver, rows, at, motions)?;
             if let Some(excess) = &mut work.excess {
                 excess.begin(constraints.len(), is_first);
                 excess.shift(stage, clock.h, is_first, new);
@@ -311,6 +291,43 @@ impl<T: Real> Simulation<'_, T> {
         }
         Ok(())
     }
+}
+
+/// Tells the corrections that a stage begins, and lets those act on its predicted motion that do.
+fn begin_corrections<T: Real>(
+    work: &mut Workspace<T>,
+    correctors: &[Box<dyn Corrector<T> + '_>],
+    solver: &mut dyn ContactSolver<T>,
+    (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
+    (stage, clock, is_first): (&CompiledStage<T>, Clock, bool),
+    (new, past): (&mut Motion<T>, &[Motion<T>]),
+) -> Result<()> {
+    let CorrectionWork { buffers, projection, projected_rows, shifted, .. } = &mut work.correction;
+    let (Some(projection), Some(start)) = (projection, past.first()) else { return Ok(()) };
+    refresh(projection, projected_rows, constraints.version());
+    buffers.begin(&work.contact.trial, is_first);
+    if shifted.is_empty() {
+        return Ok(());
+    }
+    let mut prediction = Prediction {
+        h: clock.h * stage.end,
+        t: new.t,
+        balance_share: balance_share(stage),
+        g,
+        projection,
+        solver,
+        constraints: ErasedGaps(constraints),
+        start,
+        new,
+        balance: work.vectors.balance.as_mut().filter(|_| stage.balance.is_some()),
+        was_closed: &work.contact.trial.closed,
+        massless: &work.massless,
+        prescribed: &work.vectors.supports.dofs,
+        ids: &work.contact.trial.ids,
+        buffers,
+        shifted,
+    };
+    correctors.iter().try_for_each(|corrector| corrector.predict(&mut prediction))
 }
 
 /// Makes a projection forget rows of another version.

@@ -15,6 +15,7 @@ use super::stiffening::Stiffening;
 use super::supports::Supports;
 use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::error::Result;
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
 use crate::system::System;
@@ -128,10 +129,25 @@ impl<T: Real> Workspace<T> {
         }
     }
 
-    /// Keeps the free dofs without mass.
-    pub(super) fn keep_massless(&mut self, massless: Vec<usize>) {
+    /// Keeps the free dofs without mass, and what they take: `follower` is the name of the scheme if they follow
+    /// statically before the others move.
+    pub(super) fn keep_massless(
+        &mut self,
+        massless: Vec<usize>,
+        system: &mut dyn System<T>,
+        (program, follower): (&Program<T>, Option<String>),
+        at: &Motion<T>,
+        interface: &[usize],
+    ) -> Result<()> {
+        if let Some(name) = follower {
+            self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
+            self.contact.rows.on_massless = vec![false; self.rows];
+        } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
+            self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
+        }
         self.contact.rows.massless.clone_from(&massless);
         self.massless = massless;
+        Ok(())
     }
 
     /// Memory for so many contacts, of so many weights in all.

@@ -260,8 +260,9 @@ mod tests {
         let steps = (5.0 / h).round() as usize;
         let force = |t: f64| if t > 1.0 + later && t < 3.0 + later + 0.5 * h { 2.0 } else { 0.0 };
         let forces: Vec<(f64, f64)> = (1..=steps).map(|k| h * k as f64).map(|t| (t, force(t - 1e-9))).collect();
-        let impulse = h * forces.iter().map(|of| of.1).sum::<f64>();
-        Course { forces, impulse, h, steps, last: 3.0 + later, ..Course::default() }
+        let impulses: Vec<f64> = forces.iter().map(|of| h * of.1).collect();
+        let impulse = impulses.iter().sum();
+        Course { forces, impulses, impulse, h, steps, last: 3.0 + later, ..Course::default() }
     }
 
     #[test]

@@ -308,8 +308,10 @@ impl Step<'_> {
         }
     }
 
-    /// Gives back at release what the corrections took.
+    /// Gives back at release what the corrections took: impulses from the same velocities, and one factor for those that
+    /// act on each other, by which they give the sum.
     fn release(&mut self) {
+        let (mut given, mut energies) = (Vec::new(), Vec::new());
         for i in self.released() {
             let taken = self.contacts.taken[i];
             let (s, rate) = (self.s(i, i), self.scene.rate(i, self.past[0].t, &self.past[0].v));
@@ -320,8 +322,32 @@ impl Step<'_> {
             if taken <= 0.0 || 2.0 * s * taken <= noise * noise {
                 continue;
             }
-            let impulse = ((rate * rate + 2.0 * s * taken).sqrt() - rate) / s;
-            self.apply(&[(i, impulse)]);
+            given.push((i, ((rate * rate + 2.0 * s * taken).sqrt() - rate) / s));
+            energies.push([taken, rate]);
+        }
+        let mut groups: Vec<usize> = (0..given.len()).collect();
+        for (a, b) in (0..given.len()).flat_map(|a| (0..a).map(move |b| (a, b))) {
+            if self.s(given[a].0, given[b].0) != 0.0 {
+                let (from, to) = (groups[a], groups[b]);
+                groups.iter_mut().filter(|group| **group == from).for_each(|group| *group = to);
+            }
+        }
+        let alone = given.clone();
+        for (place, &group) in groups.iter().enumerate() {
+            let mut members = (0..given.len()).filter(|&k| groups[k] == group);
+            let [mut energy, mut first, mut second] = [0.0; 3];
+            for a in members.clone() {
+                energy += energies[a][0];
+                first += alone[a].1 * energies[a][1];
+                second +=
+                    members.clone().map(|b| alone[a].1 * self.s(alone[a].0, alone[b].0) * alone[b].1).sum::<f64>();
+            }
+            if members.any(|member| member != place) {
+                given[place].1 *= ((first * first + 2.0 * second * energy).sqrt() - first) / second;
+            }
+        }
+        self.apply(&given);
+        for (i, impulse) in given {
             self.move_past(i, impulse);
         }
     }
