@@ -41,8 +41,9 @@ pub(super) struct ExcessForces<T: Real> {
     /// empty if a step has one stage.
     change: Vec<T>,
     carried: Vec<T>,
-    /// Whether there is a change in this stage.
+    /// Whether there is a change in this stage, and whether there was one in the stage before.
     is_shifted: bool,
+    is_carried: bool,
     /// How much of an impulse in v is momentum, at the end of a step.
     impulse_weight: T,
 }
@@ -95,6 +96,7 @@ impl<T: Real> ExcessForces<T> {
             change: vector(),
             carried: if stages > 1 { vector() } else { Vec::new() },
             is_shifted: false,
+            is_carried: false,
             impulse_weight: T::of(last.covector[0][1]),
         })))
     }
@@ -107,27 +109,22 @@ impl<T: Real> ExcessForces<T> {
     }
 
     /// Begins a stage, the first of its step or another one, and has it start as the one before has ended.
-    pub(super) fn begin(&mut self, rows: usize, is_first: bool) {
-        if !is_first && self.is_shifted {
+    pub(super) fn begin(&mut self, is_first: bool) {
+        self.is_carried = !is_first && self.is_shifted;
+        if self.is_carried {
             std::mem::swap(&mut self.carried, &mut self.change);
-        } else {
-            self.carried.fill(T::zero());
         }
         self.is_shifted = false;
-        for values in [&mut self.gaps, &mut self.misses] {
-            values.clear();
-            values.resize(rows, T::zero());
-        }
     }
 
     /// Adds to a predicted motion what the forces of the stage before, and those of this one, do to it.
-    pub(super) fn shift(&self, stage: &CompiledStage<T>, h: f64, is_first: bool, new: &mut Motion<T>) {
+    pub(super) fn shift(&self, stage: &CompiledStage<T>, h: f64, new: &mut Motion<T>) {
         if self.is_shifted {
             for (share, out) in shares(stage, h).into_iter().zip([&mut new.u, &mut new.v]) {
                 T::axpy(share, &self.change, out);
             }
         }
-        if !is_first && !self.carried.is_empty() {
+        if self.is_carried {
             // (The state behind the start of this stage is that at the start of the step.)
             for (share, out) in stage.recovery.shares_of_acceleration(1).into_iter().zip([&mut new.u, &mut new.v]) {
                 T::axpy(share, &self.carried, out);
@@ -143,7 +140,6 @@ impl<T: Real> ExcessForces<T> {
         (new, past): (&mut Motion<T>, &[Motion<T>]),
         (vectors, contact): (&mut StageVectors<T>, &mut ContactWork<T>),
         (switching, projection): (&mut Switching<T>, &mut JumpProjection<T>),
-        is_first: bool,
     ) -> Result<T> {
         let Some(start) = past.first() else { return Ok(T::zero()) };
         let mut part = None;
@@ -160,7 +156,7 @@ impl<T: Real> ExcessForces<T> {
             }
             self.press_less(solve.g, projection, &vectors.supports.dofs, &contact.trial, switching)?;
             predict(solve.stage, solve.clock, &mut *solve.system, new, past, vectors)?;
-            self.shift(solve.stage, solve.clock.h, is_first, new);
+            self.shift(solve.stage, solve.clock.h, new);
             solve.directly(None, new, past, vectors, contact)?;
         }
         Ok(if self.is_shifted { dot(&self.forces, &self.followed) } else { T::zero() })
@@ -194,6 +190,9 @@ impl<T: Real> ExcessForces<T> {
         if !switching.switches(contacts) {
             return Ok(T::zero());
         }
+        for values in [&mut *gaps, &mut *misses] {
+            values.resize(constraints.len(), T::zero());
+        }
         constraints.finite_gaps(new.t, &new.u, gaps)?;
         // (The work of a constant force is that along the mean velocity, which β = ¼ makes the way itself.)
         let half = T::of(0.5 * clock.h * (stage.end - stage.start));
@@ -203,7 +202,7 @@ impl<T: Real> ExcessForces<T> {
         statics.follow(way, followed)?;
         way.copy_from_slice(&new.u);
         T::axpy(-T::one(), &start.u, way);
-        for (row, miss) in misses.iter_mut().enumerate().take(constraints.len()) {
+        for (row, miss) in misses.iter_mut().enumerate() {
             let at_start = switching.gap(row);
             let (before, after, excess) = switching.forces(row, contacts);
             let closes_or_opens = (before > T::zero()) != (after > T::zero());

@@ -217,8 +217,8 @@ impl<T: Real> Simulation<'_, T> {
             let (rows, motions, at) = ((&mut *constraints, &*g), (&mut *new, &*past), (stage, clock, is_first));
             begin_corrections(work, correctors, &mut **contact_solver, rows, at, motions)?;
             if let Some(excess) = &mut work.excess {
-                excess.begin(constraints.len(), is_first);
-                excess.shift(stage, clock.h, is_first, new);
+                excess.begin(is_first);
+                excess.shift(stage, clock.h, new);
             }
             work.contact.rows.read_start(constraints, g, past, clock.h)?;
             let (parts, solver) = (&mut **system, &mut **contact_solver);
@@ -231,13 +231,8 @@ impl<T: Real> Simulation<'_, T> {
             }
             if let (Some(excess), Some(projection)) = (&mut work.excess, &mut work.correction.projection) {
                 let switching = &mut *work.correction.buffers.switching;
-                work.correction.energy += excess.solve_again(
-                    &mut solve,
-                    (new, past),
-                    (vectors, contact),
-                    (switching, projection),
-                    is_first,
-                )?;
+                work.correction.energy +=
+                    excess.solve_again(&mut solve, (new, past), (vectors, contact), (switching, projection))?;
             }
             for (&dof, support) in work.vectors.supports.dofs.iter().zip(&work.vectors.supports.state) {
                 new.a[dof] = support[2];
