@@ -30,6 +30,7 @@ mod linear_step;
 mod massless;
 mod massless_start;
 mod massless_step;
+mod mixing;
 mod newton;
 mod newton_step;
 mod operator;

@@ -2,7 +2,7 @@
 //! it.
 
 use super::contact_step::{ContactStep, ContactWork};
-use super::curved_rows::{FOLLOWED, Miss};
+use super::curved_rows::{FOLLOWED, LONG, Miss};
 use super::interface::{advance, keep, restore};
 use super::operator::Operator;
 use super::stage_vectors::StageVectors;
@@ -82,8 +82,47 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 return Ok(true);
             }
             before = [miss, before[0]];
+            if (LONG..FOLLOWED).contains(&(pass + 1)) {
+                self.mix(pass + 1, operator, new, past, vectors, contact)?;
+            }
         }
         Ok(false)
+    }
+
+    /// Linearizes rows where passes are going that do not come there by themselves, after so many `passes`, instead of
+    /// at the result of the last one.
+    fn mix(
+        &mut self,
+        passes: usize,
+        operator: &mut Operator<T>,
+        new: &mut Motion<T>,
+        past: &[Motion<T>],
+        vectors: &mut StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let ContactWork { rows, interface, .. } = contact;
+        let mixing = &mut rows.curved.mixing;
+        // (The first passes fit in nearly every step; what alternates at an edge is found by the next one.)
+        match passes {
+            LONG => mixing.forget(),
+            _ => mixing.learn(&interface.increment),
+        }
+        if mixing.mix(&mut interface.increment) {
+            let mut followed = self.follow(new, vectors, contact);
+            if followed.is_err() {
+                // What is lost there is not lost at the result.
+                let ContactWork { rows, interface, .. } = contact;
+                rows.curved.mixing.give_up(&mut interface.increment);
+                followed = self.follow(new, vectors, contact);
+            }
+            followed?;
+            operator.follow(contact.rows.curved.version(self.constraints));
+            self.evaluate(new, contact)?;
+            self.evaluate_slips(new, past, contact)?;
+        }
+        let ContactWork { rows, interface, .. } = contact;
+        rows.curved.mixing.begin_at(&interface.increment);
+        Ok(())
     }
 
     /// Evaluates y of every row at d without contact, with the rows as they are, after the forces of compliant laws

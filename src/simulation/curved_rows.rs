@@ -7,6 +7,7 @@
 //! to the solution of the unsymmetric G A⁻¹ Fᵀ.
 
 use super::constraints::Constraints;
+use super::mixing::Mixing;
 use crate::contact::ContactJacobian;
 use crate::real::Real;
 
@@ -15,7 +16,7 @@ pub(super) const FOLLOWED: usize = 40;
 
 /// The number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
 /// other, and either pushes it to the other side.
-const LONG: usize = 12;
+pub(super) const LONG: usize = 12;
 
 /// The relative miss of gaps and forces at which rows fit, in units of the rounding.
 const FIT: f64 = 64.0;
@@ -85,6 +86,8 @@ pub(super) struct CurvedRowsWork<T> {
     /// much.
     pub(super) miss: f64,
     pub(super) worst: (usize, T),
+    /// What finds rest where passes come nearer slowly.
+    pub(super) mixing: Mixing<T>,
 }
 
 impl<T: Real> CurvedRowsWork<T> {
@@ -97,6 +100,7 @@ impl<T: Real> CurvedRowsWork<T> {
             foreseen: Vec::new(),
             miss: 0.0,
             worst: (0, T::zero()),
+            mixing: Mixing::new(),
         }
     }
 

@@ -1,0 +1,184 @@
+//! Linearizations of curved rows that converge slowly, or go round a solution: where rows are linearized next is mixed
+//! from the last passes.
+//!
+//! Rows are linearized at d, and the contact problem solved with them has the result r(d). Rows turn with d, and with
+//! them forces, whose change the problem does not know: from pass to pass d then comes nearer to where r(d) = d by a
+//! factor only, which may be nearly one, or below minus one. Anderson's mixing (J. ACM 12, 1965; Walker and Ni, SIAM J.
+//! Numer. Anal. 49, 2011) takes the combination of the last passes in which r − d is least, if it is linear in d.
+
+use crate::real::Real;
+
+/// The number of differences of passes that are mixed.
+const DEPTH: usize = 4;
+
+/// Share of a difference that is left of it, without what it has in common with those of later passes, below which it
+/// is rounding.
+const LEFT: f64 = 1e-6;
+
+/// The longest way from the result of a pass to where rows are linearized next, over that from where they were
+/// linearized to the result: a factor of 0.99 or of 1.01 needs a hundred.
+const FARTHEST: f64 = 1e3;
+
+/// A difference of two passes: of r − d, and of r.
+struct Difference<T> {
+    misses: Vec<T>,
+    results: Vec<T>,
+}
+
+/// Memory for mixing; it has a size once it was needed.
+pub(super) struct Mixing<T> {
+    /// Where the rows of the next pass are linearized.
+    from: Vec<T>,
+    /// The last pass itself.
+    last: Difference<T>,
+    /// Of the passes before, the newest first, and of them what each has that those before it here have not.
+    differences: [Difference<T>; DEPTH],
+    apart: [Difference<T>; DEPTH],
+    known: usize,
+    begun: bool,
+}
+
+impl<T: Real> Difference<T> {
+    fn new() -> Self {
+        Self { misses: Vec::new(), results: Vec::new() }
+    }
+}
+
+impl<T: Real> Mixing<T> {
+    pub(super) fn new() -> Self {
+        Self {
+            from: Vec::new(),
+            last: Difference::new(),
+            differences: std::array::from_fn(|_| Difference::new()),
+            apart: std::array::from_fn(|_| Difference::new()),
+            known: 0,
+            begun: false,
+        }
+    }
+
+    /// Forgets what passes have found.
+    pub(super) fn forget(&mut self) {
+        (self.known, self.begun) = (0, false);
+    }
+
+    /// Notes where the rows of the next pass are linearized.
+    pub(super) fn begin_at(&mut self, d: &[T]) {
+        self.from.clear();
+        self.from.extend_from_slice(d);
+    }
+
+    /// Takes the result of a pass.
+    pub(super) fn learn(&mut self, result: &[T]) {
+        let Self { from, last, differences, .. } = self;
+        let miss = |(&result, &from): (&T, &T)| result - from;
+        let misses = || result.iter().zip(&*from).map(miss);
+        if self.begun {
+            differences.rotate_right(1);
+            let newest = &mut differences[0];
+            newest.misses.clear();
+            newest.misses.extend(misses().zip(&last.misses).map(|(new, &old)| new - old));
+            newest.results.clear();
+            newest.results.extend(result.iter().zip(&last.results).map(|(&new, &old)| new - old));
+            self.known = (self.known + 1).min(DEPTH);
+        }
+        last.misses.clear();
+        last.misses.extend(misses());
+        last.results.clear();
+        last.results.extend_from_slice(result);
+        self.begun = true;
+    }
+
+    /// Moves the result of the last pass to where r − d is least. Says whether it has moved.
+    pub(super) fn mix(&mut self, result: &mut [T]) -> bool {
+        let Self { last, differences, apart, known, .. } = self;
+        let mut used = 0;
+        for difference in &differences[..*known] {
+            let (before, rest) = apart.split_at_mut(used);
+            let new = &mut rest[0];
+            new.misses.clone_from(&difference.misses);
+            new.results.clone_from(&difference.results);
+            for other in before {
+                let share = T::of(-product(&other.misses, &new.misses) / product(&other.misses, &other.misses));
+                T::axpy(share, &other.misses, &mut new.misses);
+                T::axpy(share, &other.results, &mut new.results);
+            }
+            let [left, whole] = [&new.misses, &difference.misses].map(|misses| product(misses, misses));
+            if left > LEFT * LEFT * whole {
+                T::axpy(T::of(-product(&new.misses, &last.misses) / left), &new.results, result);
+                used += 1;
+            }
+        }
+        let way =
+            result.iter().zip(&last.results).map(|(&mixed, &result)| (mixed - result).value().powi(2)).sum::<f64>();
+        if used > 0 && way <= FARTHEST * FARTHEST * product(&last.misses, &last.misses) {
+            return true;
+        }
+        if used > 0 {
+            self.give_up(result);
+        }
+        false
+    }
+
+    /// Goes back to the result of the last pass, and begins anew.
+    pub(super) fn give_up(&mut self, result: &mut [T]) {
+        result.copy_from_slice(&self.last.results);
+        self.forget();
+    }
+}
+
+/// Σ x y, which neither overflows nor underflows where T does.
+fn product<T: Real>(x: &[T], y: &[T]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x.value() * y.value()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// r(d) = c + D (d − c), whose passes come nearer to c by the factors on the diagonal, or go away from it.
+    fn misses(factors: [f64; 3], mixes: bool) -> f64 {
+        let center = [1.0, -2.0, 0.5];
+        let (mut d, mut mixing) = ([0.0; 3], Mixing::new());
+        for _ in 0..6 {
+            mixing.begin_at(&d);
+            d = std::array::from_fn(|k| center[k] + factors[k] * (d[k] - center[k]));
+            mixing.learn(&d);
+            if mixes {
+                mixing.mix(&mut d);
+            }
+        }
+        d.iter().zip(center).map(|(d, c)| (d - c).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn what_is_slow_alternates_or_grows_is_found_at_once() {
+        for factors in [[0.99, 0.5, 0.1], [-1.2, 0.9, 0.3], [1.01, 0.2, -0.4]] {
+            assert!(misses(factors, false) > 0.1);
+            assert!(misses(factors, true) < 1e-9, "{}", misses(factors, true));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_mixed_stays() {
+        let mut mixing = Mixing::new();
+        let mut d = [3.0, 4.0];
+        mixing.begin_at(&[0.0, 0.0]);
+        mixing.learn(&d);
+        // Nothing to compare with yet; then passes that differ in nothing.
+        assert!(!mixing.mix(&mut d));
+        mixing.learn(&d);
+        assert!(!mixing.mix(&mut d));
+        assert_eq!(d, [3.0, 4.0]);
+        // A solution a million times farther than the last way is none.
+        mixing.forget();
+        mixing.begin_at(&[0.0, 0.0]);
+        mixing.learn(&[1.0, 0.0]);
+        mixing.begin_at(&[1.0, 0.0]);
+        let mut d = [2.0 - 1e-6, 0.0];
+        mixing.learn(&d);
+        assert!(!mixing.mix(&mut d));
+        assert_eq!(d, [2.0 - 1e-6, 0.0]);
+        mixing.give_up(&mut d);
+        assert_eq!(d, [2.0 - 1e-6, 0.0]);
+    }
+}
