@@ -25,6 +25,7 @@ mod finite;
 mod gaps;
 mod interface;
 mod judge;
+mod jumps;
 mod laws;
 mod linear_step;
 mod massless;

@@ -113,7 +113,8 @@ impl<T: Real> State<T> {
     /// Accelerations at the time of the state, one a dof.
     ///
     /// Some schemes store v or a of another time ([`Order`](crate::analysis::Order) says which). The values here are
-    /// extrapolated from two states, or those of the scheme where a contact closed or opened between the two.
+    /// extrapolated from two states, or those of the scheme where a contact closed or opened between the two (by more
+    /// than rounding).
     pub fn acceleration(&self) -> &[T] {
         self.motion.shown(&self.shown, 2)
     }

@@ -23,8 +23,11 @@ pub(super) struct ContactWork<T> {
     pub(super) rows: ContactRowsWork<T>,
     /// The contacts of the step that is being tried.
     pub(super) trial: ContactState<T>,
-    /// Closed flags at the start of the step, and before the present stage.
+    /// Closed flags at the start of the step.
     pub(super) closed_at_start: Vec<bool>,
+    /// Which contacts exerted a force at the start of the step.
+    pub(super) exerting_at_start: Vec<bool>,
+    /// Closed flags before the present stage.
     pub(super) was_closed: Vec<bool>,
     /// Which contacts friction held before the present stage; empty without friction.
     pub(super) was_sticking: Vec<bool>,

@@ -100,8 +100,10 @@ impl<T: Real> Operator<T> {
             full,
         };
         match operator.factorize(system, h, at) {
-            // Another state, or a smaller step, may have a definite matrix; if not, the step fails with this error.
-            Err(Error::Singular { .. }) if operator.varies() => return Ok(operator),
+            // Another state, or a smaller step, may have a definite matrix, or one that the host admits: iterations
+            // take their tangents where the balance holds, and a run may go on from such a state. If not, the step
+            // fails with this error.
+            Err(Error::Singular { .. } | Error::Inadmissible { .. }) if operator.varies() => return Ok(operator),
             other => other?,
         }
         if !operator.full.is_empty() {

@@ -7,6 +7,7 @@ use super::contact_step::ContactStep;
 use super::energy::StepBooks;
 use super::finite::{Extent, check_contacts, check_motion};
 use super::judge::Verdict;
+use super::jumps::{jumps, note_exerting};
 use super::massless_step::difference;
 use super::program::CompiledStage;
 use super::run::Simulation;
@@ -47,6 +48,7 @@ impl<T: Real> Simulation<'_, T> {
             ledger.begin(state);
         }
         work.contact.closed_at_start.clone_from(&work.contact.trial.closed);
+        note_exerting(&work.contact.trial, &mut work.contact.exerting_at_start);
         work.backup.begin();
         work.correction.energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
@@ -118,9 +120,11 @@ impl<T: Real> Simulation<'_, T> {
         let changes = flags.filter(|(now, before)| now != before).count();
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
         // (What a bond has let go at the end of the last step is open in this one.)
-        let changes = changes.max(state.broken_at(past[stages - 1].t).len());
-        let finite =
-            scheme.show(new, (changes == 0).then(|| &past[stages - 1]), &work.vectors.supports.dofs, &mut work.shown);
+        let broken = state.broken_at(past[stages - 1].t).len();
+        let jumps = broken.max(jumps(constraints, g, [work.backup.start(past), new], history.clock.h, &work.contact));
+        let changes = changes.max(broken);
+        let from = (jumps == 0).then(|| &past[stages - 1]);
+        let finite = scheme.show(new, from, &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
         // Recovery has checked what it wrote. Still to be checked are dofs whose velocity is differenced, and what
         // corrections have edited.
@@ -144,8 +148,8 @@ impl<T: Real> Simulation<'_, T> {
         check_contacts(new.t, &work.contact.trial)?;
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         if let Some(judge) = judge {
-            let verdict =
-                judge.judge(together, [motion[0], motion[1]], &work.vectors.supports.dofs, history.clock.h, changes)?;
+            let (prescribed, h) = (&work.vectors.supports.dofs[..], history.clock.h);
+            let verdict = judge.judge(together, [motion[0], motion[1]], prescribed, h, [jumps, changes])?;
             if verdict == Verdict::Coarse {
                 return Ok(verdict);
             }
@@ -171,7 +175,7 @@ impl<T: Real> Simulation<'_, T> {
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;
         history.known = (history.known + 1).min(depth);
-        history.smooth = if changes > 0 { 1 } else { history.smooth + 1 };
+        history.smooth = if jumps > 0 { 1 } else { history.smooth + 1 };
         if !history.trail.is_empty() {
             history.trail.push(&history.slots[1], history.made_with);
             for (field, unmoved) in (1..).zip(&mut history.unmoved) {

@@ -102,6 +102,7 @@ impl<T: Real> Workspace<T> {
                 rows: contact_rows,
                 trial: ContactState::with_capacity(rows),
                 closed_at_start: Vec::with_capacity(rows),
+                exerting_at_start: Vec::with_capacity(rows),
                 was_closed: Vec::with_capacity(rows),
                 was_sticking: Vec::new(),
             },
@@ -155,7 +156,8 @@ impl<T: Real> Workspace<T> {
         self.rows = rows;
         self.contact.rows.make_room(rows, entries);
         self.contact.trial.make_room(rows);
-        for flags in [&mut self.contact.closed_at_start, &mut self.contact.was_closed] {
+        let ContactWork { closed_at_start, exerting_at_start, was_closed, .. } = &mut self.contact;
+        for flags in [closed_at_start, exerting_at_start, was_closed] {
             flags.reserve(rows.saturating_sub(flags.len()));
         }
         self.correction.buffers.make_room(rows);

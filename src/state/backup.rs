@@ -39,6 +39,12 @@ impl<T: Real> Backup<T> {
         }
     }
 
+    /// The motion that the step started from, before any edit of it; `past` is as the stages have rotated it.
+    pub(crate) fn start<'p>(&'p self, past: &'p [Motion<T>]) -> &'p Motion<T> {
+        let copy = self.kept.and_then(|rotations| self.slots.get(rotations.checked_sub(1)?));
+        copy.unwrap_or(&past[self.rotations - 1])
+    }
+
     /// The past states that the step may have edited.
     pub(crate) fn edited<'p>(&self, past: &'p [Motion<T>]) -> &'p [Motion<T>] {
         match self.kept {

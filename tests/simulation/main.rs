@@ -5,6 +5,7 @@ mod energy;
 mod explicit_massless;
 mod failures;
 mod finite;
+mod jumps;
 mod limits;
 mod many_contacts;
 mod massless;

@@ -857,3 +857,35 @@ fn gaps_that_never_stand_still_fail_the_step() {
         assert!(refused > 0);
     }
 }
+
+/// A host that does not admit a state, but every motion in which the scheme balances, ends no run there: neither the
+/// one that comes by, nor one that goes on from it.
+#[test]
+fn a_run_goes_on_from_a_state_that_the_host_does_not_admit() {
+    let h = 0.25;
+    let builder = |refused: f64| {
+        let spring = LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap();
+        let host = Hooked::new(spring, move |method, t, _| match method {
+            "force" | "tangent" if t == refused => {
+                Err(Error::Inadmissible { callback: method, source: "an element is turned inside out".into() })
+            }
+            _ => Ok(()),
+        });
+        let host = host.linearity(Linearity::Nonlinear);
+        Simulation::builder(host, GeneralizedAlpha::chung_hulbert(0.5).unwrap(), h).energy_balance()
+    };
+    let mut run = builder(3.0 * h).displacement(vec![1.0]).build().unwrap();
+    for _ in 0..3 {
+        run.step().unwrap();
+    }
+    let mut other = builder(3.0 * h).resume(run.state().clone(), run.history().clone()).build().unwrap();
+    for _ in 0..3 {
+        run.step().unwrap();
+        other.step().unwrap();
+        assert_eq!(run.state().displacement(), other.state().displacement());
+        assert_eq!(run.state().acceleration(), other.state().acceleration());
+    }
+    // At the start accelerations come from the balance there: it is refused.
+    let refused = builder(0.0).displacement(vec![1.0]).build();
+    assert!(matches!(refused, Err(Error::Inadmissible { callback: "force", .. })), "{:?}", refused.err());
+}

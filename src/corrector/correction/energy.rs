@@ -92,14 +92,19 @@ impl<T: Real> Correction<'_, T> {
     /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
     /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative.
     pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
-        let (s, rate) = (self.compliance(row)?, self.rate(row)?);
-        let bound = T::of(T::epsilon().value().powf(2.0 / 3.0)) * (T::of(2.0) * s * energy).sqrt();
-        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
-        let gap = self.contacts.gap[row];
-        let gap_noise = T::of(16.0) * rounding(self.g.magnitude(row, &self.new.u));
-        let h = T::of(self.h);
-        Ok(rate <= bound + noise
-            && gap <= h * (bound + noise) + gap_noise
-            && h * s * self.previous_force(row) <= bound + noise)
+        let s = self.compliance(row)?;
+        let noise = self.parts_by_rounding(row, (T::of(2.0) * s * energy).sqrt())?;
+        Ok(noise.is_some_and(|noise| T::of(self.h) * s * self.previous_force(row) <= noise))
+    }
+
+    /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
+    /// miss a share of ε^⅔: how fast that is.
+    pub(in crate::corrector) fn parts_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
+        let rate = self.rate(row)?;
+        let own = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let noise = T::of(T::epsilon().value().powf(2.0 / 3.0)) * speed + own;
+        let of_gap = T::of(16.0) * rounding(self.g.magnitude(row, &self.new.u));
+        let parts = rate <= noise && self.contacts.gap[row] <= T::of(self.h) * noise + of_gap;
+        Ok(parts.then_some(noise))
     }
 }

@@ -97,24 +97,26 @@ impl Scales {
         self.0 = [u.max(h * v), v, a, forces, forces];
     }
 
-    /// What rounding within a step makes of forces at most, and rounding of the data need not show. W of a light body
-    /// between heavy ones is a sum in which these are lost: forces are known to ε times the ratio of masses. And gaps
-    /// are known to ε u, which forces make up for within a step.
-    fn known(&self, recipe: &Recipe, h: f64, eps: f64) -> f64 {
+    /// What rounding within a step makes of accelerations and of forces at most, and rounding of the data need not
+    /// show. W of a light body between heavy ones is a sum in which these are lost: forces are known to ε times the
+    /// ratio of masses. And gaps are known to ε u, which forces make up for within a step: with ε u/h² for the
+    /// accelerations, and on the heaviest body with so much times its mass, each a share of what it is measured by.
+    fn known(&self, recipe: &Recipe, h: f64, eps: f64) -> [f64; 2] {
         /// Roundings of an entry of W, or of a gap.
         const ROUNDINGS: f64 = 16.0;
         let massive = || recipe.mass.iter().copied().filter(|m| *m > 0.0);
-        let [u, _, a, ..] = self.0;
+        let [u, _, a, forces, _] = self.0;
         let heaviest = massive().fold(0.0, f64::max);
         let ratio = massive().fold(1.0_f64, |most, m| most.max(heaviest / m));
-        let gaps = if a > 0.0 { u / (h * h * a) } else { 0.0 };
-        ROUNDINGS * eps * ratio.max(gaps)
+        let share = |of_gaps: f64, scale: f64| if scale > 0.0 { of_gaps / scale } else { 0.0 };
+        let gaps = u / (h * h);
+        [share(gaps, a), share(heaviest * gaps, forces)].map(|share| ROUNDINGS * eps * ratio.max(share))
     }
 
     /// The largest difference, and of what; of accelerations and forces beyond a share that is `known` to be rounding.
-    fn difference(&self, one: &Trace, other: &Trace, known: f64) -> (f64, &'static str) {
+    fn difference(&self, one: &Trace, other: &Trace, [of_a, of_forces]: [f64; 2]) -> (f64, &'static str) {
         let mut worst = (0.0, "");
-        let known = [0.0, 0.0, known, known, known];
+        let known = [0.0, 0.0, of_a, of_forces, of_forces];
         let lists = one.lists.iter().zip(&other.lists).zip(self.0).zip(NAMES).zip(known);
         for ((((x, y), scale), name), known) in lists {
             let largest = x.iter().zip(y).fold(0.0_f64, |most, (x, y)| most.max((x - y).abs()));
@@ -175,7 +177,7 @@ fn exact<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
         if !trace.is_same(&of_second, T::min_positive_value().value().sqrt() * 1e14) {
             let mut scales = Scales::default();
             scales.see(recipe, trace);
-            let (size, name) = scales.difference(trace, &of_second, 0.0);
+            let (size, name) = scales.difference(trace, &of_second, [0.0; 2]);
             return find(what, step, format!("{name} by {size:e}"));
         }
         if matches!(recipe.twin, Twin::Resumed | Twin::Filed) && step == first.len() / 2 {
@@ -225,7 +227,7 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
         scales.see(recipe, &trace);
         for run in [&one, &two] {
             let of_run = Trace::of(run.recipe, &run.run).on_dofs(recipe);
-            least = least.max(scales.difference(&trace, &of_run, 0.0).0);
+            least = least.max(scales.difference(&trace, &of_run, [0.0; 2]).0);
         }
         let known = scales.known(recipe, run.run.history().step_size() / other.recipe.units[2], eps);
         let (size, name) = scales.difference(&trace, &other.read(&run).on_dofs(recipe), known);

@@ -1,0 +1,56 @@
+//! Contacts that close or open in a step: whether the motion jumps with them, or rounding has said so.
+
+use super::constraints::Constraints;
+use super::contact_step::ContactWork;
+use crate::contact::ContactJacobian;
+use crate::corrector::Gaps;
+use crate::real::Real;
+use crate::state::{ContactState, Motion};
+
+/// Which contacts exert a force, in place of what `exerting` said before.
+pub(super) fn note_exerting<T: Real>(contacts: &ContactState<T>, exerting: &mut Vec<bool>) {
+    exerting.clear();
+    exerting.extend((0..contacts.gap.len()).map(|row| exerts(contacts, row)));
+}
+
+fn exerts<T: Real>(contacts: &ContactState<T>, row: usize) -> bool {
+    contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()
+}
+
+/// How many of the contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion
+/// jump.
+///
+/// Bodies that touch without force come apart, and together, by the sign of the last bit, and so do rows whose force
+/// others hold. Nothing of the motion may follow from that. A contact counts that exerts a force, or has exerted one at
+/// the start of the step or within it, and along whose row the velocity has changed in the step, or h times the
+/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step.
+pub(super) fn jumps<T: Real>(
+    constraints: &Constraints<'_, T>,
+    g: &ContactJacobian<T>,
+    [start, new]: [&Motion<T>; 2],
+    h: f64,
+    contact: &ContactWork<T>,
+) -> usize {
+    let ContactWork { trial, closed_at_start, exerting_at_start, .. } = contact;
+    let flags = trial.closed.iter().zip(closed_at_start).enumerate();
+    let changed = flags.filter(|(_, (now, before))| now != before).map(|(row, _)| row);
+    let share = T::of(T::epsilon().value().powf(2.0 / 3.0));
+    let per_rounding = share / (T::of(64.0) * T::epsilon());
+    let h = T::of(h);
+    let makes_jump = |&row: &usize| {
+        if !(exerting_at_start[row] || exerts(trial, row) || trial.impulse[row] != T::zero()) {
+            return false;
+        }
+        // (The change of the one and of the other, and what they are sums of.)
+        let [of_v, of_a] = [(&start.v, &new.v), (&start.a, &new.a)].map(|(before, now)| {
+            let change = g.product(row, now) - g.product(row, before);
+            (change.abs(), g.magnitude(row, now) + g.magnitude(row, before))
+        });
+        let gap = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
+        let least = share * (of_v.1 + h * of_a.1) + per_rounding * gap / h;
+        // Written so that NaN is a jump.
+        let stays = of_v.0.max(h * of_a.0) <= least;
+        !stays
+    };
+    changed.filter(makes_jump).count()
+}
