@@ -56,7 +56,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         vectors: &mut StageVectors<T>,
         contact: &mut ContactWork<T>,
     ) -> Result<bool> {
-        let mut before = [Miss::ALL; 2];
+        let (mut before, mut mixes) = ([Miss::ALL; 2], false);
         for pass in 0..FOLLOWED {
             match pass {
                 0 => self.observe(operator, new, past, vectors, contact)?,
@@ -81,19 +81,22 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if miss.is_settled::<T>(pass + 1, before) {
                 return Ok(true);
             }
-            before = [miss, before[0]];
-            if (LONG..FOLLOWED).contains(&(pass + 1)) {
-                self.mix(pass + 1, operator, new, past, vectors, contact)?;
+            // (The first passes fit in nearly every step; what alternates at an edge is found by the next one.)
+            let begins = pass + 1 >= LONG || miss.grows(before);
+            if (begins || mixes) && pass + 1 < FOLLOWED {
+                self.mix(mixes, operator, new, past, vectors, contact)?;
+                mixes = true;
             }
+            before = [miss, before[0]];
         }
         Ok(false)
     }
 
-    /// Linearizes rows where passes are going that do not come there by themselves, after so many `passes`, instead of
-    /// at the result of the last one.
+    /// Linearizes rows where passes are going that do not come there by themselves, instead of at the result of the
+    /// last one; the first time there is nothing yet to tell from where that is.
     fn mix(
         &mut self,
-        passes: usize,
+        knows: bool,
         operator: &mut Operator<T>,
         new: &mut Motion<T>,
         past: &[Motion<T>],
@@ -102,10 +105,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         let ContactWork { rows, interface, .. } = contact;
         let mixing = &mut rows.curved.mixing;
-        // (The first passes fit in nearly every step; what alternates at an edge is found by the next one.)
-        match passes {
-            LONG => mixing.forget(),
-            _ => mixing.learn(&interface.increment),
+        match knows {
+            false => mixing.forget(),
+            true => mixing.learn(&interface.increment),
         }
         if mixing.mix(&mut interface.increment) {
             let mut followed = self.follow(new, vectors, contact);

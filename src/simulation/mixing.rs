@@ -25,7 +25,7 @@ struct Difference<T> {
     results: Vec<T>,
 }
 
-/// Memory for mixing; it has a size once it was needed.
+/// Memory for mixing.
 pub(super) struct Mixing<T> {
     /// Where the rows of the next pass are linearized.
     from: Vec<T>,
@@ -53,6 +53,16 @@ impl<T: Real> Mixing<T> {
             apart: std::array::from_fn(|_| Difference::new()),
             known: 0,
             begun: false,
+        }
+    }
+
+    /// Memory for so many dofs.
+    pub(super) fn make_room(&mut self, size: usize) {
+        let Self { from, last, differences, apart, .. } = self;
+        let pairs = std::iter::once(last).chain(differences).chain(apart);
+        let vectors = pairs.flat_map(|Difference { misses, results }| [misses, results]);
+        for vector in vectors.chain([from]) {
+            vector.reserve_exact(size.saturating_sub(vector.len()));
         }
     }
 

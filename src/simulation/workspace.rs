@@ -62,15 +62,16 @@ pub(super) struct ContactSize {
     pub(super) entries: usize,
     /// Dofs that contact may ever act on.
     pub(super) interface: usize,
-    /// Whether there may ever be a row.
+    /// Whether there may ever be a row, and whether rows may move within a step.
     pub(super) may_press: bool,
+    pub(super) curved: bool,
 }
 
 impl ContactSize {
     /// That of the constraints, with room for so many rows.
     pub(super) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
         let (entries, interface) = (g.entries(), constraints.interface().len());
-        Self { rows, entries, interface, may_press: constraints.may_press() }
+        Self { rows, entries, interface, may_press: constraints.may_press(), curved: !constraints.is_affine() }
     }
 }
 
@@ -85,7 +86,7 @@ impl<T: Real> Workspace<T> {
         slots: usize,
     ) -> Self {
         let dofs = system.dofs();
-        let &ContactSize { rows, entries, interface, may_press } = contact;
+        let &ContactSize { rows, entries, interface, may_press, curved } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
         let balances = may_press && correctors.iter().any(Corrector::corrects_massless);
         let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
@@ -95,6 +96,9 @@ impl<T: Real> Workspace<T> {
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
         let supports = Supports::of(system);
         let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
+        if curved && may_press {
+            contact_rows.curved.mixing.make_room(interface);
+        }
         contact_rows.slides_by_way = correctors.iter().any(Corrector::leaves_smooth_motion);
         Self {
             contact: ContactWork {

@@ -1,7 +1,7 @@
 //! Motion along curved gaps without friction: energy, place and work of contact to the order of the scheme, raw and
 //! corrected.
 
-use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
+use contact_dynamics::contact::{GapFunction, NodesOnObstacle, Side, Sphere};
 use contact_dynamics::tableau::ContactLevel;
 use contact_dynamics::{
     Corrector, EnergyMomentum, LinearSystem, Newmark, PersistencyCorrection, Simulation, TimeIntegrator,
@@ -99,5 +99,38 @@ fn single_precision_follows_to_its_own_rounding() {
         assert!((run.energy().total() - 0.5).abs() < 1e-3, "{}: {}", make().name(), run.energy().total());
         let counts = *run.statistics();
         assert!(counts.contact_solves <= 8 * counts.steps, "{}: {counts:?}", make().name());
+    }
+}
+
+/// Two beads in bowls or on hills y = κ x²/2, pressed down: from one linearization to the next places along the curves
+/// move by q = −β h² P κ/m of what they did before. However slowly that comes nearer, or however far it goes back and
+/// forth: gaps are met, and what is not balanced by M a and the load is a force along the normals of the curves.
+#[test]
+fn rows_that_creep_or_go_back_and_forth_are_met() {
+    let factors = [[0.9, 0.9], [0.99, 0.5], [0.998, 0.3], [-0.95, 0.9], [-1.5, -0.5], [-3.0, 0.6]];
+    for [first, second] in factors {
+        let curvature = [first, second].map(|q| -4.0 * q);
+        let curve = |curvature: f64| {
+            move |_: f64, x: &[f64], v: &[f64], gradient: &mut [f64]| {
+                gradient.copy_from_slice(&[-curvature * x[0], 1.0]);
+                [x[1] - 0.5 * curvature * x[0] * x[0], 0.0, -curvature * v[0] * v[0]]
+            }
+        };
+        let load = [0.02, -1.0, 0.01, -1.0];
+        let system = LinearSystem::lumped(vec![1.0; 4], matrix(4, [(0, 0, 0.0)])).unwrap();
+        let system = system.load(move |_, f| f.copy_from_slice(&load));
+        let beads = GapFunction::new(&[0, 1], curve(curvature[0])).and(&[2, 3], curve(curvature[1]));
+        let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1.0).constraint(beads).build().unwrap();
+        run.step().unwrap_or_else(|error| panic!("{first} {second}: {error}"));
+        let state = run.state();
+        let (u, a) = (state.displacement(), state.acceleration());
+        for (bead, curvature) in curvature.into_iter().enumerate() {
+            let [x, y] = [u[2 * bead], u[2 * bead + 1]];
+            let slope = curvature * x;
+            assert!((y - 0.5 * slope * x).abs() < 1e-12, "{first} {second}: gap {:e}", y - 0.5 * slope * x);
+            let force = [0, 1].map(|axis| a[2 * bead + axis] - load[2 * bead + axis]);
+            let along = force[0] + slope * force[1];
+            assert!(force[1] > 0.1 && along.abs() < 1e-7, "{first} {second}: {force:?}, {along:e} along the curve");
+        }
     }
 }
