@@ -1,7 +1,7 @@
 //! What follows for all bodies from contacts that close or open: nothing if rounding alone has closed or opened them.
 
 use contact_dynamics::{LinearRows, LinearSystem, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::schemes::all;
+use contact_dynamics_scenes::schemes::correctable;
 use contact_dynamics_scenes::sparse::matrix;
 
 const H: f64 = 0.1;
@@ -43,7 +43,7 @@ fn beside(mut one: Simulation<'static, f64>, mut other: Simulation<'static, f64>
 #[test]
 fn contacts_that_rounding_closes_change_no_other_body() {
     let (mut closed, mut shown) = (0, 0);
-    for listed in all() {
+    for listed in correctable() {
         let make = listed.make;
         // At rest far from the wall, and beside it.
         let far = (1.0, 0.0);

@@ -211,11 +211,14 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
     let (Ok(mut run), Ok(mut one), Ok(mut two)) = runs else { return None };
     let (mut scales, mut least, mut most) = (Scales::default(), 0.0_f64, 0.0_f64);
     for (step, trace) in first.iter().enumerate() {
+        // (Control has chosen the size of the next step when this one is over.)
+        let (start, mut h) = (run.run.time(), run.run.history().step_size());
         if step > 0 {
             // (What is refused by one of them is at the edge of being refused.)
             if run.advance().and(one.advance()).and(two.advance()).is_err() {
                 break;
             }
+            h = run.run.time() - start;
         }
         // (Control halves a step or does not: where one of them decides otherwise they are discretized differently, and
         // agree to the order of the scheme.)
@@ -229,7 +232,7 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             let of_run = Trace::of(run.recipe, &run.run).on_dofs(recipe);
             least = least.max(scales.difference(&trace, &of_run, [0.0; 2]).0);
         }
-        let known = scales.known(recipe, run.run.history().step_size() / other.recipe.units[2], eps);
+        let known = scales.known(recipe, h / other.recipe.units[2], eps);
         let (size, name) = scales.difference(&trace, &other.read(&run).on_dofs(recipe), known);
         most = most.max(size);
         if least > eps.powf(0.6) {
