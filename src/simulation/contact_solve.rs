@@ -104,7 +104,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
         let ContactWork { rows, interface, .. } = contact;
-        let mixing = &mut rows.curved.mixing;
+        let Some(mixing) = &mut rows.curved.mixing else { return Ok(()) };
         match knows {
             false => mixing.forget(),
             true => mixing.learn(&interface.increment),
@@ -114,7 +114,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if followed.is_err() {
                 // What is lost there is not lost at the result.
                 let ContactWork { rows, interface, .. } = contact;
-                rows.curved.mixing.give_up(&mut interface.increment);
+                rows.curved.mixing.iter_mut().for_each(|mixing| mixing.give_up(&mut interface.increment));
                 followed = self.follow(new, vectors, contact);
             }
             followed?;
@@ -123,7 +123,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             self.evaluate_slips(new, past, contact)?;
         }
         let ContactWork { rows, interface, .. } = contact;
-        rows.curved.mixing.begin_at(&interface.increment);
+        rows.curved.mixing.iter_mut().for_each(|mixing| mixing.begin_at(&interface.increment));
         Ok(())
     }
 

@@ -95,8 +95,8 @@ pub(super) struct CurvedRowsWork<T> {
     /// much.
     pub(super) miss: f64,
     pub(super) worst: (usize, T),
-    /// What finds rest where passes come nearer slowly.
-    pub(super) mixing: Mixing<T>,
+    /// What finds rest where passes come nearer slowly; there if rows may move within a step.
+    pub(super) mixing: Option<Box<Mixing<T>>>,
 }
 
 impl<T: Real> CurvedRowsWork<T> {
@@ -109,7 +109,7 @@ impl<T: Real> CurvedRowsWork<T> {
             foreseen: Vec::new(),
             miss: 0.0,
             worst: (0, T::zero()),
-            mixing: Mixing::new(),
+            mixing: None,
         }
     }
 

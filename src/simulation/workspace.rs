@@ -7,6 +7,7 @@ use super::contact_step::ContactWork;
 use super::excess_forces::ExcessForces;
 use super::interface::InterfaceWork;
 use super::massless::MasslessBlock;
+use super::mixing::Mixing;
 use super::newton::NewtonWork;
 use super::program::Program;
 use super::rate_check::RateCheck;
@@ -97,7 +98,7 @@ impl<T: Real> Workspace<T> {
         let supports = Supports::of(system);
         let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
         if curved && may_press {
-            contact_rows.curved.mixing.make_room(interface);
+            contact_rows.curved.mixing = Some(Box::new(Mixing::new(interface)));
         }
         contact_rows.slides_by_way = correctors.iter().any(Corrector::leaves_smooth_motion);
         Self {

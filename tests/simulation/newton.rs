@@ -866,7 +866,7 @@ fn a_run_goes_on_from_a_state_that_the_host_does_not_admit() {
     let builder = |refused: f64| {
         let spring = LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap();
         let host = Hooked::new(spring, move |method, t, _| match method {
-            "force" | "tangent" if t == refused => {
+            "force" | "tangent" if t.to_bits() == refused.to_bits() => {
                 Err(Error::Inadmissible { callback: method, source: "an element is turned inside out".into() })
             }
             _ => Ok(()),
