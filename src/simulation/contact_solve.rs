@@ -2,7 +2,7 @@
 //! it.
 
 use super::contact_step::{ContactStep, ContactWork};
-use super::curved_rows::{FOLLOWED, LONG, Miss};
+use super::curved_rows::{FOLLOWED, Miss, SLOW};
 use super::interface::{advance, keep, restore};
 use super::operator::Operator;
 use super::stage_vectors::StageVectors;
@@ -56,7 +56,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         vectors: &mut StageVectors<T>,
         contact: &mut ContactWork<T>,
     ) -> Result<bool> {
-        let (mut before, mut mixes) = ([Miss::ALL; 2], false);
+        let mut before = [Miss::ALL; 2];
         for pass in 0..FOLLOWED {
             match pass {
                 0 => self.observe(operator, new, past, vectors, contact)?,
@@ -81,13 +81,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if miss.is_settled::<T>(pass + 1, before) {
                 return Ok(true);
             }
-            // (The first passes fit in nearly every step; what alternates at an edge is found by the next one.)
-            let begins = pass + 1 >= LONG || miss.grows(before);
-            if (begins || mixes) && pass + 1 < FOLLOWED {
-                self.mix(mixes, operator, new, past, vectors, contact)?;
-                mixes = true;
-            }
             before = [miss, before[0]];
+            if (SLOW..FOLLOWED).contains(&(pass + 1)) {
+                self.mix(pass + 1 > SLOW, operator, new, past, vectors, contact)?;
+            }
         }
         Ok(false)
     }

@@ -16,10 +16,10 @@ pub(super) const FOLLOWED: usize = 40;
 
 /// The number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
 /// other, and either pushes it to the other side.
-pub(super) const LONG: usize = 12;
+const LONG: usize = 12;
 
-/// By how much a miss is larger than the one before it where rows go away from what they fit.
-const GROWTH: f64 = 1.1;
+/// The number of linearizations after which they are mixed. Nearly all stages fit by then, or alternate.
+pub(super) const SLOW: usize = 18;
 
 /// The relative miss of gaps and forces at which rows fit, in units of the rounding.
 const FIT: f64 = 64.0;
@@ -30,7 +30,7 @@ pub(super) const NEAR: f64 = 1e-8;
 /// The miss of a gap, in its tolerances, that is accepted where it falls no more.
 pub(super) const NOISE: f64 = 8.0;
 
-/// Share of the forces that they may miss after twice as many passes where gaps miss no more than [`NEAR`].
+/// Share of the forces that they may miss then where gaps miss no more than [`NEAR`].
 const TIRED: f64 = 1e-5;
 
 /// Share of the forces that may alternate then, which is the angle between the sides: both normals are right there.
@@ -60,21 +60,17 @@ impl Miss {
         self.gap.max(self.force)
     }
 
-    /// Whether rows miss more and more, pass by pass. What alternates does not.
-    pub(super) fn grows(self, [before, earlier]: [Self; 2]) -> bool {
-        let [now, before, earlier] = [self, before, earlier].map(Self::largest);
-        now > GROWTH * before && before > GROWTH * earlier
-    }
-
     /// Whether rows fit, or nearly fit and miss no less than in the passes before, that `before` this one and the
     /// `earlier` one, after so many `passes`.
     pub(super) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2]) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let force = if passes > 2 * LONG { TIRED } else { NEAR };
+        let force = if passes > LONG { TIRED } else { NEAR };
         let near = within(NEAR, force) && (now > 0.25 * before.largest() || passes == FOLLOWED);
-        let alternates = passes > LONG && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
+        // (Passes that are mixed may miss as much as before by chance.)
+        let alternates =
+            (LONG + 1..=SLOW).contains(&passes) && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
         now <= fit || near || alternates
     }
 }
