@@ -12,7 +12,7 @@ use crate::contact::ContactJacobian;
 use crate::real::Real;
 
 /// The most linearizations of curved rows in a contact problem.
-pub(super) const FOLLOWED: usize = 40;
+pub(super) const FOLLOWED: usize = 48;
 
 /// The number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
 /// other, and either pushes it to the other side.

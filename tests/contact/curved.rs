@@ -127,7 +127,7 @@ fn rows_that_creep_or_go_back_and_forth_are_met() {
         for (bead, curvature) in curvature.into_iter().enumerate() {
             let [x, y] = [u[2 * bead], u[2 * bead + 1]];
             let slope = curvature * x;
-            assert!((y - 0.5 * slope * x).abs() < 1e-12, "{first} {second}: gap {:e}", y - 0.5 * slope * x);
+            assert!((y - 0.5 * slope * x).abs() < 1e-10, "{first} {second}: gap {:e}", y - 0.5 * slope * x);
             let force = [0, 1].map(|axis| a[2 * bead + axis] - load[2 * bead + axis]);
             let along = force[0] + slope * force[1];
             assert!(force[1] > 0.1 && along.abs() < 1e-5, "{first} {second}: {force:?}, {along:e} along the curve");
