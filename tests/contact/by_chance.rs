@@ -17,6 +17,11 @@ fn named(scenes: &[(&str, u64)]) -> impl Iterator<Item = (Meeting, u64)> {
     })
 }
 
+/// That the energy of a corrected run grows, if it does.
+fn growth(figures: &Figures) -> Option<String> {
+    (figures.corrected && figures.gain > 0.01).then(|| format!("energy grows by {:e}", figures.gain))
+}
+
 /// Runs scenes and says which of them are not as they must be.
 fn check(scenes: impl Iterator<Item = (Meeting, u64)>, wrong: impl Fn(Meeting, u64, &Figures) -> Option<String>) {
     let wrong: Vec<String> = scenes
@@ -37,7 +42,7 @@ fn nothing_is_found() {
         // (What edges and corners do that pass each other unseen is in the table of docs/contact.md.)
         let gains = figures.corrected && !meeting.misses_edges() && figures.gain > 0.01;
         let gain = gains.then(|| format!("energy grows by {:e}", figures.gain));
-        figures.findings.first().cloned().or(gain)
+        figures.findings.first().cloned().or(growth(figures))
     });
 }
 
@@ -88,10 +93,7 @@ fn what_was_found_is_found_no_more() {
         ("BodyContact, of itself, a body that folds, 3-D", 39),
         ("BodyContact, of itself, three bodies, 3-D", 51),
     ];
-    check(named(&FOUND), |_, _, figures| {
-        let gain = (figures.corrected && figures.gain > 0.01).then(|| format!("energy grows by {:e}", figures.gain));
-        figures.findings.first().cloned().or(gain)
-    });
+    check(named(&FOUND), |_, _, figures| figures.findings.first().cloned().or(growth(figures)));
 }
 
 /// Rows that turn with their own forces come nearer to rest from one linearization to the next by a factor of up to
@@ -107,8 +109,7 @@ fn rows_that_turn_with_their_forces_find_rest() {
         ("Mortar, plain, 3-D", 458),
     ];
     check(named(&ENDED), |_, _, figures| {
-        let gain = (figures.corrected && figures.gain > 0.01).then(|| format!("energy grows by {:e}", figures.gain));
         let ended = figures.refused.as_ref().map(|(name, words)| format!("ended, {name}: {words}"));
-        figures.findings.first().cloned().or(ended).or(gain)
+        figures.findings.first().cloned().or(ended).or(growth(figures))
     });
 }
