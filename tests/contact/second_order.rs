@@ -51,7 +51,8 @@ fn the_patch_test_in_three_dimensions() {
 }
 
 /// Nodes that are not in the middle of their sides: pressure is constant up to the size of elements. With 27 nodes and
-/// the upper body as the slave rows are pressed so unevenly that dozens of plain linearizations do not bring them to rest.
+/// the upper body as the slave rows are pressed so unevenly that dozens of plain linearizations do not bring them to
+/// rest.
 #[test]
 fn skewed_sides_of_second_order_pass_the_patch_test_nearly() {
     let skew = |[x, y, z]: [f64; 3]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y, z];
