@@ -846,7 +846,7 @@ fn gaps_that_never_stand_still_fail_the_step() {
                     Error::NewtonNotConverged { iterations: 40, residual, .. } => {
                         assert!(newton.is_some() && residual > 1e-9, "{residual:e}");
                     }
-                    Error::Contact { iterations: 40, residual, .. } => {
+                    Error::Contact { iterations: 48, residual, .. } => {
                         assert!(newton.is_none() && residual > 1e-9, "{residual:e}");
                     }
                     other => panic!("{other:?}"),
