@@ -30,6 +30,10 @@ pub(crate) struct Excess<T> {
     miss: T,
 }
 
+/// The parts of a miss by which an excess may move.
+const SMALLEST_PART: f64 = 0.05;
+const LARGEST_PART: f64 = 4.0;
+
 /// The most directions in which a contact rubs.
 const TANGENTS: usize = 2;
 
@@ -131,7 +135,8 @@ impl<T: Real> Switching<T> {
     }
 
     /// Moves the excess of all rows by a part of what it misses, that of Irons and Tuck (Int. J. Numer. Meth. Eng. 1,
-    /// 1969) behind another one: a contact that presses less comes out farther, and asks for less. Says which part.
+    /// 1969) behind another one: a contact that opens and presses less comes out farther and asks for less, one that
+    /// closes and presses less goes in farther and asks for more. Says which part.
     pub(crate) fn move_excess(&mut self, misses: &[T], before: Option<T>) -> T {
         let mut part = T::of(0.5);
         if let Some(before) = before {
@@ -141,7 +146,7 @@ impl<T: Real> Switching<T> {
                 along += excess.miss * change;
                 square += change * change;
             }
-            part = (before * along / square).abs().min(T::one()).max(T::of(0.05));
+            part = (before * along / square).abs().min(T::of(LARGEST_PART)).max(T::of(SMALLEST_PART));
         }
         for (excess, &miss) in self.excess.iter_mut().zip(misses) {
             excess.force += part * miss;
