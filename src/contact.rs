@@ -33,6 +33,7 @@ mod tie;
 pub use body_contact::BodyContact;
 pub use bond::{BondStrength, BrokenBond};
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
+pub(crate) use contacts::kept_depth;
 pub use contacts::{Contact, Contacts};
 #[cfg(feature = "search")]
 pub use edge_to_edge::EdgeToEdge;

@@ -26,6 +26,7 @@ mod gaps;
 mod interface;
 mod judge;
 mod jumps;
+mod kept_depths;
 mod laws;
 mod linear_step;
 mod massless;

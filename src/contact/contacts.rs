@@ -28,6 +28,7 @@ pub struct Contacts<T> {
     laws: Vec<ContactLaw>,
     rows: ContactJacobian<T>,
     magnitudes: Vec<T>,
+    recoveries: Vec<T>,
     tangents: ContactJacobian<T>,
     /// Where the tangents of each contact begin.
     first_tangents: Vec<usize>,
@@ -43,6 +44,7 @@ impl<T> Default for Contacts<T> {
             laws: Vec::new(),
             rows: ContactJacobian::default(),
             magnitudes: Vec::new(),
+            recoveries: Vec::new(),
             tangents: ContactJacobian::default(),
             first_tangents: Vec::new(),
             frictions: Vec::new(),
@@ -60,16 +62,17 @@ impl<T: Real> Contacts<T> {
 
     /// Forgets all, and keeps the memory.
     pub fn clear(&mut self) {
-        let Self { names, laws, rows, magnitudes, tangents, first_tangents, frictions, positions, normals } = self;
+        let Self { names, laws, rows, magnitudes, recoveries, tangents, .. } = self;
         names.clear();
         laws.clear();
         rows.clear();
         magnitudes.clear();
+        recoveries.clear();
         tangents.clear();
-        first_tangents.clear();
-        frictions.clear();
-        positions.clear();
-        normals.clear();
+        self.first_tangents.clear();
+        self.frictions.clear();
+        self.positions.clear();
+        self.normals.clear();
     }
 
     /// Appends a candidate: its name (feature, candidate), which identifies it from step to step
@@ -95,6 +98,7 @@ impl<T: Real> Contacts<T> {
         self.names.push(name);
         self.laws.push(law);
         self.magnitudes.push(T::zero());
+        self.recoveries.push(T::infinity());
         self.first_tangents.push(self.tangents.rows());
         self.frictions.push(0.0);
         self.positions.push(None);
@@ -142,6 +146,11 @@ impl<T: Real> Contacts<T> {
         self.magnitudes[contact]
     }
 
+    /// What [`Contact::recovery`] was given; infinity if nothing.
+    pub fn recovery(&self, contact: usize) -> T {
+        self.recoveries[contact]
+    }
+
     /// The rows of [`Contact::tangent`], as (place, weight) pairs.
     pub fn tangents(&self, contact: usize) -> Vec<Vec<(usize, T)>> {
         self.tangents_of(contact).map(|row| self.tangents.row(row).collect()).collect()
@@ -185,6 +194,11 @@ impl<T: Real> Contacts<T> {
     }
 }
 
+/// By how much a step measures a gap from below zero, if a contact comes out by no more than its `recovery` in it.
+pub(crate) fn kept_depth<T: Real>(gap: T, recovery: T) -> T {
+    (-gap - recovery).max(T::zero())
+}
+
 /// A candidate that was pushed last: what else there is to say of it.
 #[derive(Debug)]
 pub struct Contact<'c, T> {
@@ -225,6 +239,20 @@ impl<T: Real> Contact<'_, T> {
     pub fn magnitude(&mut self, size: T) -> &mut Self {
         if let Some(magnitude) = self.contacts.magnitudes.last_mut() {
             *magnitude = size;
+        }
+        self
+    }
+
+    /// How far (length, d ≥ 0) a step lets this contact come out of the other body. Where the search at the start of a
+    /// step finds a gap g below −d, the contact has to be at g + d at its end, and no farther. A corner that has come in
+    /// beside an edge, where nothing looked for it, is otherwise thrown out in one step, and gains energy from nothing.
+    /// It is read of [`ContactLaw::Rigid`] only. If not given all comes out at once.
+    ///
+    /// Closed contacts of a state may so have negative gaps. Those at the start of a run are another matter
+    /// ([`InitialOverclosure`](crate::InitialOverclosure)).
+    pub fn recovery(&mut self, depth: T) -> &mut Self {
+        if let Some(last) = self.contacts.recoveries.last_mut() {
+            *last = depth;
         }
         self
     }

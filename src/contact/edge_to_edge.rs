@@ -63,8 +63,7 @@ pub(super) fn check_angle(angle: f64) -> Result<()> {
 /// facets: in the dent that an edge makes it may be none of theirs.
 ///
 /// Edges that a search finds in each other deeper than a thousandth of the shorter one, because a body has come in
-/// elsewhere, come out by so much in a step: their gaps are measured from there (but for springs). To throw them out at
-/// once would create energy.
+/// elsewhere, come out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
 ///
 /// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an
 /// eighth of the smallest one have gone into each other by more than a tenth of their way, taken as straight, or were
@@ -377,7 +376,7 @@ impl<T: Real> EdgeToEdge<T> {
     }
 
     fn find_rows(&mut self, (t, u, v): (f64, &[T], &[T]), ahead: f64) {
-        let Self { nodes, edges, surfaces, vicinity, neighborhood, found, law, .. } = self;
+        let Self { nodes, edges, surfaces, vicinity, neighborhood, found, .. } = self;
         let Vicinity { kin, thickness, reach, .. } = &*vicinity;
         let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
         let [thick, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
@@ -394,10 +393,8 @@ impl<T: Real> EdgeToEdge<T> {
                 if let Some(crossing) = pair.near(reach.least(), way, &at) {
                     let names = (pair.nodes(), |node| nodes.places(node));
                     let row = pair.row(&crossing, &at);
-                    // (A spring is to be compressed.)
-                    let inside = if law.is_compliant() { 0.0 } else { pair.kept_inside(row.0) };
                     let round = (pair.radius(&crossing), pair.offsets.factor);
-                    found.push(([first, second], crossing, inside), round, row, names, u);
+                    found.push(([first, second], crossing), round, row, names, u);
                 }
             }
         }
@@ -460,6 +457,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             let mut contact = contacts.push_row((index[0], index[1]), self.law, (&affine.jacobian, row));
             contact.magnitude(T::of(size)).position(position.map(T::of)).normal(crossing.normal.map(T::of));
+            contact.recovery(T::of(pair.recovery()));
             if self.friction == 0.0 {
                 continue;
             }
@@ -512,7 +510,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
                 Some(crossing) => {
                     let names = (pair.nodes(), |node| nodes.places(node));
                     let round = (pair.radius(&crossing), pair.offsets.factor);
-                    found.push((index, crossing, rows.inside[row]), round, pair.row(&crossing, &at), names, u);
+                    found.push((index, crossing), round, pair.row(&crossing, &at), names, u);
                 }
                 None => found.keep(rows, row),
             }

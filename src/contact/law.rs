@@ -258,6 +258,11 @@ impl ContactLaw {
         matches!(self, Self::StabilizedBipenalty { .. })
     }
 
+    /// Whether what is found deep inside would come out at once, and is to come out slowly instead.
+    pub(crate) fn keeps_depths(&self) -> bool {
+        *self == Self::Rigid
+    }
+
     /// Whether the row is bilateral.
     pub(crate) fn is_equality(&self) -> bool {
         *self == Self::Equality

@@ -11,7 +11,7 @@ mod rates;
 mod rows;
 mod second_order;
 
-use super::surface::{Behind, Bounds, Facet, Nodes, Point, Ramp, Reach, Surface, Thickness, sub};
+use super::surface::{Behind, Bounds, Facet, Nodes, Point, Ramp, Reach, SHALLOW, Surface, Thickness, sub};
 use super::{
     BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
 };
@@ -75,8 +75,9 @@ const BEYOND: f64 = 0.25;
 ///
 /// # Known failure
 ///
-/// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and are thrown out
-///   later. [`BodyContact`](super::BodyContact) has rows for these as well.
+/// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and come out later, by
+///   a thousandth of the smallest facet a step ([`Contact::recovery`](super::Contact::recovery)).
+///   [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
 ///   not exact to rounding (`docs/contact.md`): their areas are those of the parts.
@@ -386,6 +387,11 @@ impl<T: Real> Mortar<T> {
         if self.friction == 0.0 { 0 } else { self.nodes.dimension - 1 }
     }
 
+    /// The size of the smallest facet of both surfaces.
+    fn finest(&self) -> f64 {
+        self.slave.finest().min(self.master.finest())
+    }
+
     /// How far the surfaces have moved against each other since the last search.
     fn moved_since_search(&self) -> f64 {
         let [one, other] = [0, 1].map(|body| {
@@ -460,7 +466,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             let name = (self.slave.nodes()[place], 0);
             let mut contact = contacts.push_row(name, self.law, (&affine.jacobian, row));
             contact.magnitude(T::of(size)).position(spot.position.map(T::of)).normal(spot.normal.map(T::of));
-            contact.friction(self.friction);
+            contact.friction(self.friction).recovery(T::of(SHALLOW * self.finest()));
             (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
         }
         if let Some(bonds) = &self.bonds {
@@ -518,8 +524,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let count = self.tangents();
         // (Asked only where a row has lost its surroundings.)
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
-        let near = self.rows.places.iter().all(is_covered)
-            || self.moved_since_search() <= BEYOND * self.slave.finest().min(self.master.finest());
+        let near = self.rows.places.iter().all(is_covered) || self.moved_since_search() <= BEYOND * self.finest();
         let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
         let made = Made { rubs: count > 0, nodes, slave, factor: thickness.ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {

@@ -8,7 +8,7 @@ mod settings;
 
 #[cfg(doc)]
 use super::ContactConstraint;
-use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, Surface, Vicinity, add_scaled};
+use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, SHALLOW, Surface, Vicinity, add_scaled};
 use super::{ContactLaw, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -82,6 +82,9 @@ impl Pass {
 /// a facet and its way of the step has rows on the other facets around the vertices of the closest one that rise from
 /// there by more than 2.9° (sine 0.05). Within the step rows of a dent stay on their facets, each along its own normal,
 /// as if the facet went on beyond the bottom.
+///
+/// A node that a search finds deeper than a thousandth of the smallest facet, because an edge has come in beside it for
+/// instance, comes out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
 ///
 /// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
 /// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing).
@@ -339,6 +342,17 @@ impl<T: Real> NodeToFacet<T> {
         let rows: usize = self.passes.iter().map(|pass| pass.nodes.len()).sum();
         let entries: usize = self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum();
         (2 * rows, 2 * entries)
+    }
+
+    /// The size of the smallest facet of all passes.
+    fn finest(&self) -> f64 {
+        let own = self.own_surface.as_ref().map_or(f64::INFINITY, Surface::finest);
+        self.surface.finest().min(own)
+    }
+
+    /// How far a node that is inside comes out in a step.
+    fn recovery(&self) -> f64 {
+        SHALLOW * self.finest()
     }
 
     /// Shares of a facet below which closeness to a side or a vertex is rounding.

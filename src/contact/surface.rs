@@ -46,6 +46,10 @@ pub(crate) use vicinity::Vicinity;
 
 use shape::{RIM, Rim};
 
+/// Depth, in shares of a facet or an edge, up to which what is inside is taken for what has just come in, and by which
+/// what is deeper comes out in a step: all at once would throw it.
+pub(crate) const SHALLOW: f64 = 1e-3;
+
 /// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.
 ///
 /// Made of facets ([`new`](Self::new)) or as the outer sides of a mesh of cells ([`of_cells`](Self::of_cells)); both

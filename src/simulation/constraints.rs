@@ -2,6 +2,7 @@
 
 use super::admitted::Admitted;
 use super::constraint_part::{Local, Part, gather, of};
+use super::kept_depths::recovery_of;
 use super::laws::Laws;
 use super::overclosures::Overclosures;
 use super::rate_differences::RateDifferences;
@@ -23,6 +24,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// The tangents before rows were read anew.
     old_tangents: Tangents,
     pub(super) magnitudes: Vec<T>,
+    pub(super) recoveries: Vec<T>,
     /// Rows and rates of a constraint that is evaluated at another motion.
     pub(super) scratch: Contacts<T>,
     pub(super) rates: Vec<GapRates<T>>,
@@ -49,6 +51,8 @@ pub(crate) struct Constraints<'a, T: Real> {
     /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
     pub(super) overclosures: Option<Overclosures<T>>,
     pub(super) added: Vec<T>,
+    /// What is added to gaps in the step under way (empty if there is none).
+    pub(super) kept: Vec<T>,
 }
 
 /// The place of a dof that no constraint has listed among those it may act on.
@@ -130,6 +134,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             tangents: Tangents::default(),
             old_tangents: Tangents::default(),
             magnitudes: Vec::with_capacity(room),
+            recoveries: Vec::with_capacity(room),
             scratch,
             rates: vec![GapRates::default(); room],
             slip_rates: Vec::new(),
@@ -147,6 +152,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             features,
             overclosures: None,
             added: Vec::new(),
+            kept: Vec::new(),
         };
         Ok((constraints, ContactJacobian::default()))
     }
@@ -189,6 +195,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             *stale |= part.stale;
         }
         self.ahead = ahead;
+        self.kept.clear();
         self.read_stale(jacobian)
     }
 
@@ -284,10 +291,11 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses what does not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, magnitudes, places, admitted, .. } = self;
+        let Self { parts, ids, names, laws, magnitudes, recoveries, places, admitted, .. } = self;
         jacobian.clear();
         laws.clear();
         magnitudes.clear();
+        recoveries.clear();
         self.stale = true;
         for (constraint, part) in parts.iter_mut().enumerate() {
             let Part { contacts, dofs, .. } = part;
@@ -315,6 +323,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                     return Err(Error::NotFinite { what, index: laws.len() - 1, value });
                 }
                 magnitudes.push(magnitude);
+                recoveries.push(recovery_of(contacts.recovery(row), law)?);
                 check_entries(contacts.row(row), (dofs, places), contact, "a weight of a contact row (by dof)")?;
             }
             jacobian.append(contacts.rows(), dofs);

@@ -20,13 +20,23 @@ impl<T: Real> Constraints<'_, T> {
             }
             rest = others;
         }
+        self.shift(t, 0, out);
+        self.refuse_infinite(t, "the gap", out)
+    }
+
+    /// Adds to gaps, or to derivatives of them, what is added in the run and in the step.
+    fn shift(&self, t: f64, derivative: usize, out: &mut [T]) {
         if let Some(overclosures) = &self.overclosures {
-            let share = T::of(overclosures.share(t)[0]);
-            for (gap, &added) in out.iter_mut().zip(&self.added) {
-                *gap += share * added;
+            let share = T::of(overclosures.share(t)[derivative]);
+            for (out, &added) in out.iter_mut().zip(&self.added) {
+                *out += share * added;
             }
         }
-        self.refuse_infinite(t, "the gap", out)
+        if derivative == 0 {
+            for (gap, &kept) in out.iter_mut().zip(&self.kept) {
+                *gap += kept;
+            }
+        }
     }
 
     /// Refuses values of the rows that are NaN or infinite.
@@ -217,12 +227,7 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
             found.and(back)?;
             first += self.parts[number].contacts.len();
         }
-        if let Some(overclosures) = &self.overclosures {
-            let share = T::of(overclosures.share(t)[field.min(2)]);
-            for (out, &added) in out.iter_mut().zip(&self.added) {
-                *out += share * added;
-            }
-        }
+        self.shift(t, field.min(2), out);
         self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
     }
 }

@@ -37,13 +37,14 @@ impl<T: Real> Simulation<'_, T> {
     fn attempt_together(&mut self) -> Result<Verdict> {
         let Self { constraints, g, state, history, work, ledger, scheme, contact_solver, .. } = self;
         history.clock.check()?;
-        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g)?;
+        constraints.search_for_step(&state.motion, scheme.ahead() * history.clock.h, g)?;
         if constraints.room() > work.rows {
             work.make_room(constraints.room(), g.entries());
             state.contacts.make_room(constraints.room());
             contact_solver.reserve(constraints.room());
         }
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
+        constraints.measure_from_kept(&mut work.contact.trial.gap);
         if let Some(ledger) = ledger {
             ledger.begin(state);
         }
@@ -74,7 +75,7 @@ impl<T: Real> Simulation<'_, T> {
         let Self { constraints, g, state, history, scheme, .. } = self;
         // Rows may have followed the failed step: back to the state. An error of this search is not lost, for the next
         // step begins with the same search.
-        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
+        constraints.search_for_step(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
 
     /// Refuses a step that has become too long for what presses, or for a system that has stiffened.
@@ -171,6 +172,7 @@ impl<T: Real> Simulation<'_, T> {
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
+        constraints.measure_from_surfaces(&mut work.contact.trial.gap);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;

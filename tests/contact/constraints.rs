@@ -378,3 +378,90 @@ fn forces_of_contacts_are_vectors() {
     assert_eq!([contacts[0].position, contacts[1].position], [None, Some([5.0, 5.0, 0.0])]);
     assert_eq!((contacts[1].status, contacts[2].status), (ContactStatus::Open, ContactStatus::Closed));
 }
+
+/// A floor at zero that is looked for from some time on: what has passed it by then is found inside.
+struct LateFloor {
+    from: f64,
+    law: ContactLaw,
+    recovery: Option<f64>,
+    found: bool,
+}
+
+impl ContactConstraint<f64> for LateFloor {
+    fn dofs(&self) -> &[usize] {
+        &[0]
+    }
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        if self.found {
+            let mut contact = contacts.push((0, 0), self.law, &[(0, 1.0)]);
+            if let Some(depth) = self.recovery {
+                contact.recovery(depth);
+            }
+        }
+    }
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = u[0];
+        Ok(())
+    }
+    fn search(&mut self, t: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
+        let found = t >= self.from;
+        Ok(Candidates::changed_if(std::mem::replace(&mut self.found, found) != found))
+    }
+    fn variation(&self) -> Variation {
+        Variation::BySearch
+    }
+}
+
+/// A mass that falls onto such a floor from 1 above it, with a velocity of −1.
+fn falling(floor: LateFloor) -> Result<Simulation<'static, f64>> {
+    Simulation::builder(free(1), Composite, 0.1).displacement(vec![1.0]).velocity(vec![-1.0]).constraint(floor).build()
+}
+
+#[test]
+fn what_is_found_deep_inside_comes_out_slowly() {
+    let floor = |recovery| LateFloor { from: 1.45, law: ContactLaw::Rigid, recovery, found: false };
+    let mut run = falling(floor(Some(1e-3))).unwrap();
+    run.run_until(1.5, &mut ()).unwrap();
+    let mut energy: f64 = 0.0;
+    for _ in 0..30 {
+        let before = run.state().displacement()[0];
+        run.step().unwrap();
+        let state = run.state();
+        let [gap] = state.contacts().gaps() else { panic!("one row") };
+        energy = energy.max(0.5 * state.velocity()[0].powi(2));
+        // By the depth that was given, and not faster.
+        let out = state.displacement()[0] - before;
+        assert!((0.0..1.5e-3).contains(&out), "comes out by {out:e}");
+        assert!((gap - state.displacement()[0]).abs() < 1e-15 && state.contacts().closed()[0], "{gap:e}");
+    }
+    assert!(energy < 1e-3, "{energy:e}");
+    assert!(run.state().displacement()[0] > -0.5 + 0.02);
+
+    // All at once, unless it is asked for.
+    let mut run = falling(floor(None)).unwrap();
+    run.run_until(1.75, &mut ()).unwrap();
+    assert!(run.state().displacement()[0] > -1e-12);
+}
+
+#[test]
+fn depths_of_springs_and_of_the_start_are_as_they_are() {
+    let law = ContactLaw::Penalty { stiffness: 1.0 };
+    let mut run = falling(LateFloor { from: 1.45, law, recovery: Some(1e-3), found: false }).unwrap();
+    run.run_until(1.55, &mut ()).unwrap();
+    let state = run.state();
+    assert!(state.contacts().gaps()[0] < -0.5 && state.contacts().gaps()[0] == state.displacement()[0]);
+
+    let inside = LateFloor { from: 0.0, law: ContactLaw::Rigid, recovery: Some(1e-3), found: false };
+    let builder = Simulation::builder(free(1), Composite, 0.1).displacement(vec![-0.5]);
+    let error = builder.constraint(inside).build().unwrap_err();
+    assert!(matches!(error, Error::InitialViolation { gap: -0.5, .. }), "{error}");
+}
+
+#[test]
+fn absurd_depths_of_recovery_are_refused() {
+    for depth in [-1e-3, f64::NAN] {
+        let floor = LateFloor { from: 0.0, law: ContactLaw::Rigid, recovery: Some(depth), found: false };
+        let error = falling(floor).unwrap_err();
+        assert!(matches!(error, Error::Parameter { range: "from 0", .. }), "{error}");
+    }
+}

@@ -843,7 +843,7 @@ fn gaps_that_never_stand_still_fail_the_step() {
                 refused += 1;
                 assert!(error.is_recoverable());
                 match error {
-                    Error::NewtonNotConverged { iterations: 40, residual, .. } => {
+                    Error::NewtonNotConverged { iterations: 48, residual, .. } => {
                         assert!(newton.is_some() && residual > 1e-9, "{residual:e}");
                     }
                     Error::Contact { iterations: 48, residual, .. } => {

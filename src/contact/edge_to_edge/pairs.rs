@@ -2,7 +2,7 @@
 
 use super::edges::Edge;
 use super::lines::{Crossing, Ways};
-use crate::contact::surface::{Bounds, Offsets, Point, Surface, add_scaled, dot, sub};
+use crate::contact::surface::{Bounds, Offsets, Point, SHALLOW, Surface, add_scaled, dot, sub};
 
 /// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
 /// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
@@ -11,10 +11,6 @@ pub(super) const LEAST_SINE: f64 = 0.05;
 
 /// Shares of an edge, and sines, that are rounding.
 const ROUNDING: f64 = 1e-9;
-
-/// Depth, in shares of the shorter edge, up to which a pair is kept whatever the shape of the bodies behind, and by
-/// which edges that are in each other come out in a step: all at once would throw them.
-const SHALLOW: f64 = 1e-3;
 
 /// Shares of an edge, of the gap and beyond the ends, within which edges touch: beside a dent, where the normal may be
 /// none of the facets there, they are in contact all the same.
@@ -131,16 +127,17 @@ impl Pair<'_> {
             let (misses, gap) = (self.misses_normal(crossing, at), self.clear(crossing));
             let touches = gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
             // What is in already must be in the bodies, and meet; what comes must come from outside.
-            let inside = || misses <= ROUNDING && gap >= -deepest && self.is_inside(crossing, at);
+            let meets = crossing.excess().into_iter().fold(misses, f64::max) <= ROUNDING;
+            let inside = || meets && gap >= -deepest && self.is_inside(crossing, at);
             let is_met = misses <= if touches { LARGEST_TURN } else { turn };
             is_met && crossing.gap >= -self.depth && (touches || gap >= -SHALLOW * shorter || inside())
         };
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
 
-    /// The depth that edges found inside keep for a step: all but what comes out in one.
-    pub(super) fn kept_inside(&self, gap: f64) -> f64 {
-        (-gap - SHALLOW * self.shorter()).max(0.0)
+    /// How far edges that are in each other come out in a step.
+    pub(super) fn recovery(&self) -> f64 {
+        SHALLOW * self.shorter()
     }
 
     /// The edge beyond whose end the closest points lie, if any, and the opening of the gap for it with its derivatives

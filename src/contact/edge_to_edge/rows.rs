@@ -11,9 +11,6 @@ pub(super) struct Rows<T> {
     pub(super) affine: AffineRows<T>,
     /// The edges of the two surfaces.
     pub(super) pairs: Vec<[usize; 2]>,
-    /// By how much they were in each other at the search, but for what a step takes them out; gaps are measured from
-    /// there.
-    pub(super) inside: Vec<f64>,
     /// The sum of their radii in full size, and the factor that the gap was made with.
     pub(super) rounding: Vec<(f64, f64)>,
     /// The lines through them, with the normal along which the first edge opens.
@@ -22,19 +19,12 @@ pub(super) struct Rows<T> {
 
 impl<T: Real> Rows<T> {
     pub(super) fn new() -> Self {
-        Self {
-            affine: AffineRows::with_capacity(0, 0),
-            pairs: Vec::new(),
-            inside: Vec::new(),
-            rounding: Vec::new(),
-            crossings: Vec::new(),
-        }
+        Self { affine: AffineRows::with_capacity(0, 0), pairs: Vec::new(), rounding: Vec::new(), crossings: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {
         self.affine.clear();
         self.pairs.clear();
-        self.inside.clear();
         self.rounding.clear();
         self.crossings.clear();
     }
@@ -42,15 +32,14 @@ impl<T: Real> Rows<T> {
     /// Appends the row of two edges: their four nodes, the gap and its derivatives by the positions of these.
     pub(super) fn push<'a>(
         &mut self,
-        (pair, crossing, inside): ([usize; 2], Crossing, f64),
+        (pair, crossing): ([usize; 2], Crossing),
         rounding: (f64, f64),
         (gap, row): (f64, [Point; 4]),
         (nodes, places): ([usize; 4], impl Fn(usize) -> &'a [usize]),
         u: &[T],
     ) {
         let entries = nodes.into_iter().zip(row).flat_map(|(node, weights)| places(node).iter().copied().zip(weights));
-        self.affine.push(gap + inside, entries, u);
-        self.inside.push(inside);
+        self.affine.push(gap, entries, u);
         self.rounding.push(rounding);
         self.pairs.push(pair);
         self.crossings.push(crossing);
@@ -60,7 +49,6 @@ impl<T: Real> Rows<T> {
     pub(super) fn keep(&mut self, other: &Self, row: usize) {
         self.affine.keep(&other.affine, row);
         self.pairs.push(other.pairs[row]);
-        self.inside.push(other.inside[row]);
         self.rounding.push(other.rounding[row]);
         self.crossings.push(other.crossings[row]);
     }

@@ -30,7 +30,7 @@ impl<T: Real> Mortar<T> {
     /// Refuses a step in which the surfaces have gone into each other on their way, or have been stopped apart.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
-        let (way, finest) = (motions[0].farthest(&motions[1]), self.slave.finest().min(self.master.finest()));
+        let (way, finest) = (motions[0].farthest(&motions[1]), self.finest());
         if way <= FINE * finest {
             return Ok(());
         }

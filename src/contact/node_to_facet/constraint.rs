@@ -21,6 +21,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
             let mut contact = contacts.push_row((node, candidate), self.law, (&affine.jacobian, row));
             contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
+            contact.recovery(T::of(self.recovery()));
             if self.friction == 0.0 {
                 continue;
             }

@@ -3,7 +3,7 @@
 use super::NodeToFacet;
 use super::candidates::pass_of;
 use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, norm, sub};
-use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
+use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, kept_depth, press_differently};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -31,6 +31,8 @@ struct Crossing<'a> {
     /// A bound of its way against the surface.
     way: f64,
     law: ContactLaw,
+    /// How far it comes out in a step.
+    recovery: f64,
 }
 
 impl<T: Real> NodeToFacet<T> {
@@ -47,7 +49,7 @@ impl<T: Real> NodeToFacet<T> {
         let motions = self.nodes.boxes_of(moved);
         let longest = motions[0].farthest(&motions[1]);
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
-        if longest <= FINE * surfaces.iter().flatten().map(|surface| surface.finest()).fold(f64::INFINITY, f64::min) {
+        if longest <= FINE * self.finest() {
             return Ok(());
         }
         for (positions, u) in ends.iter_mut().zip(step.u) {
@@ -80,7 +82,8 @@ impl<T: Real> NodeToFacet<T> {
                     rounding: Self::rounding(),
                 });
                 let likely = row.map(|row| self.rows.stands[row].facet);
-                let crossing = Crossing { grounds: [start, end], place, likely, node, way, law: self.law };
+                let recovery = self.recovery();
+                let crossing = Crossing { grounds: [start, end], place, likely, node, way, law: self.law, recovery };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
                 let velocity = |node: usize| self.nodes.vector(node, step.v);
                 if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
@@ -130,7 +133,8 @@ impl Crossing<'_> {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
                 return Err(("was stopped where the surface has ended", length, gap));
             };
-            if to.gap.abs() > LARGEST_MISS * length {
+            let kept = if self.law.keeps_depths() { kept_depth(gap, self.recovery) } else { 0.0 };
+            if (to.gap + kept).abs() > LARGEST_MISS * length {
                 return Err(("was stopped away from the surface", length, gap));
             }
             let speed = against(&velocity);
@@ -151,7 +155,7 @@ impl Crossing<'_> {
             return Err(("went through a facet", length, gap));
         }
         let turned = after.is_some_and(|to| dot(from.normal, to.normal) < 0.0);
-        // (A rigid law throws out at once what it finds inside, and no smaller step throws it less.)
+        // (Under a rigid law what is found inside comes out slowly.)
         if self.law.is_compliant() && gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
             return Err(("went through the body that it was in", length, gap));
         }

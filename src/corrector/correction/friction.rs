@@ -1,6 +1,7 @@
 //! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both
 //! in the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
 
+use super::past::FARTHEST;
 use super::{Correction, Jump, Pressed};
 use crate::contact::GapRates;
 use crate::contact_solver::AdmissibleSet;
@@ -126,50 +127,26 @@ impl<T: Real> Correction<'_, T> {
     /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips where
     /// contact sticks. Where it slides the past has had the friction of the impulse that this takes.
     pub(super) fn project_rubbing_field(&mut self, k: usize, field: usize, engaged: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, solver, g, contacts, scheme, h, t, new, energy, .. } = self;
-        let Buffers { rubbing, gaps, rates, slips, past_slips, .. } = &mut **buffers;
-        let motion = &mut past[k - 1];
-        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        let Self { past, constraints, buffers, new, .. } = self;
+        let Buffers { gaps, past_slips, .. } = &mut **buffers;
+        let motion = &past[k - 1];
         constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
         constraints.0.slip_rates(motion.t, &motion.u, &motion.v, past_slips)?;
-        let before = T::of(new.t - motion.t);
-        let tangents = constraints.0.tangents();
-        let first = tangents.all().start;
-        let slip = |row: usize| match field {
-            // From where it is now, back along the way of the obstacle.
-            0 => {
-                let now = slips[row - first];
-                let way = g.row(row).map(|(dof, weight)| weight * (motion.u[dof] - new.u[dof])).sum::<T>();
-                way - before * (now.rate - T::of(0.5) * before * now.acceleration)
+        if self.constraints.0.turn() {
+            // As of contacts without friction, see `see_straight`.
+            self.look_straight((k, field), engaged)?;
+            let straight = self.solve_past((k, field), engaged, true)?;
+            if self.solve_past((k, field), engaged, false)? > T::of(FARTHEST * FARTHEST) * straight {
+                self.solve_past((k, field), engaged, true)?;
             }
-            1 => g.product(row, &motion.v) + past_slips[row - first].rate,
-            _ => g.product(row, &motion.a) + past_slips[row - first].acceleration,
-        };
-        let size = |row: usize, jump: T| {
-            let values = [&motion.u, &motion.v, &motion.a][field.min(2)];
-            rounding(g.magnitude(row, values) + jump.abs())
-        };
-        rubbing.clear();
-        for &row in engaged {
-            let own = tangents.of(row);
-            if own.is_empty() || !contacts.sliding[row] {
-                for row in std::iter::once(row).chain(own) {
-                    let jump = if row < first { gaps[row] } else { slip(row) };
-                    rubbing.push(&Block::new(row, 0, AdmissibleSet::Free));
-                    rubbing.demand(row, jump, size(row, jump), T::zero());
-                }
-            } else {
-                let direction = rubbing.direction(row).map(|f| T::of(tangents.friction(row)) * f);
-                let set = AdmissibleSet::with_friction(0.0, own.len(), true);
-                rubbing.push(&Block { direction: Some(direction), ..Block::new(row, own.len(), set) });
-                rubbing.demand(row, gaps[row], size(row, gaps[row]), T::zero());
-                own.for_each(|row| rubbing.demand(row, slip(row), size(row, slip(row)), T::zero()));
-            }
+        } else {
+            self.solve_past((k, field), engaged, false)?;
         }
-        // A body that has come from a gap had a positive impulse: its past displacement is moved back by that.
-        let presses = if field == 0 { -T::one() } else { T::one() };
-        let ids = &contacts.ids;
-        rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[tangents.owner(row)]))?;
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, energy, .. } = self;
+        let Buffers { rubbing, rates, past_slips, .. } = &mut **buffers;
+        let motion = &mut past[k - 1];
+        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
+        let first = constraints.0.tangents().all().start;
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
             constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
             let jumps = rubbing.jump.iter().zip(&rubbing.left);
@@ -192,6 +169,56 @@ impl<T: Real> Correction<'_, T> {
             contacts.impulse[row] += T::of(unit) * multiplier;
         }
         Ok(())
+    }
+
+    /// Finds the multipliers that project one field of past state k onto the engaged contacts, whose gaps are those at
+    /// its place, or `straight`, as the rows that hold now see them. Says the square of the way of the past, in the norm
+    /// of the mass.
+    fn solve_past(&mut self, (k, field): (usize, usize), engaged: &[usize], straight: bool) -> Result<T> {
+        let Self { past, constraints, buffers, projection, solver, g, contacts, t, new, .. } = self;
+        let Buffers { rubbing, gaps, straight: seen, slips, past_slips, .. } = &mut **buffers;
+        let motion = &past[k - 1];
+        let before = T::of(new.t - motion.t);
+        let tangents = constraints.0.tangents();
+        let first = tangents.all().start;
+        let slip = |row: usize| match field {
+            // From where it is now, back along the way of the obstacle.
+            0 => {
+                let now = slips[row - first];
+                let way = g.row(row).map(|(dof, weight)| weight * (motion.u[dof] - new.u[dof])).sum::<T>();
+                way - before * (now.rate - T::of(0.5) * before * now.acceleration)
+            }
+            1 => g.product(row, &motion.v) + past_slips[row - first].rate,
+            _ => g.product(row, &motion.a) + past_slips[row - first].acceleration,
+        };
+        let size = |row: usize, jump: T| {
+            let values = [&motion.u, &motion.v, &motion.a][field.min(2)];
+            rounding(g.magnitude(row, values) + jump.abs())
+        };
+        rubbing.clear();
+        for (k, &row) in engaged.iter().enumerate() {
+            let own = tangents.of(row);
+            let gap = if straight { seen[k] } else { gaps[row] };
+            if own.is_empty() || !contacts.sliding[row] {
+                for row in std::iter::once(row).chain(own) {
+                    let jump = if row < first { gap } else { slip(row) };
+                    rubbing.push(&Block::new(row, 0, AdmissibleSet::Free));
+                    rubbing.demand(row, jump, size(row, jump), T::zero());
+                }
+            } else {
+                let direction = rubbing.direction(row).map(|f| T::of(tangents.friction(row)) * f);
+                let set = AdmissibleSet::with_friction(0.0, own.len(), true);
+                rubbing.push(&Block { direction: Some(direction), ..Block::new(row, own.len(), set) });
+                rubbing.demand(row, gap, size(row, gap), T::zero());
+                own.for_each(|row| rubbing.demand(row, slip(row), size(row, slip(row)), T::zero()));
+            }
+        }
+        // A body that has come from a gap had a positive impulse: its past displacement is moved back by that.
+        let presses = if field == 0 { -T::one() } else { T::one() };
+        let ids = &contacts.ids;
+        rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[tangents.owner(row)]))?;
+        let changes = rubbing.jump.iter().zip(&rubbing.left).map(|(&jump, &left)| left - jump);
+        Ok(rubbing.increments.iter().zip(changes).map(|(&multiplier, change)| multiplier * change).sum())
     }
 
     /// Reads what slips have of their own.

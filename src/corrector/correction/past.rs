@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::real::Real;
 
 /// How much farther than by the rows that hold now, in the norm of the mass, a projection may move the past.
-const FARTHEST: f64 = 2.0;
+pub(super) const FARTHEST: f64 = 2.0;
 
 impl<T: Real> Correction<'_, T> {
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
@@ -99,8 +99,24 @@ impl<T: Real> Correction<'_, T> {
     /// each other: together they would throw it far. By rows that hold now it goes no farther than the bodies have
     /// come.
     fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, g, contacts, new, .. } = self;
-        let Buffers { rates, jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
+        self.look_straight((k, field), rows)?;
+        let Self { buffers, projection, .. } = self;
+        let Buffers { jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
+        by_straight.clear();
+        by_straight.extend_from_slice(straight);
+        projection.solve(by_straight);
+        let square = |jumps: &[T], by: &[T]| jumps.iter().zip(by).map(|(&jump, &by)| jump * by).sum::<T>();
+        if square(before, jump) > T::of(FARTHEST * FARTHEST) * square(straight, by_straight) {
+            std::mem::swap(before, straight);
+            std::mem::swap(jump, by_straight);
+        }
+        Ok(())
+    }
+
+    /// Reads one field of past state k as the rows that hold now see it.
+    pub(super) fn look_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, g, contacts, new, .. } = self;
+        let Buffers { rates, straight, .. } = &mut **buffers;
         let motion = &past[k - 1];
         constraints.0.rates(new.t, &new.u, &new.v, rates)?;
         let since = T::of(new.t - motion.t);
@@ -115,14 +131,6 @@ impl<T: Real> Correction<'_, T> {
         };
         straight.clear();
         straight.extend(rows.iter().map(|&row| by_rows(row)));
-        by_straight.clear();
-        by_straight.extend_from_slice(straight);
-        projection.solve(by_straight);
-        let square = |jumps: &[T], by: &[T]| jumps.iter().zip(by).map(|(&jump, &by)| jump * by).sum::<T>();
-        if square(before, jump) > T::of(FARTHEST * FARTHEST) * square(straight, by_straight) {
-            std::mem::swap(before, straight);
-            std::mem::swap(jump, by_straight);
-        }
         Ok(())
     }
 

@@ -84,10 +84,14 @@ impl Meeting {
         }
     }
 
-    /// Whether corners may pass corners, or edges cross, unseen: what is inside when it is seen is pushed out at once,
-    /// with energy.
+    /// Whether corners may pass corners, or edges cross, unseen: what is inside when it is seen comes out slowly.
     pub fn misses_edges(&self) -> bool {
         self.constraint == "Mortar" || (self.space == 3 && self.constraint == "NodeToFacet")
+    }
+
+    /// Whether bodies may be in each other because of that, or because corners have no rows.
+    pub(super) fn lets_in(&self) -> bool {
+        self.misses_edges() || self.what == "beside mortar"
     }
 
     /// Dimensions.

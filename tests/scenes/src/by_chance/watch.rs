@@ -84,7 +84,8 @@ impl<'s, const D: usize> Watch<'s, D> {
         figures.touched |= raw.iter().any(|force| *force > 0.0);
         let depth = if self.on_positions { self.deepest(u, contacts.gaps()) } else { 0.0 };
         figures.depth = figures.depth.max(depth / self.element);
-        if depth > DEEPEST * self.element {
+        // (What has come in unseen comes out slowly.)
+        if depth > DEEPEST * self.element && !meeting.lets_in() {
             find(format!("depth {depth:e}, elements are {:e}", self.element));
         }
         if meeting.has_fixed_normals() && depth > ROUNDING * size {
