@@ -36,6 +36,12 @@ impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
     }
 }
 
+/// The share of a velocity, ε^⅔, that rounding may make of it: bodies that touch without force come apart, and together,
+/// by the sign of the last bit.
+pub(crate) fn share_of_rounding<T: Real>() -> T {
+    T::of(T::epsilon().value().powf(2.0 / 3.0))
+}
+
 /// What rounding makes of a sum whose terms have this magnitude.
 pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
     T::of(64.0) * T::epsilon() * magnitude

@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::contact_step::ContactWork;
 use crate::contact::ContactJacobian;
-use crate::corrector::Gaps;
+use crate::corrector::{Gaps, rounding, share_of_rounding};
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
 
@@ -34,8 +34,8 @@ pub(super) fn jumps<T: Real>(
     let ContactWork { trial, closed_at_start, exerting_at_start, .. } = contact;
     let flags = trial.closed.iter().zip(closed_at_start).enumerate();
     let changed = flags.filter(|(_, (now, before))| now != before).map(|(row, _)| row);
-    let share = T::of(T::epsilon().value().powf(2.0 / 3.0));
-    let per_rounding = share / (T::of(64.0) * T::epsilon());
+    let share = share_of_rounding::<T>();
+    let per_rounding = share / rounding(T::one());
     let h = T::of(h);
     let makes_jump = |&row: &usize| {
         if !(exerting_at_start[row] || exerts(trial, row) || trial.impulse[row] != T::zero()) {

@@ -28,6 +28,9 @@ pub const ROOMS: [Room; 17] = [
             "simulation/applied_rows",
             "simulation/admitted",
             "simulation/overclosures",
+            "simulation/kept_depths",
+            "simulation/mixing",
+            "simulation/jumps",
             "simulation/responses",
             "simulation/operator/delassus",
         ],
@@ -61,7 +64,7 @@ pub const ROOMS: [Room; 17] = [
     Room { name: "state, history, clock", files: &["state", "simulation/past"], tests: &["simulation", "checkpoint"] },
     Room {
         name: "starts, dofs without mass",
-        files: &["simulation/start*", "simulation/massless*", "simulation/resumed"],
+        files: &["simulation/start*", "simulation/massless*", "simulation/excess_forces", "simulation/resumed"],
         tests: &["simulation"],
     },
     Room {

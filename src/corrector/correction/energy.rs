@@ -2,6 +2,7 @@
 
 use super::{Correction, rounding};
 use crate::corrector::buffers::Given;
+use crate::corrector::share_of_rounding;
 use crate::error::Result;
 use crate::real::Real;
 
@@ -102,7 +103,7 @@ impl<T: Real> Correction<'_, T> {
     pub(in crate::corrector) fn parts_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
         let rate = self.rate(row)?;
         let own = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
-        let noise = T::of(T::epsilon().value().powf(2.0 / 3.0)) * speed + own;
+        let noise = share_of_rounding::<T>() * speed + own;
         let of_gap = T::of(16.0) * rounding(self.g.magnitude(row, &self.new.u));
         let parts = rate <= noise && self.contacts.gap[row] <= T::of(self.h) * noise + of_gap;
         Ok(parts.then_some(noise))
