@@ -62,7 +62,7 @@ pub(super) fn check_angle(angle: f64) -> Result<()> {
 /// Edges that touch, by 2 % of the shorter one, are in contact even if the normal is up to 30° beside those of the
 /// facets: in the dent that an edge makes it may be none of theirs.
 ///
-/// Edges that a search finds in each other deeper than a thousandth of the shorter one, because a body has come in
+/// Edges that a search finds in each other deeper than 1e-4 of the shorter one, because a body has come in
 /// elsewhere, come out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
 ///
 /// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an

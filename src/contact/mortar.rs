@@ -11,7 +11,7 @@ mod rates;
 mod rows;
 mod second_order;
 
-use super::surface::{Behind, Bounds, Facet, Nodes, Point, Ramp, Reach, SHALLOW, Surface, Thickness, sub};
+use super::surface::{Behind, Bounds, Facet, Nodes, Point, RECOVERY, Ramp, Reach, Surface, Thickness, sub};
 use super::{
     BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
 };
@@ -76,7 +76,7 @@ const BEYOND: f64 = 0.25;
 /// # Known failure
 ///
 /// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and come out later, by
-///   a thousandth of the smallest facet a step ([`Contact::recovery`](super::Contact::recovery)).
+///   1e-4 of the smallest facet a step ([`Contact::recovery`](super::Contact::recovery)).
 ///   [`BodyContact`](super::BodyContact) has rows for these as well.
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
@@ -466,7 +466,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             let name = (self.slave.nodes()[place], 0);
             let mut contact = contacts.push_row(name, self.law, (&affine.jacobian, row));
             contact.magnitude(T::of(size)).position(spot.position.map(T::of)).normal(spot.normal.map(T::of));
-            contact.friction(self.friction).recovery(T::of(SHALLOW * self.finest()));
+            contact.friction(self.friction).recovery(T::of(RECOVERY * self.finest()));
             (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
         }
         if let Some(bonds) = &self.bonds {

@@ -8,7 +8,7 @@ mod settings;
 
 #[cfg(doc)]
 use super::ContactConstraint;
-use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, SHALLOW, Surface, Vicinity, add_scaled};
+use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, RECOVERY, Surface, Vicinity, add_scaled};
 use super::{ContactLaw, check_nodes};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -83,7 +83,7 @@ impl Pass {
 /// there by more than 2.9° (sine 0.05). Within the step rows of a dent stay on their facets, each along its own normal,
 /// as if the facet went on beyond the bottom.
 ///
-/// A node that a search finds deeper than a thousandth of the smallest facet, because an edge has come in beside it for
+/// A node that a search finds deeper than 1e-4 of the smallest facet, because an edge has come in beside it for
 /// instance, comes out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
 ///
 /// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
@@ -352,7 +352,7 @@ impl<T: Real> NodeToFacet<T> {
 
     /// How far a node that is inside comes out in a step.
     fn recovery(&self) -> f64 {
-        SHALLOW * self.finest()
+        RECOVERY * self.finest()
     }
 
     /// Shares of a facet below which closeness to a side or a vertex is rounding.

@@ -46,9 +46,9 @@ pub(crate) use vicinity::Vicinity;
 
 use shape::{RIM, Rim};
 
-/// Depth, in shares of a facet or an edge, up to which what is inside is taken for what has just come in, and by which
-/// what is deeper comes out in a step: all at once would throw it.
-pub(crate) const SHALLOW: f64 = 1e-3;
+/// Share of a facet, or an edge, by which what is found inside comes out in a step: a tenth of what bodies fly in a step
+/// that are as slow as impacts are, a thousandth of the speed of waves. Faster would throw it.
+pub(crate) const RECOVERY: f64 = 1e-4;
 
 /// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.
 ///

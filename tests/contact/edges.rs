@@ -622,9 +622,9 @@ fn edges_that_end_on_edges_gain_no_energy() {
 
 #[test]
 fn edges_that_are_inside_come_out_slowly() {
-    // Found inside by 0.01, of ridges of length 2: out by 0.002 in a step.
+    // Found inside by 0.01, of ridges of length 2: out by 0.0002 in a step.
     let mut contact = Pair::new(1.2, [0.5, 0.5], -0.01).contact::<f64>();
     assert!((Pair::rows(&mut contact)[0].1 + 0.01).abs() < 1e-14);
     let row = ridges(&contact).unwrap();
-    assert!((Contacts::of(&contact).recovery(row) - 0.002).abs() < 1e-15);
+    assert!((Contacts::of(&contact).recovery(row) - 0.0002).abs() < 1e-15);
 }

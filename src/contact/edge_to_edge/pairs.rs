@@ -2,7 +2,7 @@
 
 use super::edges::Edge;
 use super::lines::{Crossing, Ways};
-use crate::contact::surface::{Bounds, Offsets, Point, SHALLOW, Surface, add_scaled, dot, sub};
+use crate::contact::surface::{Bounds, Offsets, Point, RECOVERY, Surface, add_scaled, dot, sub};
 
 /// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
 /// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
@@ -11,6 +11,9 @@ pub(super) const LEAST_SINE: f64 = 0.05;
 
 /// Shares of an edge, and sines, that are rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Depth in shares of the shorter edge up to which a pair is kept whatever the shape of the bodies behind.
+const SHALLOW: f64 = 1e-3;
 
 /// Shares of an edge, of the gap and beyond the ends, within which edges touch: beside a dent, where the normal may be
 /// none of the facets there, they are in contact all the same.
@@ -137,7 +140,7 @@ impl Pair<'_> {
 
     /// How far edges that are in each other come out in a step.
     pub(super) fn recovery(&self) -> f64 {
-        SHALLOW * self.shorter()
+        RECOVERY * self.shorter()
     }
 
     /// The edge beyond whose end the closest points lie, if any, and the opening of the gap for it with its derivatives
