@@ -4,7 +4,7 @@ use crate::OnSystem;
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
-use contact_dynamics::contact::{BodyContact, ContactConstraint, ContactLaw, EdgeToEdge, Mortar, NodeToFacet};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, Mortar, NodeToFacet};
 use contact_dynamics::{PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -145,9 +145,7 @@ impl Fall {
             .step_control(StepControl::halving(h / 256.0)?)
             .constraints(constraints)
             .build()?;
-        // (Gaps of a rigid law are measured from where edges were found inside.)
-        let spring = ContactLaw::Penalty { stiffness: 1.0 };
-        let (mut nodes, mut crossed) = (self.two_passes()?, self.edges()?.with_law(spring));
+        let (mut nodes, mut crossed) = (self.two_passes()?, self.edges()?);
         let up: Vec<f64> = (0..solid.dofs()).map(|dof| f64::from(u8::from(dof % 3 == 2))).collect();
         let (momentum, energy) = (run.momentum(&up)?, run.energy().total());
         let mut figures = FallFigures {
