@@ -250,6 +250,16 @@ impl<T: Real> Contact<'_, T> {
     ///
     /// Closed contacts of a state may so have negative gaps. Those at the start of a run are another matter
     /// ([`InitialOverclosure`](crate::InitialOverclosure)).
+    ///
+    /// ```
+    /// use contact_dynamics::ContactLaw;
+    /// use contact_dynamics::contact::Contacts;
+    ///
+    /// let mut contacts = Contacts::new();
+    /// contacts.push((7, 0), ContactLaw::Rigid, &[(0, 1.0)]).recovery(1e-4);
+    /// contacts.push((8, 0), ContactLaw::Rigid, &[(1, 1.0)]);
+    /// assert_eq!([0, 1].map(|contact| contacts.recovery(contact)), [1e-4, f64::INFINITY]);
+    /// ```
     pub fn recovery(&mut self, depth: T) -> &mut Self {
         if let Some(last) = self.contacts.recoveries.last_mut() {
             *last = depth;
