@@ -194,7 +194,7 @@ impl<T: Real> Contacts<T> {
     }
 }
 
-/// By how much a step measures a gap from below zero, if a contact comes out by no more than its `recovery` in it.
+/// [`ContactLaw::kept_depth`] of what comes out slowly.
 pub(crate) fn kept_depth<T: Real>(gap: T, recovery: T) -> T {
     (-gap - recovery).max(T::zero())
 }

@@ -67,7 +67,7 @@ impl Groups {
         // Counted, then laid out, groups in the order of their first rows.
         starts.clear();
         starts.push(0);
-        place.clear();
+        // (All of it is written before it is read.)
         place.resize(rows.len(), 0);
         for position in 0..rows.len() {
             let first = find(leader, position);
@@ -82,7 +82,6 @@ impl Groups {
         for group in 1..starts.len() {
             starts[group] += starts[group - 1];
         }
-        positions.clear();
         positions.resize(rows.len(), 0);
         next.clear();
         next.extend_from_slice(starts);

@@ -1,5 +1,6 @@
 //! Contact laws: how force and gap of one row belong together.
 
+use super::contacts::kept_depth;
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
@@ -261,6 +262,11 @@ impl ContactLaw {
     /// Whether what is found deep inside would come out at once, and is to come out slowly instead.
     pub(crate) fn keeps_depths(&self) -> bool {
         *self == Self::Rigid
+    }
+
+    /// By how much a step measures a gap from below zero, if a contact comes out by no more than its `recovery` in it.
+    pub(crate) fn kept_depth<T: Real>(&self, gap: T, recovery: T) -> T {
+        if self.keeps_depths() { kept_depth(gap, recovery) } else { T::zero() }
     }
 
     /// Whether the row is bilateral.

@@ -375,3 +375,20 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
         Err(acceptance.failure(pivots, multipliers))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows 0 and 1 lose their multipliers at once, row 1 by the larger pivot, in whatever order they are listed.
+    #[test]
+    fn of_ties_the_largest_pivot_leaves() {
+        let (w, sets) = ([4.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0], [AdmissibleSet::NonNegative; 3]);
+        let problem = ContactProblem::new(&w, &[-1.0; 3], &sets, &[0.0; 3]).unwrap();
+        for rows in [vec![0, 1], vec![1, 0]] {
+            let basis = Basis { rows, direction: vec![-0.5; 2], ..Basis::default() };
+            let (position, step): (usize, f64) = basis.blocking(&problem, 1e-9, &[2.0, 2.0, 0.0]).unwrap();
+            assert_eq!((basis.rows[position], step.to_bits()), (1, 4.0_f64.to_bits()));
+        }
+    }
+}

@@ -96,7 +96,7 @@ type Solved<T> = std::result::Result<(), ContactFailure<T>>;
 
 impl<T: Real> Rubbing<T> {
     /// Forgets all blocks.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         let Self { blocks, rows, owners, jump, tolerance, base, totals, increments, left, noise, .. } = self;
         blocks.clear();
         rows.clear();

@@ -78,7 +78,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             operator.follow(contact.rows.curved.version(self.constraints));
             let miss = self.miss(new, past, contact)?;
             contact.rows.curved.miss = miss.largest();
-            if miss.is_settled::<T>(pass + 1, before) {
+            if miss.is_settled::<T>(pass + 1, before, contact.rows.curved.waits) {
                 return Ok(true);
             }
             before = [miss, before[0]];
@@ -101,7 +101,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
         let ContactWork { rows, interface, .. } = contact;
-        let Some(mixing) = &mut rows.curved.mixing else { return Ok(()) };
+        let Some(mixing) = rows.curved.mixing_now() else { return Ok(()) };
         match knows {
             false => mixing.forget(),
             true => mixing.learn(&interface.increment),

@@ -7,7 +7,7 @@ use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
 use super::scheme::Scheme;
-use super::start_problem::{StartProblem, rubbed, sliding};
+use super::start_problem::{StartProblem, rubbed, sliding, stop_in_time};
 use super::supports::put_initial_supports;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
@@ -229,7 +229,8 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        rub_springs(constraints, g, &mut **contact_solver, (&mut *projection, massless), &mut motion, &mut contacts)?;
+        let pushing = (&mut *projection, *massless);
+        rub_springs(constraints, g, &mut **contact_solver, pushing, h, (&mut motion, &mut contacts))?;
         if !massless.is_empty() {
             // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
             let mut forces = vec![T::zero(); dofs];
@@ -239,6 +240,7 @@ impl<T: Real> Start<'_, T> {
             }
             let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
             let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching)?;
+            problem.h = None;
             problem.rows.retain(|&row| g.acts_on(row, massless));
             problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
@@ -310,41 +312,50 @@ fn rub_springs<T: Real>(
     g: &ContactJacobian<T>,
     solver: &mut dyn ContactSolver<T>,
     (projection, massless): (&mut JumpProjection<T>, &[usize]),
-    motion: &mut Motion<T>,
-    contacts: &mut ContactState<T>,
+    h: f64,
+    (motion, contacts): (&mut Motion<T>, &mut ContactState<T>),
 ) -> Result<()> {
     let mut slips = vec![GapRates::default(); constraints.tangents().len()];
     constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
-    let sliding = sliding(constraints, (g, &slips), motion);
+    let mut sliding = sliding(constraints, (g, &slips), motion);
     let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
-    for row in tangents.contacts().filter(|&row| constraints.law(row).is_spring() && contacts.closed[row]) {
-        if rubbed(tangents, g, massless, row).is_empty() {
-            continue;
-        }
-        let friction = T::of(tangents.friction(row));
-        let direction = sliding.iter().find(|(other, _)| *other == row).map(|(_, along)| along.map(|f| friction * f));
-        let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
-        problem.push(&Block { direction, known: Some(contacts.lambda[row]), ..block });
-        problem.demand(row, T::zero(), T::zero(), T::zero());
-        for k in tangents.of(row) {
-            let own = slips[k - tangents.all().start].acceleration;
-            let size = g.magnitude(k, &motion.a) + own.abs();
-            problem.demand(k, g.product(k, &motion.a) + own, rounding(size), T::zero());
-        }
-    }
-    if problem.rows.is_empty() {
+    let rubs = |row: &usize| constraints.law(*row).is_spring() && !rubbed(tangents, g, massless, *row).is_empty();
+    let rows: Vec<usize> = tangents.contacts().filter(|&row| contacts.closed[row] && rubs(&row)).collect();
+    if rows.is_empty() {
         return Ok(());
     }
-    solver.reserve(problem.rows.len());
-    problem.solve((g, projection), solver, T::one(), (motion.t, |row| constraints.ids[row]))?;
-    let rubs = problem.rows.iter().zip(&problem.totals).filter(|(row, _)| g.is_tangential(**row));
-    let (rows, forces): (Vec<usize>, Vec<T>) = rubs.unzip();
-    projection.push(g, (&rows, &forces), T::one(), &mut motion.a)?;
+    let own = |k: usize| slips[k - tangents.all().start].acceleration;
+    let (rows, forces) = loop {
+        problem.clear();
+        for &row in &rows {
+            let slide = sliding.iter().find(|slide| slide.contact == row);
+            let direction = slide.and_then(|slide| slide.friction(tangents));
+            let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
+            problem.push(&Block { direction, known: Some(contacts.lambda[row]), ..block });
+            problem.demand(row, T::zero(), T::zero(), T::zero());
+            for (at, k) in tangents.of(row).enumerate() {
+                let over = slide.map_or(T::zero(), |slide| slide.to_stop(h)[at]);
+                let size = g.magnitude(k, &motion.a) + own(k).abs() + over.abs();
+                problem.demand(k, g.product(k, &motion.a) + own(k) + over, rounding(size), T::zero());
+            }
+        }
+        solver.reserve(problem.rows.len());
+        problem.solve((g, projection), solver, T::one(), (motion.t, |row| constraints.ids[row]))?;
+        let rubs = problem.rows.iter().zip(&problem.totals).filter(|(row, _)| g.is_tangential(**row));
+        let (rubbed, forces): (Vec<usize>, Vec<T>) = rubs.unzip();
+        let mut a = motion.a.clone();
+        projection.push(g, (&rubbed, &forces), T::one(), &mut a)?;
+        let slower = |k: usize| rubbed.contains(&k).then(|| g.product(k, &a) + own(k));
+        if !stop_in_time(&mut sliding, tangents, h, slower) {
+            motion.a = a;
+            break (rubbed, forces);
+        }
+    };
     for (row, force) in rows.into_iter().zip(forces) {
         (contacts.lambda[row], contacts.lambda_raw[row]) = (force, force);
     }
-    for (row, _) in sliding {
-        contacts.sliding[row] = contacts.closed[row];
+    for slide in sliding {
+        contacts.sliding[slide.contact] = contacts.closed[slide.contact];
     }
     Ok(())
 }

@@ -24,8 +24,10 @@ pub(super) struct StartProblem<T> {
     pub(super) tolerance: Vec<T>,
     /// Additions to the diagonal of S, one entry a candidate.
     compliance: Vec<T>,
-    /// The contacts with friction that slide, with the direction of their friction.
-    sliding: Vec<(usize, [T; 2])>,
+    /// The contacts with friction that slide.
+    sliding: Vec<Slide<T>>,
+    /// The step, within which friction does no more than stop them, if the unknowns are forces on bodies with mass.
+    pub(super) h: Option<f64>,
     /// The rows solved for, and their multipliers.
     solved: Vec<usize>,
     lambda: Vec<T>,
@@ -65,6 +67,7 @@ impl<T: Real> StartProblem<T> {
             tolerance: (0..g.rows()).map(|row| rounding(g.magnitude(row, &motion.a) + own(row).abs())).collect(),
             compliance: vec![T::zero(); constraints.len()],
             sliding,
+            h: Some(h),
             solved: Vec::new(),
             lambda: Vec::new(),
         })
@@ -197,6 +200,7 @@ impl<T: Real> StartProblem<T> {
             tolerance,
             compliance,
             sliding: Vec::new(),
+            h: None,
             solved: Vec::new(),
             lambda: Vec::new(),
         })
@@ -220,7 +224,8 @@ impl<T: Real> StartProblem<T> {
         }
         for &row in self.rows.iter().filter(|&&row| !contacts.tangents.of(row).is_empty()) {
             let bound = T::of(contacts.tangents.friction(row)) * contacts.lambda[row];
-            contacts.sliding[row] = slides(contacts.tangential(row, &contacts.lambda), bound);
+            let moves = self.sliding.iter().any(|slide| slide.contact == row && slide.stops);
+            contacts.sliding[row] = moves || slides(contacts.tangential(row, &contacts.lambda), bound);
         }
         Ok(())
     }
@@ -241,9 +246,15 @@ impl<T: Real> StartProblem<T> {
                 (_, true) => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
                 (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection, unreached), solver)?,
             }
-            let Self { rows, waiting, offset, tolerance, solved, lambda, .. } = self;
+            let Self { rows, waiting, offset, tolerance, sliding, h, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];
             projection.push(g, (solved, lambda), T::one(), &mut pushed)?;
+            if let Some(h) = *h {
+                let (rub, acceleration) = (&*solved, |k: usize| offset[k] + g.product(k, &pushed));
+                if stop_in_time(sliding, constraints.tangents(), h, |k| rub.contains(&k).then(|| acceleration(k))) {
+                    continue;
+                }
+            }
             let violated = |row: &usize| offset[*row] + g.product(*row, &pushed) < -tolerance[*row];
             let joining: Vec<usize> = waiting.iter().copied().filter(violated).collect();
             if joining.is_empty() {
@@ -291,17 +302,19 @@ impl<T: Real> StartProblem<T> {
         (g, projection, unreached): (&ContactJacobian<T>, &mut JumpProjection<T>, &[usize]),
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
-        let Self { rows, offset, tolerance, compliance, sliding, solved, lambda, .. } = self;
+        let Self { rows, offset, tolerance, compliance, sliding, h, solved, lambda, .. } = self;
         let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
         for &row in rows.iter() {
             let own = rubbed(tangents, g, unreached, row);
-            let slides = sliding.iter().find(|(other, _)| *other == row && !own.is_empty());
-            let direction = slides.map(|(_, along)| along.map(|f| T::of(tangents.friction(row)) * f));
+            let slide = sliding.iter().find(|slide| slide.contact == row && !own.is_empty());
+            let direction = slide.and_then(|slide| slide.friction(tangents));
             let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
             let block = Block::new(row, own.len(), set);
             problem.push(&Block { direction, compliance: compliance[row], ..block });
-            for row in std::iter::once(row).chain(own) {
-                problem.demand(row, offset[row], tolerance[row], T::zero());
+            problem.demand(row, offset[row], tolerance[row], T::zero());
+            for (k, row) in own.enumerate() {
+                let over = slide.zip(*h).map_or(T::zero(), |(slide, h)| slide.to_stop(h)[k]);
+                problem.demand(row, offset[row] + over, tolerance[row] + rounding(over.abs()), T::zero());
             }
         }
         solver.reserve(problem.rows.len());
@@ -325,12 +338,53 @@ pub(super) fn rubbed<T: Real>(
     if reaches { own } else { 0..0 }
 }
 
-/// The contacts with friction that slide at the start, with the direction of their friction: against the slip.
+/// A contact with friction that slides at the start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slide<T> {
+    pub(super) contact: usize,
+    /// The direction of its friction: against the slip.
+    direction: [T; 2],
+    speed: T,
+    /// Whether its friction would turn the slip round within the first step. Coulomb's law then holds of the slip at
+    /// the end of the step: the force stops the slip, if the bound allows it.
+    stops: bool,
+}
+
+impl<T: Real> Slide<T> {
+    /// The friction over the normal force, if it is all that there may be.
+    pub(super) fn friction(&self, tangents: &Tangents) -> Option<[T; 2]> {
+        (!self.stops).then(|| self.direction.map(|f| T::of(tangents.friction(self.contact)) * f))
+    }
+
+    /// The slip over the step, if that is to be stopped.
+    pub(super) fn to_stop(&self, h: f64) -> [T; 2] {
+        self.direction.map(|f| if self.stops { -self.speed / T::of(h) * f } else { T::zero() })
+    }
+}
+
+/// Notes what would slide back at the end of a step h with the accelerations along tangential rows, if they have
+/// friction; says whether there is any that was not known.
+pub(super) fn stop_in_time<T: Real>(
+    sliding: &mut [Slide<T>],
+    tangents: &Tangents,
+    h: f64,
+    acceleration: impl Fn(usize) -> Option<T>,
+) -> bool {
+    let mut found = false;
+    for slide in sliding.iter_mut().filter(|slide| !slide.stops) {
+        let along = tangents.of(slide.contact).zip(slide.direction).map(|(k, f)| Some(acceleration(k)? * f));
+        slide.stops = along.sum::<Option<T>>().is_some_and(|slower| T::of(h) * slower > slide.speed);
+        found |= slide.stops;
+    }
+    found
+}
+
+/// The contacts with friction that slide at the start.
 pub(super) fn sliding<T: Real>(
     constraints: &Constraints<'_, T>,
     (g, rates): (&ContactJacobian<T>, &[GapRates<T>]),
     motion: &Motion<T>,
-) -> Vec<(usize, [T; 2])> {
+) -> Vec<Slide<T>> {
     let tangents = constraints.tangents();
     let mut sliding = Vec::new();
     for row in tangents.contacts() {
@@ -342,7 +396,7 @@ pub(super) fn sliding<T: Real>(
         }
         let speed = slip[0].hypot(slip[1]);
         if speed > noise {
-            sliding.push((row, slip.map(|slip| -slip / speed)));
+            sliding.push(Slide { contact: row, direction: slip.map(|slip| -slip / speed), speed, stops: false });
         }
     }
     sliding

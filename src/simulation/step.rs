@@ -74,8 +74,8 @@ impl<T: Real> Simulation<'_, T> {
         self.put_back();
         let Self { constraints, g, state, history, scheme, .. } = self;
         // Rows may have followed the failed step: back to the state. An error of this search is not lost, for the next
-        // step begins with the same search.
-        constraints.search_for_step(&state.motion, scheme.ahead() * history.clock.h, g).ok();
+        // step begins with one.
+        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
     }
 
     /// Refuses a step that has become too long for what presses, or for a system that has stiffened.

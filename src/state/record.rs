@@ -249,9 +249,6 @@ fn tangents(friction: &[(usize, f64, usize)], n: usize) -> Result<Tangents> {
     if friction.is_empty() {
         return Ok(tangents);
     }
-    if friction.len() > n {
-        length("the contacts with friction of a checkpoint", friction.len(), n)?;
-    }
     tangents.begin(n);
     for &(contact, coefficient, rows) in friction {
         let range = tangents.listed() as u64..=(n as u64).saturating_sub(1);

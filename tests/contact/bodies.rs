@@ -219,7 +219,11 @@ fn corners_in_the_plane_gain_no_energy() {
 
 #[test]
 fn blocks_gain_no_energy_and_stay_out_of_each_other() {
-    for (landing, fall, until) in [(Landing::Corner, 1, 4.0), (Landing::Edge, 0, 3.0), (Landing::Beside, 5, 4.5)] {
+    // (In the last one linearizations that were mixed found another solution, and 5 % of the energy, where half of the
+    // step finds its own.)
+    let falls =
+        [(Landing::Corner, 1, 4.0), (Landing::Edge, 0, 3.0), (Landing::Beside, 5, 4.5), (Landing::Beside, 11, 3.0)];
+    for (landing, fall, until) in falls {
         let mut random = xorshift(77);
         for number in 0..=fall {
             let scene = Fall::new(landing, &mut random);

@@ -541,3 +541,20 @@ fn nodes_that_are_each_on_a_facet_of_the_other() {
     let found = solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap();
     check(&w, &q, &sets, &found, 1e-11, "a bar that folds");
 }
+
+/// Where the bodies give way along one direction alone, friction along that holds what would slip there: of all slopes
+/// of it.
+#[test]
+fn a_block_that_gives_way_along_one_direction_is_held() {
+    for degrees in [5.0_f64, 40.0, 50.0, 85.0, 130.0, 175.0] {
+        let (y, x) = degrees.to_radians().sin_cos();
+        let w = [2.0, 0.0, 0.0, 0.0, x * x, x * y, 0.0, x * y, y * y];
+        let q = [-4.0, 0.3 * x, 0.3 * y];
+        let solvers: [&mut dyn ContactSolver<f64>; 2] = [&mut GaussSeidel::default(), &mut ActiveSet::default()];
+        for solver in solvers {
+            let r = solve(solver, (&w, &q, &[cone(3, 0.5)])).unwrap();
+            let found = [r[0] - 2.0, r[1] + 0.3 * x, r[2] + 0.3 * y];
+            assert!(found.iter().all(|miss| miss.abs() < 1e-14), "{degrees}: {r:?}");
+        }
+    }
+}

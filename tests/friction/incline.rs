@@ -2,7 +2,7 @@
 
 use super::{GRAVITY, masses, run, schemes};
 use contact_dynamics::{
-    CdLagrange, ContactStatus, LinearRows, LinearSystem, Newmark, Result, Simulation, TimeIntegrator,
+    CdLagrange, ContactLaw, ContactStatus, LinearRows, LinearSystem, Newmark, Real, Result, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::sparse::matrix;
 
@@ -119,6 +119,41 @@ fn twelve_decades_of_size_mass_and_stiffness() {
             for x in [0, 2] {
                 let error = run.state().displacement()[x] / (0.5 * acceleration * time * time) - 1.0;
                 assert!(error.abs() < 1e-10, "{mass:e} {stiffness:e} {size:e}: {error:e}");
+            }
+        }
+    }
+}
+
+/// Friction that would stop a block in a small part of the first step stops it within that, and is no larger: a block on
+/// a floor as rough as one likes goes as far as one on a floor that is rough enough, in single precision too.
+#[test]
+fn rough_floors_stop_a_block_in_the_first_step() {
+    fn way<T: Real>(scheme: Box<dyn TimeIntegrator>, friction: f64, spring: bool) -> [T; 3] {
+        let [zero, one, weight] = [0.0, 1.0, 10.0].map(T::of);
+        let block = LinearSystem::lumped(vec![one; 2], matrix::<T>(2, [])).unwrap().load(move |_, f| f[1] = -weight);
+        let law = if spring { ContactLaw::Penalty { stiffness: 1e3 } } else { ContactLaw::Rigid };
+        let floor = LinearRows::new().row(law, &[(1, one)], zero).friction(friction, &[&[(0, one)]]);
+        let sunk = if spring { T::of(-0.01) } else { zero };
+        let builder = Simulation::builder(block, scheme, 0.01).velocity(vec![T::of(0.05), zero]);
+        let mut run = builder.displacement(vec![zero, sunk]).constraint(floor).build().unwrap();
+        run.step().unwrap();
+        let first = run.state().displacement()[0];
+        (0..3).for_each(|_| run.step().unwrap());
+        [first, run.state().displacement()[0], run.state().velocity()[0]]
+    }
+    for scheme in schemes() {
+        for spring in [false, true] {
+            let stops = way::<f64>((scheme.make)(), 1e2, spring);
+            assert!((-1e-15..=0.05 * 0.01).contains(&stops[0]), "{} {spring} {stops:?}", scheme.name());
+            for friction in [1e2, 1e4, 1e6] {
+                let [double, single] = [way::<f64>((scheme.make)(), friction, spring), {
+                    way::<f32>((scheme.make)(), friction, spring).map(f64::from)
+                }];
+                for (k, size) in [0.05 * 0.01, 0.05 * 0.01, 0.05].into_iter().enumerate() {
+                    let [rough, rounded] = [double, single].map(|found| (found[k] - stops[k]).abs() / size);
+                    let fine = rough < 1e-12 && rounded < 1e-5;
+                    assert!(fine, "{} {friction} {spring}: {double:?} {single:?}", scheme.name());
+                }
             }
         }
     }

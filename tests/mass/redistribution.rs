@@ -193,6 +193,13 @@ fn least_squares_of_a_bar_by_hand() {
         Err(Error::Mass { dof: 2, value }) => assert!((value + 0.5).abs() < 1e-14, "{value}"),
         other => panic!("{other:?}"),
     }
+    // A matrix of the same masses is refused for the same place.
+    let matrix: SparseColMat<usize, f64> = diagonal(&lumped);
+    let by = Redistribution::LeastSquares { motions: &motions, receivers: Some(&[1, 2, 3]) };
+    match mass::redistribute_consistent(matrix.as_ref(), &[0], &[0; 6], by) {
+        Err(Error::Mass { dof: 2, value }) => assert!((value + 0.5).abs() < 1e-14, "{value}"),
+        other => panic!("{other:?}"),
+    }
     refused!(cut(Some(&[1, 2])), Error::Incompatible { .. });
     // One motion keeps the total alone: as the uniform option. Two of them total and center.
     let ones = Redistribution::LeastSquares { motions: &motions[..1], receivers: None };

@@ -278,6 +278,13 @@ fn modes_of_another_code_are_checked() {
     let mut bent = all.clone();
     bent[3] += 0.1;
     assert!(matches!(take(omega, bent, own.next_frequency()), Err(Error::ModeResidual { .. })));
+    // Rigid motions of two bars that are not orthogonal to each other: the later one is named.
+    let apart: Matrix = matrix(4, [0, 2].into_iter().flat_map(|node| element(node, node + 1, [1.0, -1.0])));
+    let (lumped, skew) = (diagonal(&[0.5; 4]), [1.0, 1.0, 0.0, 0.0].into_iter().chain([0.5_f64.sqrt(); 4]));
+    let skew: Vec<f64> = skew.collect();
+    let given = GivenModes { frequencies: &[0.0; 2], shapes: &skew, next: 2.0, tolerance: 1e-5 };
+    let oblique = Modes::given(lumped.as_ref(), apart.as_ref(), &[], &given);
+    assert!(matches!(oblique, Err(Error::ModeResidual { mode: 1, .. })), "{oblique:?}");
     // What comes next is said to come before the last.
     let early = take(omega, all.clone(), 0.5 * (omega[4] + omega[5]));
     assert!(matches!(early, Err(Error::Parameter { .. })), "{early:?}");

@@ -9,7 +9,7 @@ use contact_dynamics::{
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::record_run;
 use contact_dynamics_scenes::schemes::{Listed, all, correctable};
-use contact_dynamics_scenes::sparse::matrix;
+use contact_dynamics_scenes::sparse::{matrix, springs};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 const OMEGA: f64 = 2.0;
@@ -615,5 +615,45 @@ fn restart_after_a_jump_of_the_load_keeps_the_order() {
     for scheme in all() {
         let order = (error((scheme.make)(), 400) / error((scheme.make)(), 800)).log2();
         assert!((order - f64::from(scheme.order)).abs() < 0.1, "{}: {order}", scheme.name());
+    }
+}
+
+/// A past is extrapolated to three times its age, and no farther: beyond that it is made anew, for which the scheme of
+/// the first steps is factorized.
+#[test]
+fn steps_three_times_as_long_keep_the_past() {
+    let factorizations = |ratio: f64| {
+        let system = LinearSystem::<f64>::lumped(vec![1.0], matrix(1, [(0, 0, 1.0)])).unwrap();
+        let mut run = Simulation::builder(system, Bdf2, 0.5).displacement(vec![1.0]).build().unwrap();
+        run.step().unwrap();
+        let before = run.statistics().factorizations;
+        run.set_step_size(0.5 * ratio).unwrap();
+        run.statistics().factorizations - before
+    };
+    let [within, at, beyond] = [2.5, 3.0, 3.5].map(factorizations);
+    assert!(within == at && at < beyond, "{within} {at} {beyond}");
+}
+
+/// A contact that has just closed stays so where the past is forgotten: the velocity that the scheme alone has the
+/// momentum of would be partly that from before the impact.
+#[test]
+fn contacts_that_have_just_closed_keep_their_rates_without_the_past() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] = [|| Box::new(Bdf2), || Box::new(Houbolt), || Box::new(Park)];
+    for make in schemes {
+        let k = matrix(2, springs(2, 5.0));
+        let mut run = Simulation::builder(LinearSystem::<f64>::lumped(vec![1.0, 2.0], k).unwrap(), make(), 0.01)
+            .velocity(vec![-1.0, -1.5])
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.0625))
+            .corrector(PersistencyCorrection::new())
+            .build()
+            .unwrap();
+        while !run.state().contacts().closed()[0] {
+            run.step().unwrap();
+        }
+        let before = run.state().velocity().to_vec();
+        run.set_step_size(0.2).unwrap();
+        let after = run.state().velocity();
+        assert!(before[0].abs() < 1e-14 && after[0].abs() < 1e-14, "{}: {before:?} {after:?}", make().name());
+        assert!((after[1] - before[1]).abs() < 0.1, "{}: {before:?} {after:?}", make().name());
     }
 }

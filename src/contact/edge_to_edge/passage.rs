@@ -4,7 +4,7 @@ use super::EdgeToEdge;
 use super::lines::{Crossing, Ways};
 use super::pairs::{Pair, motion};
 use crate::contact::surface::{Bounds, Point, add_scaled, dot, norm, sub};
-use crate::contact::{LARGEST_MISS, Stride, kept_depth, press_differently};
+use crate::contact::{LARGEST_MISS, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -95,7 +95,7 @@ impl<T: Real> EdgeToEdge<T> {
             return Err(("was stopped where the edges do not meet", way, gap));
         }
         // (What was deep inside stays so: see `recovery`.)
-        let kept = if self.law.keeps_depths() { kept_depth(gap, pair_before.recovery()) } else { 0.0 };
+        let kept = self.law.kept_depth(gap, pair_before.recovery());
         if (pair.clear(&to) + kept).abs() > LARGEST_MISS * way {
             return Err(("was stopped away from the other edge", way, gap));
         }

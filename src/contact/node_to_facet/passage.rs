@@ -3,7 +3,7 @@
 use super::NodeToFacet;
 use super::candidates::pass_of;
 use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, norm, sub};
-use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, kept_depth, press_differently};
+use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -133,7 +133,7 @@ impl Crossing<'_> {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
                 return Err(("was stopped where the surface has ended", length, gap));
             };
-            let kept = if self.law.keeps_depths() { kept_depth(gap, self.recovery) } else { 0.0 };
+            let kept = self.law.kept_depth(gap, self.recovery);
             if (to.gap + kept).abs() > LARGEST_MISS * length {
                 return Err(("was stopped away from the surface", length, gap));
             }

@@ -196,9 +196,9 @@ impl<T: Real> Correction<'_, T> {
             rounding(g.magnitude(row, values) + jump.abs())
         };
         rubbing.clear();
-        for (k, &row) in engaged.iter().enumerate() {
+        for (place, &row) in engaged.iter().enumerate() {
             let own = tangents.of(row);
-            let gap = if straight { seen[k] } else { gaps[row] };
+            let gap = if straight { seen[place] } else { gaps[row] };
             if own.is_empty() || !contacts.sliding[row] {
                 for row in std::iter::once(row).chain(own) {
                     let jump = if row < first { gap } else { slip(row) };

@@ -193,13 +193,20 @@ where
     ) -> Self {
         let body = Self::small_block(drawn, random);
         let toward = distance(from).1.map(|x| -x);
-        let mut way = 0.0;
+        let (mut way, mut closest) = (0.0, (f64::INFINITY, 0.0));
         let at = |way: f64| -> [f64; D] { std::array::from_fn(|k| from[k] + way * toward[k]) };
         for _ in 0..200 {
             let center = at(way);
             let gap = |x: &[f64; D]| distance(std::array::from_fn(|k| center[k] + x[k])).0;
             let nearest = body.solid.nodes.iter().map(gap).fold(f64::INFINITY, f64::min);
+            if nearest < closest.0 {
+                closest = (nearest, way);
+            }
             way += nearest - drawn.gap;
+        }
+        // (One that flies past the tip of a cone begins where it is closest.)
+        if way > 100.0 {
+            way = closest.1;
         }
         let center = at(way);
         let velocity = std::array::from_fn(|k| drawn.speed * toward[k] + drawn.drift[k]);

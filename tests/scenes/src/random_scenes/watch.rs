@@ -143,6 +143,10 @@ impl<'a> Watch<'a> {
         let iterates = matches!(self.recipe.contact_solver, Contacting::GaussSeidel | Contacting::ProjectedGradient)
             || self.recipe.rows.iter().any(|row| row.friction.is_some());
         let largest = self.recipe.rows.iter().map(size).fold(0.0, f64::max);
+        // (That of a problem with friction may be a slip.)
+        let slips = self.recipe.rows.iter().filter_map(|row| row.friction.as_ref()).flat_map(|(_, tangents)| tangents);
+        let slip = |tangent: &Vec<(usize, f64)>| tangent.iter().map(|&(dof, x)| way(dof, x)).sum::<f64>();
+        let slip = slips.map(slip).fold(0.0, f64::max);
         for (r, row) in self.recipe.rows.iter().enumerate() {
             let (gap, raw) = (contacts.gaps()[r].value(), contacts.raw_forces()[r].value());
             if row.law != ContactLaw::Rigid {
@@ -155,7 +159,7 @@ impl<'a> Watch<'a> {
                 continue;
             }
             let size = if iterates { largest } else { size(row) };
-            let bound = ROUNDING * (eps.sqrt() * size + 1e2 * eps * largest);
+            let bound = ROUNDING * (eps.sqrt() * size + 1e2 * eps * largest) + 1e2 * eps.max(1e-14) * slip;
             if gap < -bound {
                 return find("a gap is violated", format!("row {r}: {gap:e} of {size:e}"));
             }

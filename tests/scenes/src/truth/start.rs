@@ -34,7 +34,7 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
         (raw[i], closed[i]) = (force, force > 0.0);
     }
     push(scene, &raw, 1.0, &mut now.a);
-    let (rigid, resting) = rigid_forces(scene, tableau, &now, &gaps);
+    let (rigid, resting, stopped) = rigid_forces(scene, tableau, &now, &gaps);
     for (i, force) in rigid.iter().enumerate() {
         raw[i] += force;
         if i < rows {
@@ -60,7 +60,7 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
         vec![now]
     };
     let slides = |i: usize| match (&scene.rows[i].friction, scene.tangent(i)) {
-        (Some((coefficient, _)), Some(k)) => is_at_bound(raw[k], coefficient * raw[i]),
+        (Some((coefficient, _)), Some(k)) => stopped.contains(&i) || is_at_bound(raw[k], coefficient * raw[i]),
         _ => false,
     };
     let slides = (0..rows).map(slides).collect();
@@ -99,8 +99,8 @@ fn push(scene: &Scene, r: &[f64], c: f64, a: &mut [f64]) {
 }
 
 /// Multipliers of rigid contacts: of those at rest, or those that a scheme asks for which imposes contact ahead; and
-/// which contacts are at rest, pressed or not.
-fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) -> (Vec<f64>, Vec<usize>) {
+/// which contacts are at rest, pressed or not, and which their friction stops in the first step.
+fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) -> (Vec<f64>, Vec<usize>, Vec<usize>) {
     let (h, rows) = (scene.h, &scene.rows);
     let level = tableau.stages[tableau.stages.len() - 1].contact;
     let lead = level.lead() * h;
@@ -176,14 +176,35 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
         _ => 0.0,
     };
     let entry = |i: usize, j: usize, x: &[f64]| dot(axes[i], x) + if i == j { own(i) } else { 0.0 };
-    let problem = Problem {
+    let mut problem = Problem {
         contacts,
         w: all.iter().map(|&i| all.iter().zip(&responses).map(|(&j, x)| entry(i, j, x)).collect()).collect(),
         noise: q.iter().map(|q| 64.0 * f64::EPSILON * q.abs()).collect(),
         q,
     };
+    // Friction that would turn a slip round in the first step stops it at the end of that, if it can.
+    let mut stopped = Vec::new();
+    let solved = loop {
+        let solved = problem.solve();
+        let stops = |(&i, contact): (&usize, &Contact)| {
+            let friction = contact.friction?;
+            let slower = (dot(&problem.w[friction.row], &solved) + problem.q[friction.row]) * friction.direction?;
+            (scene.h * slower > dot(axes[scene.tangent(i)?], &now.v).abs()).then_some(i)
+        };
+        let found: Vec<usize> = taken.iter().zip(&problem.contacts).filter_map(stops).collect();
+        if found.is_empty() {
+            break solved;
+        }
+        for (i, contact) in taken.iter().zip(&mut problem.contacts).filter(|(i, _)| found.contains(i)) {
+            if let (Some(friction), Some(k)) = (&mut contact.friction, scene.tangent(*i)) {
+                friction.direction = None;
+                problem.q[friction.row] += dot(axes[k], &now.v) / scene.h;
+            }
+        }
+        stopped.extend(found);
+    };
     let mut forces = vec![0.0; axes.len()];
-    problem.solve().iter().zip(&all).for_each(|(force, &i)| forces[i] = *force);
+    solved.iter().zip(&all).for_each(|(force, &i)| forces[i] = *force);
     let rest = taken.into_iter().filter(|&i| level.lead() <= 0.0 && !rows[i].law.is_compliant());
-    (forces, rest.collect())
+    (forces, rest.collect(), stopped)
 }
