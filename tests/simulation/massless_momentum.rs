@@ -164,3 +164,20 @@ fn changes_of_the_step_keep_momentum_while_a_dof_without_mass_is_pressed() {
         }
     }
 }
+
+/// A damped dof without mass between two that go by on either side of it, and that it is tied to the ground beside: it
+/// stands, though all that its velocity is known by is rounding of theirs.
+#[test]
+fn damped_dofs_that_others_let_stand_begin_at_rest() {
+    let speed: f64 = 553.767_675_993_571_7;
+    for [one, other] in [[0.1, 0.2], [0.3, 0.1], [0.7, 0.9]] {
+        let third = -(one + other);
+        let couplings = [one, other, third].into_iter().zip(1..).flat_map(|(k, dof)| [(0, dof, k), (dof, 0, k)]);
+        let k = (0..4).map(|dof| (dof, dof, 2.0)).chain(couplings);
+        let system =
+            LinearSystem::<f64>::lumped(vec![0.0, 1.0, 1.0, 1.0], matrix(4, k)).unwrap().rayleigh(0.0, 0.01).unwrap();
+        let run = Simulation::builder(system, Bdf2, 0.1).velocity(vec![speed; 4]).build().unwrap();
+        let foot = run.state().velocity()[0];
+        assert!(foot.abs() < 1e-12 * speed, "{one} {other}: {foot:e}");
+    }
+}
