@@ -16,6 +16,11 @@ pub(crate) fn contact_error<T: Real>(t: f64, failure: ContactFailure<T>, id: imp
         ContactFailure::Contradictory { row, other, residual } => {
             Error::ContradictoryContacts { t, contact: id(row), other: id(other), violation: residual.value() }
         }
+        // (Numbers have gone beyond those of the scalar.)
+        ContactFailure::NotConverged { row, residual, .. } if !residual.is_finite() => {
+            let what = "what the contact solver leaves of the gap";
+            Error::ContactNotFinite { t, what, contact: id(row), value: residual.value() }
+        }
         ContactFailure::NotConverged { iterations, row, residual } => {
             Error::Contact { t, iterations, contact: id(row), residual: residual.value() }
         }

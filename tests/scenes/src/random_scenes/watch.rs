@@ -204,8 +204,12 @@ impl<'a> Watch<'a> {
         let step = run.step;
         let find = |what: &'static str, words: String| Some(Finding { what, step, words });
         let (name, words) = named(error);
-        if name != "StepNotFinite" && name != "EnergyNotFinite" && words.contains("NaN") {
-            return find("an error speaks of NaN", words);
+        // (These say what has gone beyond all numbers.)
+        let tells = ["StepNotFinite", "ContactNotFinite", "EnergyNotFinite"].contains(&name.as_str());
+        if !tells && words.contains("NaN") {
+            let largest = |values: &[T]| values.iter().fold(0.0_f64, |most, x| most.max(x.value().abs()));
+            let [u, v, a] = [before.displacement(), before.velocity(), before.acceleration()].map(largest);
+            return find("an error speaks of NaN", format!("{words}; u, v, a up to {u:e}, {v:e}, {a:e}"));
         }
         let now = run.run.state();
         if now != before || bits(now) != bits(before) {
