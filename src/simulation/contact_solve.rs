@@ -7,6 +7,8 @@ use super::interface::{advance, keep, restore};
 use super::operator::Operator;
 use super::stage_vectors::StageVectors;
 use crate::contact::Candidates;
+use crate::contact_solver::ContactFailure;
+use crate::corrector::contact_error;
 use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
@@ -73,13 +75,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
             self.foresee(needed, contact);
             if self.follow(new, vectors, contact)? == Candidates::Unchanged {
                 contact.rows.curved.miss = 0.0;
-                return Ok(true);
+                return self.refuse_elsewhere(pass, new.t, contact);
             }
             operator.follow(contact.rows.curved.version(self.constraints));
             let miss = self.miss(new, past, contact)?;
             contact.rows.curved.miss = miss.largest();
-            if miss.is_settled::<T>(pass + 1, before, contact.rows.curved.waits) {
-                return Ok(true);
+            if miss.is_settled::<T>(pass + 1, before, contact.rows.curved.may_halve) {
+                return self.refuse_elsewhere(pass, new.t, contact);
             }
             before = [miss, before[0]];
             if (SLOW..FOLLOWED).contains(&(pass + 1)) {
@@ -87,6 +89,20 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
         }
         Ok(false)
+    }
+
+    /// Refuses the rest of passes that were mixed where it is that of another solution, as it seems, and half of the step
+    /// may be taken instead, which is nearer to its own.
+    fn refuse_elsewhere(&self, pass: usize, t: f64, contact: &ContactWork<T>) -> Result<bool> {
+        let ContactWork { rows, interface, .. } = contact;
+        let mixed = rows.curved.mixing.as_ref().filter(|_| rows.curved.may_halve && pass >= SLOW);
+        match mixed.and_then(|mixing| mixing.elsewhere(&interface.increment, &interface.free)) {
+            None => Ok(true),
+            Some(residual) => {
+                let failure = ContactFailure::NotConverged { iterations: pass + 1, row: rows.curved.worst.0, residual };
+                Err(contact_error(t, failure, |row| self.constraints.ids[row]))
+            }
+        }
     }
 
     /// Linearizes rows where passes are going that do not come there by themselves, instead of at the result of the
@@ -101,9 +117,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
         let ContactWork { rows, interface, .. } = contact;
-        let Some(mixing) = rows.curved.mixing_now() else { return Ok(()) };
+        let Some(mixing) = &mut rows.curved.mixing else { return Ok(()) };
         match knows {
-            false => mixing.forget(),
+            false => mixing.begin(&interface.increment),
             true => mixing.learn(&interface.increment),
         }
         if mixing.mix(&mut interface.increment) {

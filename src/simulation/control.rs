@@ -8,9 +8,7 @@ use crate::real::Real;
 use crate::state::{History, State};
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step, with halves of the step size as long as steps are refused. Linearizations that find no rest are
-    /// mixed in the smallest steps alone: in a larger one the rest that they find may be that of another solution, farther
-    /// away, and half of the step is nearer to its own.
+    /// Takes one step, with halves of the step size as long as steps are refused.
     pub(super) fn controlled_step(&mut self) -> Result<()> {
         let mut before: Option<(State<T>, History<T>)> = None;
         let mut refusals = 0;
@@ -21,7 +19,7 @@ impl<T: Real> Simulation<'_, T> {
             let last = smaller < judge.control.smallest * (1.0 - 1e-9);
             judge.suspended = last;
             judge.begin(&self.state);
-            self.work.contact.rows.curved.waits = !last;
+            self.work.contact.rows.curved.may_halve = !last;
             match self.attempt() {
                 Ok(Verdict::Accepted) => break Ok(()),
                 Err(error) if !error.is_recoverable() => break Err(error),

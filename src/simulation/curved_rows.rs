@@ -62,7 +62,7 @@ impl Miss {
 
     /// Whether rows fit, or nearly fit and miss no less than in the passes before, that `before` this one and the
     /// `earlier` one, after so many `passes`; or are as near as they come where no smaller step may be taken instead.
-    pub(super) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], waits: bool) -> bool {
+    pub(super) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], may_halve: bool) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
@@ -71,7 +71,7 @@ impl Miss {
         // (Passes that are mixed may miss as much as before by chance.)
         let alternates =
             (LONG + 1..=SLOW).contains(&passes) && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
-        let as_near_as_may_be = passes == FOLLOWED && !waits && within(AT_EDGE, TIRED);
+        let as_near_as_may_be = passes == FOLLOWED && !may_halve && within(AT_EDGE, TIRED);
         now <= fit || near || alternates || as_near_as_may_be
     }
 }
@@ -94,8 +94,8 @@ pub(super) struct CurvedRowsWork<T> {
     pub(super) worst: (usize, T),
     /// What finds rest where passes come nearer slowly; there if rows may move within a step.
     pub(super) mixing: Option<Box<Mixing<T>>>,
-    /// Whether nothing is mixed, for a smaller step may be taken instead.
-    pub(super) waits: bool,
+    /// Whether a smaller step may be taken instead of this one.
+    pub(super) may_halve: bool,
 }
 
 impl<T: Real> CurvedRowsWork<T> {
@@ -109,13 +109,8 @@ impl<T: Real> CurvedRowsWork<T> {
             miss: 0.0,
             worst: (0, T::zero()),
             mixing: None,
-            waits: false,
+            may_halve: false,
         }
-    }
-
-    /// What mixes passes now, if they may be mixed.
-    pub(super) fn mixing_now(&mut self) -> Option<&mut Mixing<T>> {
-        self.mixing.as_deref_mut().filter(|_| !self.waits)
     }
 
     /// Memory for so many rows, of so many weights.

@@ -8,11 +8,12 @@ use crate::state::Motion;
 
 impl<T: Real> Constraints<'_, T> {
     /// [`search`](Self::search) at the start of a step, which measures gaps from where it finds the contacts that are
-    /// deeper than they may come out by ([`Contact::recovery`](crate::contact::Contact::recovery)).
+    /// deeper than they may come out by ([`Contact::recovery`](crate::contact::Contact::recovery)), times the `share`
+    /// that the step is of a whole one: halves of a step would throw them out.
     pub(crate) fn search_for_step(
         &mut self,
         motion: &Motion<T>,
-        ahead: f64,
+        (ahead, share): (f64, f64),
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
         let found = self.search(motion, ahead, jacobian)?;
@@ -24,7 +25,7 @@ impl<T: Real> Constraints<'_, T> {
         kept.resize(self.len(), T::zero());
         let evaluated = self.finite_gaps(motion.t, &motion.u, &mut kept);
         for (kept, &recovery) in kept.iter_mut().zip(&self.recoveries) {
-            *kept = kept_depth(*kept, recovery);
+            *kept = kept_depth(*kept, T::of(share) * recovery);
         }
         self.kept = kept;
         evaluated.inspect_err(|_| self.kept.clear()).map(|()| found)

@@ -19,6 +19,10 @@ const LEFT: f64 = 1e-6;
 /// linearized to the result: a factor of 0.99 or of 1.01 needs a hundred.
 const FARTHEST: f64 = 1e3;
 
+/// The share of the way by which passes have pushed that mixing may move their result where half of the step may be
+/// taken instead. (Of the rests that are those of the same solution nearly all are nearer than a hundredth.)
+const ELSEWHERE: f64 = 0.5;
+
 /// A difference of two passes: of r − d, and of r.
 struct Difference<T> {
     misses: Vec<T>,
@@ -31,6 +35,8 @@ pub(super) struct Mixing<T> {
     from: Vec<T>,
     /// The last pass itself.
     last: Difference<T>,
+    /// The result of the passes before any was mixed.
+    unmixed: Vec<T>,
     /// Of the passes before, the newest first, and of them what each has that those before it here have not.
     differences: [Difference<T>; DEPTH],
     apart: [Difference<T>; DEPTH],
@@ -51,6 +57,7 @@ impl<T: Real> Mixing<T> {
         Self {
             from: Vec::with_capacity(size),
             last: Difference::new(size),
+            unmixed: Vec::with_capacity(size),
             differences: differences(),
             apart: differences(),
             known: 0,
@@ -58,9 +65,24 @@ impl<T: Real> Mixing<T> {
         }
     }
 
+    /// Begins with the result of passes that were not mixed.
+    pub(super) fn begin(&mut self, result: &[T]) {
+        self.forget();
+        self.unmixed.clear();
+        self.unmixed.extend_from_slice(result);
+    }
+
     /// Forgets what passes have found.
-    pub(super) fn forget(&mut self) {
+    fn forget(&mut self) {
         (self.known, self.begun) = (0, false);
+    }
+
+    /// How far d is from where passes were before any was mixed, if farther than a share of the way that they had pushed
+    /// it from `free`: that of another solution.
+    pub(super) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<T> {
+        let square = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| (x - y).value().powi(2)).sum::<f64>();
+        let moved = square(d, &self.unmixed);
+        (moved > ELSEWHERE * ELSEWHERE * square(&self.unmixed, free)).then(|| T::of(moved.sqrt()))
     }
 
     /// Notes where the rows of the next pass are linearized.

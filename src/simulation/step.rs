@@ -21,7 +21,7 @@ use crate::corrector::{Correction, Corrector, Erased, ErasedGaps, JumpProjection
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::real::Real;
-use crate::state::{Clock, Motion};
+use crate::state::{Clock, History, Motion};
 use crate::tableau::impulse_weight;
 
 impl<T: Real> Simulation<'_, T> {
@@ -37,7 +37,7 @@ impl<T: Real> Simulation<'_, T> {
     fn attempt_together(&mut self) -> Result<Verdict> {
         let Self { constraints, g, state, history, work, ledger, scheme, contact_solver, .. } = self;
         history.clock.check()?;
-        constraints.search_for_step(&state.motion, scheme.ahead() * history.clock.h, g)?;
+        constraints.search_for_step(&state.motion, extent(scheme.ahead(), history), g)?;
         if constraints.room() > work.rows {
             work.make_room(constraints.room(), g.entries());
             state.contacts.make_room(constraints.room());
@@ -73,9 +73,10 @@ impl<T: Real> Simulation<'_, T> {
     fn undo(&mut self) {
         self.put_back();
         let Self { constraints, g, state, history, scheme, .. } = self;
-        // Rows may have followed the failed step: back to the state. An error of this search is not lost, for the next
-        // step begins with one.
-        constraints.search(&state.motion, scheme.ahead() * history.clock.h, g).ok();
+        // Rows may have followed the failed step: back to the state. (A past that is resampled for half of the step is
+        // projected onto gaps as the step has measured them.) An error of this search is not lost, for the next step
+        // begins with the same search.
+        constraints.search_for_step(&state.motion, extent(scheme.ahead(), history), g).ok();
     }
 
     /// Refuses a step that has become too long for what presses, or for a system that has stiffened.
@@ -292,6 +293,12 @@ impl<T: Real> Simulation<'_, T> {
         }
         Ok(())
     }
+}
+
+/// How far ahead a step looks, and its share of a whole one.
+fn extent<T: Real>(ahead: f64, history: &History<T>) -> (f64, f64) {
+    let (h, whole) = (history.clock.h, history.pace.nominal.max(history.made_with));
+    (ahead * h, (h / whole).min(1.0))
 }
 
 /// Tells the corrections that a stage begins, and lets those act on its predicted motion that do.

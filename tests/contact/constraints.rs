@@ -8,7 +8,7 @@ use contact_dynamics::contact::{
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     CentralDifference, Composite, ContactStatus, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
-    Result, Simulation, TimeIntegrator,
+    Result, Simulation, StepControl, TimeIntegrator,
 };
 
 /// Free masses.
@@ -441,6 +441,39 @@ fn what_is_found_deep_inside_comes_out_slowly() {
     let mut run = falling(floor(None)).unwrap();
     run.run_until(1.75, &mut ()).unwrap();
     assert!(run.state().displacement()[0] > -1e-12);
+}
+
+/// In steps that are halved over and over, and in those that are cut to land on a time, as fast as in whole ones.
+#[test]
+fn what_is_deep_inside_comes_out_no_faster_in_parts_of_steps() {
+    let begin = || {
+        let floor = LateFloor { from: 1.45, law: ContactLaw::Rigid, recovery: Some(1e-3), found: false };
+        let fall = Simulation::builder(free(1), Composite, 0.1).displacement(vec![1.0]).velocity(vec![-1.0]);
+        fall.constraint(floor)
+    };
+    let mut halved =
+        begin().step_control(StepControl::halving(1e-3).unwrap().local_error(1e-12).unwrap()).build().unwrap();
+    let mut landed = begin().build().unwrap();
+    for run in [&mut halved, &mut landed] {
+        run.run_until(1.5, &mut ()).unwrap();
+    }
+    let mut fastest: f64 = 0.0;
+    for k in 1..=10 {
+        let before = [&halved, &landed].map(|run| run.state().displacement()[0]);
+        halved.run_until(1.5 + 0.1 * f64::from(k), &mut ()).unwrap();
+        for part in [0.011, 0.1] {
+            landed.land_on(1.5 + 0.1 * f64::from(k - 1) + part, &mut ()).unwrap();
+            // (The step in which it is stopped is that of an impact.)
+            if k > 1 {
+                fastest = fastest.max(landed.state().velocity()[0].abs());
+            }
+        }
+        let after = [&halved, &landed].map(|run| run.state().displacement()[0]);
+        for (out, name) in [after[0] - before[0], after[1] - before[1]].into_iter().zip(["halved", "landed"]) {
+            assert!((0.0..2.5e-3).contains(&out), "{name}, {k}: comes out by {out:e}");
+        }
+    }
+    assert!(halved.statistics().steps > 500 && fastest < 0.05, "{} {fastest}", halved.statistics().steps);
 }
 
 #[test]
