@@ -183,6 +183,18 @@ mod tests {
     }
 
     #[test]
+    fn a_rest_that_passes_were_not_going_to_is_elsewhere() {
+        let mut mixing = Mixing::new(2);
+        let free = [3.0, 4.0];
+        mixing.begin(&[0.0, 0.0]);
+        // Half of the way of 5 that they had pushed.
+        assert_eq!(mixing.elsewhere(&[2.4, 0.0], &free), None);
+        assert_eq!(mixing.elsewhere(&[0.0, -2.75], &free), Some(2.75));
+        mixing.begin(&[2.9, 4.0]);
+        assert_eq!(mixing.elsewhere(&[2.5, 4.3], &free), Some(0.5));
+    }
+
+    #[test]
     fn what_cannot_be_mixed_stays() {
         let mut mixing = Mixing::new(2);
         let mut d = [3.0, 4.0];
