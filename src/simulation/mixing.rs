@@ -190,8 +190,8 @@ mod tests {
         // Half of the way of 5 that they had pushed.
         assert_eq!(mixing.elsewhere(&[2.4, 0.0], &free), None);
         assert_eq!(mixing.elsewhere(&[0.0, -2.75], &free), Some(2.75));
-        mixing.begin(&[2.9, 4.0]);
-        assert_eq!(mixing.elsewhere(&[2.5, 4.3], &free), Some(0.5));
+        mixing.begin(&[2.0, 4.0]);
+        assert_eq!(mixing.elsewhere(&[2.0, 5.0], &free), Some(1.0));
     }
 
     #[test]
