@@ -357,7 +357,7 @@ impl<T: Real> Slide<T> {
     }
 
     /// The slip over the step, if that is to be stopped.
-    pub(super) fn to_stop(&self, h: f64) -> [T; 2] {
+    pub(super) fn to_stop(self, h: f64) -> [T; 2] {
         self.direction.map(|f| if self.stops { -self.speed / T::of(h) * f } else { T::zero() })
     }
 }
