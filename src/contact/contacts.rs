@@ -244,9 +244,10 @@ impl<T: Real> Contact<'_, T> {
     }
 
     /// How far (length, d ≥ 0) a step lets this contact come out of the other body. Where the search at the start of a
-    /// step finds a gap g below −d, the contact has to be at g + d at its end, and no farther. A corner that has come in
-    /// beside an edge, where nothing looked for it, is otherwise thrown out in one step, and gains energy from nothing.
-    /// Steps that are halved, or end early to land on a time, let it come out by as much less. It is read of [`ContactLaw::Rigid`] only. If not given all comes out at once.
+    /// step finds a gap g below −d, the contact has to be at g + d at its end, and no farther. A corner that has come
+    /// in beside an edge, where nothing looked for it, is otherwise thrown out in one step, and gains energy from
+    /// nothing. Steps that are halved, or end early to land on a time, let it come out by as much less. It is read of
+    /// [`ContactLaw::Rigid`] only. If not given all comes out at once.
     ///
     /// Closed contacts of a state may so have negative gaps. Those at the start of a run are another matter
     /// ([`InitialOverclosure`](crate::InitialOverclosure)).

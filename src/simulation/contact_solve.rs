@@ -91,8 +91,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(false)
     }
 
-    /// Refuses the rest of passes that were mixed where it is that of another solution, as it seems, and half of the step
-    /// may be taken instead, which is nearer to its own.
+    /// Refuses the rest of passes that were mixed where it is that of another solution, as it seems, and half of the
+    /// step may be taken instead, which is nearer to its own.
     fn refuse_elsewhere(&self, pass: usize, t: f64, contact: &ContactWork<T>) -> Result<bool> {
         let ContactWork { rows, interface, .. } = contact;
         let mixed = rows.curved.mixing.as_ref().filter(|_| rows.curved.may_halve && pass >= SLOW);

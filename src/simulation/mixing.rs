@@ -77,8 +77,8 @@ impl<T: Real> Mixing<T> {
         (self.known, self.begun) = (0, false);
     }
 
-    /// How far d is from where passes were before any was mixed, if farther than a share of the way that they had pushed
-    /// it from `free`: that of another solution.
+    /// How far d is from where passes were before any was mixed, if farther than a share of the way that they had
+    /// pushed it from `free`: that of another solution.
     pub(super) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<T> {
         let square = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| (x - y).value().powi(2)).sum::<f64>();
         let moved = square(d, &self.unmixed);

@@ -124,8 +124,8 @@ fn twelve_decades_of_size_mass_and_stiffness() {
     }
 }
 
-/// Friction that would stop a block in a small part of the first step stops it within that, and is no larger: a block on
-/// a floor as rough as one likes goes as far as one on a floor that is rough enough, in single precision too.
+/// Friction that would stop a block in a small part of the first step stops it within that, and is no larger: a block
+/// on a floor as rough as one likes goes as far as one on a floor that is rough enough, in single precision too.
 #[test]
 fn rough_floors_stop_a_block_in_the_first_step() {
     fn way<T: Real>(scheme: Box<dyn TimeIntegrator>, friction: f64, spring: bool) -> [T; 3] {
