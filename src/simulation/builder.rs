@@ -506,6 +506,8 @@ fn take_up<T: Real>(
     if let Some(overclosures) = &history.overclosures {
         constraints.adjust(overclosures.clone());
     }
+    // (A past that is resampled at once is projected onto gaps as the last step has measured them.)
+    constraints.keep_depths(&state.motion, 0.0)?;
     RateCheck::new(constraints.len()).check(constraints, &state.motion, h, g)
 }
 

@@ -17,18 +17,26 @@ impl<T: Real> Constraints<'_, T> {
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
         let found = self.search(motion, ahead, jacobian)?;
+        self.keep_depths(motion, share)?;
+        Ok(found)
+    }
+
+    /// Measures gaps from where contacts are in a motion, as far as they are deeper than what they come out by, times
+    /// the share. (Of no share, as the step has left them that made the motion.)
+    pub(crate) fn keep_depths(&mut self, motion: &Motion<T>, share: f64) -> Result<()> {
+        self.kept.clear();
         if self.recoveries.iter().all(|recovery| recovery.is_infinite()) {
-            return Ok(found);
+            return Ok(());
         }
         let mut kept = std::mem::take(&mut self.kept);
         kept.reserve(self.room());
         kept.resize(self.len(), T::zero());
         let evaluated = self.finite_gaps(motion.t, &motion.u, &mut kept);
         for (kept, &recovery) in kept.iter_mut().zip(&self.recoveries) {
-            *kept = kept_depth(*kept, T::of(share) * recovery);
+            *kept = if recovery.is_infinite() { T::zero() } else { kept_depth(*kept, T::of(share) * recovery) };
         }
         self.kept = kept;
-        evaluated.inspect_err(|_| self.kept.clear()).map(|()| found)
+        evaluated.inspect_err(|_| self.kept.clear())
     }
 
     /// Makes gaps of a state those that the step under way measures.

@@ -80,9 +80,8 @@ impl<T: Real> Mixing<T> {
     /// How far d is from where passes were before any was mixed, if farther than a share of the way that they had
     /// pushed it from `free`: that of another solution.
     pub(super) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<T> {
-        let square = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| (x - y).value().powi(2)).sum::<f64>();
-        let moved = square(d, &self.unmixed);
-        (moved > ELSEWHERE * ELSEWHERE * square(&self.unmixed, free)).then(|| T::of(moved.sqrt()))
+        let moved = square_of_way(d, &self.unmixed);
+        (moved > ELSEWHERE * ELSEWHERE * square_of_way(&self.unmixed, free)).then(|| T::of(moved.sqrt()))
     }
 
     /// Notes where the rows of the next pass are linearized.
@@ -132,8 +131,7 @@ impl<T: Real> Mixing<T> {
                 used += 1;
             }
         }
-        let way =
-            result.iter().zip(&last.results).map(|(&mixed, &result)| (mixed - result).value().powi(2)).sum::<f64>();
+        let way = square_of_way(result, &last.results);
         if used > 0 && way <= FARTHEST * FARTHEST * product(&last.misses, &last.misses) {
             return true;
         }
@@ -153,6 +151,11 @@ impl<T: Real> Mixing<T> {
 /// Σ x y, which neither overflows nor underflows where T does.
 fn product<T: Real>(x: &[T], y: &[T]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x.value() * y.value()).sum()
+}
+
+/// Σ (x − y)².
+fn square_of_way<T: Real>(x: &[T], y: &[T]) -> f64 {
+    x.iter().zip(y).map(|(&x, &y)| (x - y).value().powi(2)).sum()
 }
 
 #[cfg(test)]

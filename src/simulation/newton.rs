@@ -11,6 +11,17 @@ pub(super) enum TangentUpdate {
     Stage,
 }
 
+impl TangentUpdate {
+    /// The number of iterations in which a residual that is not yet rounding falls to half. (With a tangent that stays
+    /// it may fall by a tenth in each.)
+    pub(super) fn halves_within(self) -> usize {
+        match self {
+            Self::Iteration => 2,
+            Self::Stage => 8,
+        }
+    }
+}
+
 /// How Newton's method solves the stages of a nonlinear system.
 ///
 /// With r = f − M ā + Gᵀ λ and A the effective matrix, an iteration solves `A Δ = r` together with the contact
@@ -25,8 +36,9 @@ pub(super) enum TangentUpdate {
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
 /// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of
-/// the whole, and the residual has fallen by `force` or falls no more; or when they are below the resolution of u, ε
-/// ‖u‖. Tolerances below 64 ε of the scalar are raised to it.
+/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, in eight where the
+/// tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are raised to
+/// it.
 ///
 /// ```
 /// use contact_dynamics::Newton;
@@ -129,6 +141,8 @@ pub(super) struct NewtonWork<T> {
     /// For schemes that take the force of the whole path.
     pub(super) path: Option<PathWork<T>>,
     pub(super) report: Vec<Iteration>,
+    /// The norm of the residual before the iterations of the stage, and after each.
+    pub(super) residuals: Vec<f64>,
 }
 
 impl<T: Real> NewtonWork<T> {
@@ -143,6 +157,7 @@ impl<T: Real> NewtonWork<T> {
             unsettled: 0.0,
             path,
             report: Vec::with_capacity(settings.iterations),
+            residuals: Vec::with_capacity(settings.iterations + 1),
         }
     }
 }

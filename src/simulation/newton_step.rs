@@ -51,7 +51,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         self.begin(newton, new, past, vectors);
         let limit = newton.settings.iterations;
         let mut norms = self.evaluate(newton, new, past, vectors, &contact.interface.forces)?;
-        let first = norms.residual;
+        newton.residuals.push(norms.residual);
         for iteration in 0..limit {
             if self.operator.varies() && (iteration == 0 || newton.settings.tangent == TangentUpdate::Iteration) {
                 self.factorize(iteration, newton, new, past, vectors)?;
@@ -82,7 +82,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             norms = found;
             // Rows were made to fit the whole increment.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
-            if self.has_converged(newton, share * size, [first, before.residual], norms, new)? && settled {
+            if self.has_converged(newton, share * size, before.residual, norms, new)? && settled {
                 return Ok(());
             }
         }
@@ -98,13 +98,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Reports an iteration whose increment has this `size`, and says whether it is the last one. `first` and `before`
-    /// are the norms of the residual of the prediction and before the iteration.
+    /// Reports an iteration whose increment has this `size`, and says whether it is the last one. `before` is the norm
+    /// of the residual before it, with the contact forces that it has found.
     fn has_converged(
         &self,
         newton: &mut NewtonWork<T>,
         size: f64,
-        [first, before]: [f64; 2],
+        before: f64,
         norms: Norms,
         new: &Motion<T>,
     ) -> Result<bool> {
@@ -118,10 +118,14 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
         // Where forces cancel the residual has nothing to be compared with. Then increments must be small, and the
         // residual must fall no more or have fallen far; or the increment must be below the resolution of the
-        // displacements.
+        // displacements. (Far from the origin much is small beside the displacements: that the residual falls slowly is
+        // not enough.)
+        newton.residuals.push(norms.residual);
+        let earlier = newton.residuals.len().checked_sub(newton.settings.tangent.halves_within() + 1);
+        let stays = earlier.is_some_and(|earlier| norms.residual >= 0.5 * newton.residuals[earlier]);
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * values);
         let small = size <= displacement * whole || moved <= 1e4 * resolution;
-        Ok(met || moved <= resolution || small && (contraction >= 0.5 || norms.residual <= force * first))
+        Ok(met || moved <= resolution || small && (stays || norms.residual <= force * newton.residuals[0]))
     }
 
     /// Begins with d = 0: completes the prediction by its accelerations.
@@ -134,6 +138,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     ) {
         newton.d.fill(T::zero());
         newton.report.clear();
+        newton.residuals.clear();
         let StageVectors { balance, supports, .. } = vectors;
         let prescribed = &supports.dofs;
         let complete = |rows: &ScaledRows<T>, a: &mut [T], supports: &[[T; 3]]| {

@@ -476,6 +476,30 @@ fn what_is_deep_inside_comes_out_no_faster_in_parts_of_steps() {
     assert!(halved.statistics().steps > 500 && fastest < 0.05, "{} {fastest}", halved.statistics().steps);
 }
 
+/// Also where a run goes on from memory right behind an impact, and its step changes at once.
+#[test]
+fn what_is_deep_inside_stays_there_when_a_resumed_run_changes_its_step() {
+    let floor = || LateFloor { from: 1.45, law: ContactLaw::Rigid, recovery: Some(1e-3), found: false };
+    let mut run = falling(floor()).unwrap();
+    while run.state().contacts().closed() != [true] {
+        run.step().unwrap();
+    }
+    let (state, history) = (run.state().clone(), run.history().clone());
+    let builder = Simulation::builder(free(1), Composite, 0.1).constraint(floor());
+    let mut resumed = builder.resume(state, history).build().unwrap();
+    for run in [&mut run, &mut resumed] {
+        run.set_step_size(0.05).unwrap();
+        let (u, v, _) = run.history().past(1).unwrap();
+        assert!((u[0] - run.state().displacement()[0]).abs() < 1e-12 && v[0].abs() < 1e-12, "{u:?}, {v:?}");
+    }
+    for _ in 0..5 {
+        for run in [&mut run, &mut resumed] {
+            run.step().unwrap();
+        }
+        assert_eq!(run.state(), resumed.state());
+    }
+}
+
 #[test]
 fn depths_of_springs_and_of_the_start_are_as_they_are() {
     let law = ContactLaw::Penalty { stiffness: 1.0 };

@@ -249,6 +249,67 @@ fn single_precision_converges_to_its_own_rounding() {
     assert!(newton.statistics().newton_iterations < 2 * 402);
 }
 
+/// Two masses of 1 on a spring between them with force e + e³, in single precision.
+struct HardeningPair {
+    pattern: SymbolicSparseColMat<usize>,
+}
+
+impl System<f32> for HardeningPair {
+    fn dofs(&self) -> usize {
+        2
+    }
+    fn mass(&self) -> Mass<'_, f32> {
+        Mass::Lumped(&[1.0, 1.0])
+    }
+    fn force(&mut self, _: f64, u: &[f32], _: &[f32], out: &mut [f32]) -> Result<()> {
+        let e = u[1] - u[0];
+        let tension = e + e.powi(3);
+        out.copy_from_slice(&[tension, -tension]);
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, u: &[f32], _: &[f32], weights: TangentWeights<f32>, out: &mut [f32]) -> Result<()> {
+        let stiffness = weights.stiffness * (1.0 + 3.0 * (u[1] - u[0]).powi(2));
+        out.copy_from_slice(&[stiffness, -stiffness, -stiffness, stiffness]);
+        Ok(())
+    }
+}
+
+/// Far from the origin increments are small beside the displacements long before they are rounding: an iteration that
+/// converges slowly was ended there.
+#[test]
+fn what_converges_slowly_does_so_far_from_the_origin() {
+    // A step of the trapezoidal rule from e = 0 and de/dt = v, with a = −2 (e + e³): e + h²/2 (e + e³) = h v.
+    let (h, v): (f64, f64) = (2.0, 0.5);
+    let exact = {
+        let (mut least, mut most) = (0.0, h * v);
+        for _ in 0..60 {
+            let e: f64 = 0.5 * (least + most);
+            if e + 0.5 * h * h * (e + e.powi(3)) < h * v { least = e } else { most = e }
+        }
+        least
+    };
+    for (newton, least) in [(Newton::modified(), 8), (Newton::full(), 3)] {
+        for far in [0.0, 300.0] {
+            let pattern = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 4], None, vec![0, 1, 0, 1]);
+            let mut run = Simulation::builder(HardeningPair { pattern }, Newmark::trapezoidal(), h)
+                .newton(newton)
+                .displacement(vec![far; 2])
+                .velocity(vec![0.0, 0.5])
+                .build()
+                .unwrap();
+            run.step().unwrap();
+            let u = run.state().displacement();
+            // (The tolerance in force, and rounding of u.)
+            let error = (f64::from(u[1] - u[0]) - exact).abs();
+            assert!(error < f64::from(f32::EPSILON) * (64.0 + 8.0 * f64::from(far)), "{newton:?} at {far}: {error:e}");
+            assert!(run.statistics().newton_iterations >= least, "{}", run.statistics().newton_iterations);
+        }
+    }
+}
+
 #[test]
 fn a_linear_body_follows_a_curved_obstacle() {
     let block = Solid::rectangle([1.0; 2], [6; 2], Material { young: 100.0, poisson: 0.3, density: 1.0 });
