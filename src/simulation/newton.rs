@@ -12,12 +12,12 @@ pub(super) enum TangentUpdate {
 }
 
 impl TangentUpdate {
-    /// The number of iterations in which a residual that is not yet rounding falls to half. (With a tangent that stays
-    /// it may fall by a tenth in each.)
-    pub(super) fn halves_within(self) -> usize {
+    /// In how many iterations a residual that is not yet rounding falls below which share of what it was. (With a
+    /// tangent that stays it may fall by a fiftieth in each.)
+    pub(super) fn falls(self) -> (usize, f64) {
         match self {
-            Self::Iteration => 2,
-            Self::Stage => 8,
+            Self::Iteration => (2, 0.5),
+            Self::Stage => (8, 0.85),
         }
     }
 }
@@ -36,8 +36,8 @@ impl TangentUpdate {
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
 /// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of
-/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, in eight where the
-/// tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are raised to
+/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, to 0.85 in eight where
+/// the tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are raised to
 /// it.
 ///
 /// ```

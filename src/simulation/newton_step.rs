@@ -121,8 +121,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         // displacements. (Far from the origin much is small beside the displacements: that the residual falls slowly is
         // not enough.)
         newton.residuals.push(norms.residual);
-        let earlier = newton.residuals.len().checked_sub(newton.settings.tangent.halves_within() + 1);
-        let stays = earlier.is_some_and(|earlier| norms.residual >= 0.5 * newton.residuals[earlier]);
+        let (within, share) = newton.settings.tangent.falls();
+        let earlier = newton.residuals.len().checked_sub(within + 1);
+        let stays = earlier.is_some_and(|earlier| norms.residual >= share * newton.residuals[earlier]);
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * values);
         let small = size <= displacement * whole || moved <= 1e4 * resolution;
         Ok(met || moved <= resolution || small && (stays || norms.residual <= force * newton.residuals[0]))
