@@ -16,7 +16,7 @@ mod record;
 pub(crate) use backup::Backup;
 #[cfg(feature = "serde")]
 pub use checkpoint::Checkpoint;
-pub(crate) use clock::{Clock, Pace, resolution};
+pub(crate) use clock::{Clock, Pace, Refusal, resolution};
 pub(crate) use contacts::Names;
 pub use contacts::{ContactState, ContactStatus};
 pub use history::History;

@@ -3,9 +3,10 @@
 use super::judge::Verdict;
 use super::run::Simulation;
 use super::tangent::At;
+use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::{History, State};
+use crate::state::{History, Refusal, State};
 
 impl<T: Real> Simulation<'_, T> {
     /// Takes one step, with halves of the step size as long as steps are refused.
@@ -28,14 +29,19 @@ impl<T: Real> Simulation<'_, T> {
                     let (t, attempts) = (self.time(), refusals + 1);
                     break Err(Error::StepRefused { t, h, attempts, source: Box::new(source) });
                 }
-                Ok(Verdict::Coarse) | Err(_) => {
+                verdict @ (Ok(Verdict::Coarse) | Err(_)) => {
+                    let refusal = match verdict {
+                        Err(Error::Stiffened { contact: Some(_), .. }) => Refusal::StiffContact,
+                        Err(Error::Stiffened { contact: None, .. }) => Refusal::StiffSystem,
+                        _ => Refusal::Passing,
+                    };
                     self.statistics.refused_steps += 1;
                     refusals += 1;
                     before.get_or_insert_with(|| (self.state.clone(), self.history.clone()));
                     if let Err(error) = self.change_step_size(smaller) {
                         break Err(error);
                     }
-                    self.history.pace.halve();
+                    self.history.pace.halve(refusal);
                 }
             }
         };
@@ -60,10 +66,14 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Counts a good step, and doubles the step size where the nominal grid and the judgement allow it.
     fn grow(&mut self) {
-        let Some(judge) = &self.judge else { return };
-        self.statistics.coarse_steps += u64::from(judge.coarse);
-        let (may_grow, pace) = (judge.may_grow() && !judge.coarse, &mut self.history.pace);
-        if pace.advance() && may_grow {
+        let Self { judge: Some(judge), constraints, state, statistics, history, .. } = self else { return };
+        statistics.coarse_steps += u64::from(judge.coarse);
+        let may_grow = judge.may_grow() && !judge.coarse;
+        let presses = || {
+            let mut rows = constraints.rows_of(&state.contacts);
+            rows.any(|(contact, row)| constraints.law(row).is_spring() && state.contacts.closed[contact])
+        };
+        if history.pace.advance(presses) && may_grow {
             // If the matrix of the larger step cannot be factorized, the run goes on with the smaller one.
             let larger = 2.0 * self.history.clock.h;
             if self.change_step_size(larger).is_ok() {

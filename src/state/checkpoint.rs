@@ -41,7 +41,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 ///
 /// # What is in it, and what is not
 ///
-/// A file names its format (1), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of
+/// A file names its format (a number), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of
 /// schemes apart. The format changes when what is stored changes, and files of another one are refused; results, and
 /// with them the bits of a run, may change between versions of the crate without that. Stored are the vectors of the
 /// state and of the past that is read, the contacts, the clock, the place of a controlled step size in the nominal

@@ -92,6 +92,20 @@ pub(crate) struct Pace {
     grown: bool,
     /// Steps that growth asks for.
     patience: u32,
+    /// Halvings that growth keeps: a larger step was beyond the limit of stability of the system, and of contacts that
+    /// pressed (until none does).
+    kept: [u32; 2],
+}
+
+/// Why a step was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// For something that passes.
+    Passing,
+    /// The system is too stiff for it.
+    StiffSystem,
+    /// A contact is.
+    StiffContact,
 }
 
 /// Good steps before a step size grows, at first and at most.
@@ -99,39 +113,54 @@ const PATIENCE: [u32; 2] = [2, 64];
 
 impl Pace {
     pub(crate) fn new(nominal: f64) -> Self {
-        Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0] }
+        Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0], kept: [0; 2] }
     }
 
     /// Of a checkpoint that was read: refuses what no run with a present step size of h leaves.
     #[cfg(feature = "serde")]
     pub(super) fn check_read(&self, h: f64) -> Result<()> {
-        let Self { nominal, level, position, steps: _, grown: _, patience } = *self;
+        let Self { nominal, level, position, steps: _, grown: _, patience, kept } = *self;
         let halved = |nominal: f64| (0..level).fold(nominal, |h, _| 0.5 * h);
         let levels = u64::from(f64::MANTISSA_DIGITS) + u64::from(f64::MAX_EXP.unsigned_abs());
         count("the halvings of a checkpoint", level.into(), 0..=levels)?;
         let range = "that of the step, times a power of two";
         number("the nominal step size of a checkpoint", nominal, range, |size| halved(size).to_bits() == h.to_bits())?;
         count("the place in the nominal grid of a checkpoint", position, 0..=COUNT)?;
+        for kept in kept {
+            count("the halvings of a checkpoint that growth keeps", kept.into(), 0..=level.into())?;
+        }
         count("the patience of a checkpoint", patience.into(), PATIENCE[0].into()..=PATIENCE[1].into())
     }
 
-    /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer.
-    pub(crate) fn halve(&mut self) {
+    /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer; one for a
+    /// stiffness keeps it from the size that was refused. (Between two such refusals a step that is too long adds
+    /// energy: growing back to it over and over would do so without end.)
+    pub(crate) fn halve(&mut self, refusal: Refusal) {
         if self.grown && self.steps == 0 {
             self.patience = (2 * self.patience).min(PATIENCE[1]);
         }
         (self.level, self.position) = (self.level + 1, self.position.saturating_mul(2));
         (self.steps, self.grown) = (0, false);
+        match refusal {
+            Refusal::Passing => {}
+            Refusal::StiffSystem => self.kept[0] = self.level,
+            Refusal::StiffContact => self.kept[1] = self.level,
+        }
     }
 
-    /// After a good step: says whether the size may grow here.
-    pub(crate) fn advance(&mut self) -> bool {
+    /// After a good step: says whether the size may grow here. `presses` is asked whether a contact presses that may be
+    /// too stiff for larger steps.
+    pub(crate) fn advance(&mut self, presses: impl FnOnce() -> bool) -> bool {
         self.position = if self.level > 0 { self.position + 1 } else { 0 };
         self.steps = self.steps.saturating_add(1);
         if self.grown {
             self.patience = PATIENCE[0];
         }
-        self.level > 0 && self.position.is_multiple_of(2) && self.steps >= self.patience
+        if self.kept[1] > 0 && !presses() {
+            self.kept[1] = 0;
+        }
+        let most = self.kept[0].max(self.kept[1]);
+        self.level > most && self.position.is_multiple_of(2) && self.steps >= self.patience
     }
 
     /// Growth: twice the size.

@@ -322,6 +322,55 @@ fn step_control_follows_a_spring_that_hardens() {
     assert!(run.statistics().refused_steps > 0 && run.energy().total() < 3.0 * start, "{:?}", run.statistics());
 }
 
+/// A chain that hardens more the more energy it has: steps that grow back to a size that was too long would add some
+/// each time.
+#[test]
+fn step_control_does_not_come_back_to_steps_that_were_too_long() {
+    for (listed, _) in conditional() {
+        for times in [0.5, 2.0] {
+            let (h, mut velocity) = (0.1_f64, vec![0.0; 5]);
+            velocity[4] = (times / h).powi(2);
+            let mut run = Simulation::builder(Hardening::new(5, 1.0, 1.0), (listed.make)(), h)
+                .velocity(velocity)
+                .step_control(StepControl::halving(1e-5).unwrap())
+                .build()
+                .unwrap();
+            let start = run.energy().total();
+            let mut most: f64 = 0.0;
+            for _ in 0..3000 {
+                run.step().unwrap();
+                most = most.max(run.energy().total() / start);
+            }
+            let (name, refused) = (listed.name(), run.statistics().refused_steps);
+            assert!(most < 30.0 && refused <= 4, "{name}, {times}: energy grows to {most} of that at the start, {refused}");
+            assert!(times < 1.0 || run.step_size() < h, "{name}: {}", run.step_size());
+        }
+    }
+}
+
+/// A spring of contact keeps steps short as long as it presses.
+#[test]
+fn step_control_grows_back_where_a_contact_that_was_too_stiff_opens() {
+    for (listed, critical) in conditional() {
+        let stiffness = 2.0 * (3.0 * critical / STEP).powi(2);
+        let control = StepControl::halving(1e-3 * STEP).unwrap();
+        let builder = mass_at_wall(&listed, ContactLaw::Penalty { stiffness }, 1.0).step_control(control);
+        let mut run = builder.build().unwrap();
+        let name = listed.name();
+        let (mut pressed, mut whole) = (0, 0);
+        while run.time() < 2000.0 * STEP {
+            let before = run.time();
+            run.step().unwrap();
+            let h = run.time() - before;
+            let closed = run.state().contacts().closed()[0];
+            assert!(!closed || h < 0.3 * STEP, "{name} presses in a step of {h}");
+            pressed += u64::from(closed);
+            whole += u64::from(h > 0.9 * STEP);
+        }
+        assert!(pressed >= 3 && whole > 1900, "{name}: {pressed} pressed, {whole} were whole");
+    }
+}
+
 /// Hosts that know their frequency are asked again.
 #[test]
 fn hosts_are_asked_again_for_their_frequency() {
