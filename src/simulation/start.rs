@@ -17,6 +17,7 @@ use crate::linear_solver::LinearSolver;
 use crate::mass::InverseMass;
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::sparse::scattered_signed;
 use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
 use crate::system::System;
 use crate::tableau::StartUp;
@@ -416,30 +417,72 @@ fn is_free_flight<T: Real>(
     past: &[Motion<T>],
     h: f64,
 ) -> Result<bool> {
-    let largest = |x: &[T]| -> Result<T> {
-        let own = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
-        let own = if T::all_finite(x) { own } else { T::infinity() };
-        together.max(Ok([own.value()])).map(|[largest]| T::of(largest))
+    let bound = 64.0 * T::epsilon().value() * largest(&motion.v, together)?;
+    let is_rounding = |a: &[T], system: &mut dyn System<T>, projection: &mut _, motion: &_| -> Result<bool> {
+        let change = h * largest(a, together)?;
+        if change <= bound || !change.is_finite() {
+            return Ok(change <= bound);
+        }
+        let sensitivity = sensitivity((system, together), projection, motion)?;
+        Ok(sensitivity.is_some_and(|most| change <= bound + 64.0 * T::epsilon().value() * h * most))
     };
-    let bound = T::of(64.0) * T::epsilon() * largest(&motion.v)?;
-    let small = |a: &[T]| -> Result<bool> { Ok(T::of(h) * largest(a)? <= bound) };
-    if !small(&motion.a)? {
+    if !is_rounding(&motion.a, system, projection, motion)? {
         return Ok(false);
     }
     let mut a = vec![T::zero(); motion.u.len()];
     for motion in past {
-        match system.force(motion.t, &motion.u, &motion.v, &mut a) {
-            // The host does not admit this past.
-            Err(error) if error.is_recoverable() => {
-                together.caught();
-                return Ok(false);
-            }
-            other => other?,
+        if !admitted(system.force(motion.t, &motion.u, &motion.v, &mut a), together)? {
+            return Ok(false);
         }
         projection.apply_inverse(&mut a)?;
-        if !small(&a)? {
+        if !is_rounding(&a, system, projection, motion)? {
             return Ok(false);
         }
     }
     Ok(true)
+}
+
+/// The largest size of an entry of a vector, infinite if one is no number.
+fn largest<T: Real>(x: &[T], together: &Together<T>) -> Result<f64> {
+    let own = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+    let own = if T::all_finite(x) { own } else { T::infinity() };
+    together.max(Ok([own.value()])).map(|[largest]| largest)
+}
+
+/// Whether the host admits a state.
+fn admitted<T: Real>(force: Result<()>, together: &Together<T>) -> Result<bool> {
+    match force {
+        Err(error) if error.is_recoverable() => {
+            together.caught();
+            Ok(false)
+        }
+        other => other.map(|()| true),
+    }
+}
+
+/// How accelerations change with changes of displacements and velocities as large as these are, and without common
+/// direction: ε times that is what rounding makes of accelerations where forces cancel, as those of stiff springs do in
+/// rigid motions. None where the host does not admit the state.
+fn sensitivity<T: Real>(
+    (system, together): (&mut dyn System<T>, &Together<T>),
+    projection: &mut JumpProjection<T>,
+    motion: &Motion<T>,
+) -> Result<Option<f64>> {
+    let share = T::epsilon().sqrt();
+    let mut moved = [motion.u.clone(), motion.v.clone()];
+    for values in &mut moved {
+        let size = share * T::of(largest(values, together)?);
+        values.iter_mut().enumerate().for_each(|(dof, x)| *x += size * T::of(scattered_signed(dof)));
+        together.share(values)?;
+    }
+    let [mut there, mut here] = [(); 2].map(|()| vec![T::zero(); motion.u.len()]);
+    let known = admitted(system.force(motion.t, &moved[0], &moved[1], &mut there), together)?
+        && admitted(system.force(motion.t, &motion.u, &motion.v, &mut here), together)?;
+    if !known {
+        return Ok(None);
+    }
+    there.iter_mut().zip(&here).for_each(|(there, &here)| *there -= here);
+    projection.apply_inverse(&mut there)?;
+    let most = largest(&there, together)? / share.value();
+    Ok(most.is_finite().then_some(most))
 }
