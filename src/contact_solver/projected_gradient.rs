@@ -81,18 +81,20 @@ impl<T: Real> Memory<T> {
             let diagonal = problem.delassus(i, i);
             *inverse = if diagonal > T::zero() { diagonal.recip() } else { T::zero() };
         }
-        // Row sums of |D^{-½} W D^{-½}|; the trace is a bound too. `old` is free until the first step.
-        for (root, inverse) in old.iter_mut().zip(inverse.iter()) {
-            *root = inverse.sqrt();
-        }
-        let sum = |i: usize| problem.row(i).iter().zip(old.iter()).map(|(w, &root)| w.abs() * root).sum::<T>() * old[i];
-        let bound = (0..size).map(sum).fold(T::one(), T::max).min(T::of(size as f64)).max(T::one());
+        // Row sums of |D^{-½} W D^{-½}|; the trace is a bound too. (Roots of products: those of units of odd powers of
+        // two are rounded.)
+        let scaled = |own: T, w: T, inverse: T| w.value().abs() * (own.value() * inverse.value()).sqrt();
+        let sum = |i: usize| {
+            let own = inverse[i];
+            problem.row(i).iter().zip(inverse.iter()).map(|(&w, &inverse)| scaled(own, w, inverse)).sum::<f64>()
+        };
+        let bound = (0..size).map(sum).fold(1.0, f64::max).min(size as f64).max(1.0);
         evaluate(problem, multipliers, gaps);
         old.copy_from_slice(multipliers);
         old_gaps.copy_from_slice(gaps);
         ahead.copy_from_slice(multipliers);
         ahead_gaps.copy_from_slice(gaps);
-        bound
+        T::of(bound)
     }
 
     /// The gradient step of length 1/L from the point ahead.
@@ -104,21 +106,24 @@ impl<T: Real> Memory<T> {
         evaluate(problem, multipliers, &mut self.gaps);
     }
 
-    /// Whether W bends no more than L along the step: then the step cannot overshoot.
+    /// Whether W bends no more than L along the step: then the step cannot overshoot. (Products of small differences
+    /// may be below the numbers of `f32`.)
     fn is_bounded(&self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &[T]) -> bool {
-        let mut sums = (T::zero(), T::zero());
+        let mut sums = (0.0, 0.0);
         for (i, (&new, &ahead)) in multipliers.iter().zip(&self.ahead).enumerate() {
-            let difference = new - ahead;
-            sums.0 += difference * (self.gaps[i] - self.ahead_gaps[i]);
-            sums.1 += difference * difference * problem.delassus(i, i);
+            let difference = (new - ahead).value();
+            sums.0 += difference * (self.gaps[i] - self.ahead_gaps[i]).value();
+            sums.1 += difference * difference * problem.delassus(i, i).value();
         }
-        sums.0 <= lipschitz * sums.1
+        sums.0 <= lipschitz.value() * sums.1
     }
 
     /// Whether the momentum points uphill.
     fn is_uphill(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
-        let product = |(i, &new): (usize, &T)| problem.delassus(i, i) * (self.ahead[i] - new) * (new - self.old[i]);
-        multipliers.iter().enumerate().map(product).sum::<T>() > T::zero()
+        let product = |(i, &new): (usize, &T)| {
+            problem.delassus(i, i).value() * ((self.ahead[i] - new).value() * (new - self.old[i]).value())
+        };
+        multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
     }
 
     /// Goes on from the iterate, with this share of the last step as momentum.
