@@ -1,6 +1,7 @@
 //! What `Release` gives back: whatever the scheme, the phase of the impact, and the motion of the observer.
 
-use contact_dynamics::contact::{GapOffset, NodesOnObstacle, Plane};
+use contact_dynamics::contact::{ContactLaw, GapOffset, NodesOnObstacle, Plane};
+use contact_dynamics::contact_solver::Pivoting;
 use contact_dynamics::corrector::Release;
 use contact_dynamics::{
     Gssss, LinearRows, LinearSystem, PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
@@ -159,6 +160,40 @@ fn contacts_that_open_together_have_no_order() {
         together += usize::from(both);
     }
     assert!(together > 10, "they open together in {together} runs");
+}
+
+/// One contact written twice, with another factor: which of both rows presses is the solver's choice, and neither opens
+/// as long as the other one does. What the impact took is given back once, when both open.
+#[test]
+fn a_contact_that_is_written_twice_is_one() {
+    let mut opened = 0;
+    for (make, _) in schemes() {
+        for (law, gap) in [ContactLaw::Rigid, ContactLaw::PersistencySwitch].into_iter().zip([0.013, 0.0179]) {
+            let mut end = |factors: &[f64]| {
+                let k = [spring(0, 1, 5.0), spring(1, 2, 4.0), spring(2, 3, 6.0)].concat();
+                let system = LinearSystem::lumped(vec![1.0, 1.7, 0.6, 1.2], matrix(4, k)).unwrap();
+                let rows = factors.iter().fold(LinearRows::new(), |rows, &factor| {
+                    rows.row(law, &[(0, factor)], factor * gap)
+                });
+                let builder = Simulation::builder(system, make(), 0.05).velocity(vec![-0.02; 4]).constraint(rows);
+                let mut run = corrected(builder.contact_solver(Pivoting::default()), With::Release).build().unwrap();
+                let mut velocities = Vec::new();
+                while run.time() < 8.0 {
+                    let before = run.state().contacts().closed().contains(&true);
+                    run.step().unwrap();
+                    opened += u32::from(before && !run.state().contacts().closed().contains(&true));
+                    velocities.extend_from_slice(run.state().velocity());
+                }
+                velocities
+            };
+            let (one, name) = (end(&[1.0]), make().name());
+            for factors in [[1.0, 2.068], [2.068, 1.0]] {
+                let worst = one.iter().zip(end(&factors)).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+                assert!(worst < 1e-10 * 0.02, "{name}, {law:?}, {factors:?}: {worst:e}");
+            }
+        }
+    }
+    assert!(opened > 60, "{opened}");
 }
 
 /// Two masses that have met move on together, without any force between them: whichever way their gap is rounded, what

@@ -91,11 +91,29 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
-    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative.
+    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative. Those that are held
+    /// together by a multiple of its row are so by the choice of one: the energy is that one's then.
     pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
-        let noise = self.parts_by_rounding(row, (T::of(2.0) * s * energy).sqrt())?;
-        Ok(noise.is_some_and(|noise| T::of(self.h) * s * self.previous_force(row) <= noise))
+        let Some(noise) = self.parts_by_rounding(row, (T::of(2.0) * s * energy).sqrt())? else { return Ok(false) };
+        if let Some(other) = self.multiple_of(row) {
+            self.contacts.dissipated[row] = T::zero();
+            self.contacts.dissipated[other] += energy;
+            return Ok(true);
+        }
+        Ok(T::of(self.h) * s * self.previous_force(row) <= noise)
+    }
+
+    /// A row that is pressed and a multiple of another one.
+    fn multiple_of(&self, row: usize) -> Option<usize> {
+        let largest = |row| self.g.row(row).map(|(_, weight)| weight.abs()).fold(T::zero(), T::max);
+        let own = largest(row);
+        let mut pressed = self.buffers.closed.iter().copied().filter(|&other| self.is_pressed(other));
+        pressed.find(|&other| {
+            let (size, near) = (largest(other), share_of_rounding::<T>());
+            let same = |((dof, x), (at, y)): ((usize, T), (usize, T))| dof == at && (x / own - y / size).abs() <= near;
+            self.g.row(row).count() == self.g.row(other).count() && self.g.row(row).zip(self.g.row(other)).all(same)
+        })
     }
 
     /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
