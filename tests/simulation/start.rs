@@ -3,12 +3,13 @@
 use contact_dynamics::contact::Plane;
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
+    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Park,
     PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::sparse::{matrix, springs};
+use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::sparse::{matrix, spring, springs};
 
 /// A bar of n elements (EA/l = 1 a element, mass 1 a element), its first node without mass, the last one fixed.
 fn bar(n: usize) -> LinearSystem<'static, f64> {
@@ -315,5 +316,37 @@ fn overlap_that_is_removed_strains_what_it_moves() {
         }
         assert!(worst[0] < 1e-13 && worst[1] < 2e-2 * 4.0 * depth, "{name}: {worst:?}");
         assert!((run.energy().total() / (2.0 * depth * depth) - 1.0).abs() < 1e-3, "{name}: {}", run.energy().total());
+    }
+}
+
+/// Forces of stiff springs, and of dashpots, cancel in a rigid motion but for their rounding, which is no acceleration:
+/// whatever the stiffness, the order of the dofs, the motion and the place, the past is a straight line. A load is none
+/// of this.
+#[test]
+fn a_rigid_motion_of_a_stiff_body_begins_with_its_past() {
+    let mut random = Congruential(5);
+    for case in 0..200 {
+        let stiffness = 10.0_f64.powf(8.0 * random.unit());
+        let (n, speed, place) = (12, 1e3 * random.signed(), if case % 2 == 0 { 0.0 } else { 1e3 * random.signed() });
+        let mut dofs: Vec<usize> = (0..n).collect();
+        for i in (1..n).rev() {
+            dofs.swap(i, (random.unit() * (i + 1) as f64) as usize);
+        }
+        let mut springs = Vec::new();
+        for i in 0..n {
+            let others = [i + 1, i + 3].into_iter().filter(|&j| j < n);
+            springs.extend(others.flat_map(|j| spring(dofs[i], dofs[j], stiffness * (0.5 + random.unit()))));
+        }
+        let mass: Vec<f64> = (0..n).map(|_| 0.5 + random.unit()).collect();
+        for (load, known) in [(0.0, 2), (1e-3, 0)] {
+            let k = matrix(n, springs.iter().copied());
+            let system = LinearSystem::lumped(mass.clone(), k).unwrap().rayleigh(0.0, 1e-3).unwrap();
+            let run = Simulation::builder(system.load(move |_, f| f[0] = load * stiffness), Park, 0.5)
+                .displacement(vec![place; n])
+                .velocity(vec![speed; n])
+                .build()
+                .unwrap();
+            assert_eq!(run.history().len(), known, "case {case}: stiffness {stiffness:e}, load {load}");
+        }
     }
 }
