@@ -19,8 +19,9 @@ pub(crate) struct Buffers<T> {
     pub(crate) opened: Vec<usize>,
     /// Rows that were closed in this step or at its start, and are open now.
     pub(crate) released: Vec<usize>,
-    /// Reported forces before this stage, one a candidate.
+    /// Reported forces before this stage, and λ_a beside them, one a candidate.
     pub(crate) reported: Vec<T>,
+    pub(super) struck: Vec<T>,
     /// The contact problem of the jumps of one kind: what multipliers may be, jumps, and what of them is rounding.
     pub(super) sets: Vec<AdmissibleSet>,
     pub(super) jump: Vec<T>,
@@ -96,6 +97,7 @@ impl<T: Real> Buffers<T> {
             opened: Vec::with_capacity(rows),
             released: Vec::with_capacity(rows),
             reported: reals(rows),
+            struck: reals(rows),
             sets: Vec::with_capacity(rows),
             jump: reals(rows),
             tolerance: reals(rows),
@@ -130,6 +132,7 @@ impl<T: Real> Buffers<T> {
             opened,
             released,
             reported,
+            struck,
             sets,
             jump,
             tolerance,
@@ -142,7 +145,7 @@ impl<T: Real> Buffers<T> {
         for list in [closed, engaged, opened, released] {
             list.reserve(rows.saturating_sub(list.len()));
         }
-        for values in [reported, jump, tolerance, straight, by_straight, impulses, forces] {
+        for values in [reported, struck, jump, tolerance, straight, by_straight, impulses, forces] {
             values.reserve(rows.saturating_sub(values.len()));
         }
         sets.reserve(rows.saturating_sub(sets.len()));
@@ -158,11 +161,10 @@ impl<T: Real> Buffers<T> {
     fn report(&mut self, contacts: &ContactState<T>, first: bool) {
         if first {
             self.reported.clone_from(&contacts.lambda);
+            self.struck.clone_from(&contacts.lambda_a);
         }
-        for ((reported, &lambda), &closed) in self.reported.iter_mut().zip(&contacts.lambda).zip(&contacts.closed) {
-            if closed {
-                *reported = lambda;
-            }
+        for (row, _) in contacts.closed.iter().enumerate().filter(|(_, closed)| **closed) {
+            (self.reported[row], self.struck[row]) = (contacts.lambda[row], contacts.lambda_a[row]);
         }
     }
 

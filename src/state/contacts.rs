@@ -122,12 +122,13 @@ impl<T: Real> ContactState<T> {
     }
 
     /// Copies what belongs to the same contacts from another state; contacts it does not know are open. What every
-    /// stage sets anew (gaps, impulses, λ_v, λ_a, slips) is anything before.
+    /// stage sets anew (impulses, λ_v, slips; gaps and λ_a of tangential rows) is anything before.
     pub(crate) fn carry_over(&mut self, old: &Self, (ids, names): (&[ContactId], Names), tangents: &Tangents) {
         if old.names.are(names) && self.names.are(names) {
             self.lambda.copy_from_slice(&old.lambda);
             self.lambda_raw.copy_from_slice(&old.lambda_raw);
             self.gap.copy_from_slice(&old.gap);
+            self.lambda_a.copy_from_slice(&old.lambda_a);
             self.closed.copy_from_slice(&old.closed);
             self.dissipated.copy_from_slice(&old.dissipated);
             if !tangents.is_empty() {
@@ -152,6 +153,7 @@ impl<T: Real> ContactState<T> {
                 next = j + 1;
                 self.closed[i] = old.closed[j];
                 self.gap[i] = old.gap[j];
+                self.lambda_a[i] = old.lambda_a[j];
                 self.dissipated[i] = old.dissipated[j];
                 let tangential = tangents.of(i).zip(old.tangents.of(j));
                 for (i, j) in std::iter::once((i, j)).chain(tangential) {

@@ -162,6 +162,26 @@ fn contacts_that_open_together_have_no_order() {
     assert!(together > 10, "they open together in {together} runs");
 }
 
+/// A damped mass that stops at a wall is not driven back: whichever way its gap is rounded, and in whatever part of a
+/// step it comes, from the start or later.
+#[test]
+fn a_damped_mass_stays_where_it_has_stopped() {
+    for (make, _) in schemes() {
+        for (damping, i) in [0.0, 0.03, 0.3, 3.0].into_iter().flat_map(|damping| (0..40).map(move |i| (damping, i))) {
+            let (mass, gap, speed) = (0.92 + 0.1 * f64::from(i), 0.0137 * f64::from(i), 1.4e-4 * 1.7_f64.powi(i % 9));
+            let system = LinearSystem::lumped(vec![mass], matrix(1, [(0, 0, 0.0)])).unwrap();
+            let wall = LinearRows::new().unilateral(&[(0, 1.0)], gap * speed);
+            let builder = Simulation::builder(system.rayleigh(damping, 0.0).unwrap(), make(), 0.052);
+            let mut run = corrected(builder.velocity(vec![-speed]).constraint(wall), With::Release).build().unwrap();
+            for _ in 0..60 {
+                run.step().unwrap();
+            }
+            let v = run.state().velocity()[0];
+            assert!(v < 1e-9 * speed, "{}, damping {damping}, gap {gap}: {v:e} of {speed:e}", make().name());
+        }
+    }
+}
+
 /// One contact written twice, with another factor: which of both rows presses is the solver's choice, and neither opens
 /// as long as the other one does. What the impact took is given back once, when both open.
 #[test]
@@ -172,9 +192,8 @@ fn a_contact_that_is_written_twice_is_one() {
             let mut end = |factors: &[f64]| {
                 let k = [spring(0, 1, 5.0), spring(1, 2, 4.0), spring(2, 3, 6.0)].concat();
                 let system = LinearSystem::lumped(vec![1.0, 1.7, 0.6, 1.2], matrix(4, k)).unwrap();
-                let rows = factors.iter().fold(LinearRows::new(), |rows, &factor| {
-                    rows.row(law, &[(0, factor)], factor * gap)
-                });
+                let rows =
+                    factors.iter().fold(LinearRows::new(), |rows, &factor| rows.row(law, &[(0, factor)], factor * gap));
                 let builder = Simulation::builder(system, make(), 0.05).velocity(vec![-0.02; 4]).constraint(rows);
                 let mut run = corrected(builder.contact_solver(Pivoting::default()), With::Release).build().unwrap();
                 let mut velocities = Vec::new();

@@ -7,8 +7,8 @@ use contact_dynamics::{
     PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
-use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, spring, springs};
 
 /// A bar of n elements (EA/l = 1 a element, mass 1 a element), its first node without mass, the last one fixed.

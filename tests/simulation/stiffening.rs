@@ -342,7 +342,10 @@ fn step_control_does_not_come_back_to_steps_that_were_too_long() {
                 most = most.max(run.energy().total() / start);
             }
             let (name, refused) = (listed.name(), run.statistics().refused_steps);
-            assert!(most < 30.0 && refused <= 4, "{name}, {times}: energy grows to {most} of that at the start, {refused}");
+            assert!(
+                most < 30.0 && refused <= 4,
+                "{name}, {times}: energy grows to {most} of that at the start, {refused}"
+            );
             assert!(times < 1.0 || run.step_size() < h, "{name}: {}", run.step_size());
         }
     }

@@ -91,17 +91,20 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
-    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative. Those that are held
-    /// together by a multiple of its row are so by the choice of one: the energy is that one's then.
+    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative. (The force of the
+    /// impact itself is none that holds them together, and with damping not zero.) Those that are held together by a
+    /// multiple of its row are so by the choice of one: the energy is that one's then.
     pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
-        let Some(noise) = self.parts_by_rounding(row, (T::of(2.0) * s * energy).sqrt())? else { return Ok(false) };
+        let speed = (T::of(2.0) * s * energy).sqrt();
+        let Some(noise) = self.parts_by_rounding(row, speed)? else { return Ok(false) };
         if let Some(other) = self.multiple_of(row) {
             self.contacts.dissipated[row] = T::zero();
             self.contacts.dissipated[other] += energy;
             return Ok(true);
         }
-        Ok(T::of(self.h) * s * self.previous_force(row) <= noise)
+        let struck = s * self.buffers.struck[row].abs() > T::of(0.1 * self.h) * speed;
+        Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
     }
 
     /// A row that is pressed and a multiple of another one.
