@@ -3,7 +3,7 @@
 use super::scheme::Scheme;
 use crate::analysis::{self, ZeroStability};
 use crate::error::{Error, Result};
-use crate::mass::InverseMass;
+use crate::mass::{InverseMass, Mass};
 use crate::memory;
 use crate::ranks::Together;
 use crate::real::Real;
@@ -78,7 +78,7 @@ pub(super) fn highest_square<T: Real>(
     enough: f64,
     mut add: impl FnMut(&[T], &mut [T]),
 ) -> Result<Option<[f64; 2]>> {
-    let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed(), &[])?, system.dofs());
+    let mut lanczos = Lanczos::new(system)?;
     let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(None) };
     if !stiffness.is_symmetric() {
         return Ok(None);
@@ -121,7 +121,7 @@ pub(super) fn check_step<T: Real>(
             }),
         };
     }
-    let mut lanczos = Lanczos::new(InverseMass::new(system.mass(), system.prescribed(), &[])?, system.dofs());
+    let mut lanczos = Lanczos::new(system)?;
     let highest = if let Some(omega) = system.highest_frequency() {
         Highest { at_least: omega * omega, at_most: omega * omega }
     } else {
@@ -305,12 +305,19 @@ struct Lanczos<T: Real> {
 }
 
 impl<T: Real> Lanczos<T> {
-    fn new(inverse: InverseMass<T>, dofs: usize) -> Self {
-        let start = match &inverse {
-            InverseMass::Lumped(inverse) => inverse.iter().map(|inverse| inverse.sqrt()).collect(),
-            InverseMass::Consistent(_) => vec![T::one(); dofs],
+    fn new(system: &dyn System<T>) -> Result<Self> {
+        let (mass, dofs) = (system.mass(), system.dofs());
+        let inverse = InverseMass::new(mass, system.prescribed(), &[])?;
+        // (As much of each dof in the inner product of M: of light ones, which are the fastest, as of others.)
+        let start = match (&inverse, mass) {
+            (InverseMass::Lumped(inverse), _) => inverse.iter().map(|inverse| inverse.sqrt()).collect(),
+            (_, Mass::Consistent(mass)) => {
+                let inverse = (0..dofs).map(|dof| sparse::entry(mass, dof, dof).sqrt().recip());
+                inverse.map(|size| if size.is_finite() { size } else { T::zero() }).collect()
+            }
+            _ => vec![T::one(); dofs],
         };
-        Self { inverse, start, vectors: std::array::from_fn(|_| vec![T::zero(); dofs]) }
+        Ok(Self { inverse, start, vectors: std::array::from_fn(|_| vec![T::zero(); dofs]) })
     }
 
     /// The highest eigenvalue, known well enough to compare it with `limit`, and to [`ACCURACY`] if it is above.

@@ -1,11 +1,13 @@
 //! Schemes and steps that cannot work are refused when a simulation is built, with the step that works.
 
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::faer::{Mat, Side};
 use contact_dynamics::tableau::{A, Rows, U, V, Z};
 use contact_dynamics::{
     CdLagrange, CentralDifference, ChungLee, Error, LinearSystem, Linearity, Mass, Newmark, NohBathe, Result,
     Simulation, System, TangentWeights, TimeIntegrator, analysis,
 };
+use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::schemes::Tabulated;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::matrix;
@@ -89,6 +91,42 @@ fn bars_may_run_at_courant_one_and_no_further() {
         let build =
             |courant: f64| Simulation::builder(bars.system::<f32>(), CentralDifference, courant * transit).build();
         assert!(build(1.0).is_ok() && build(1.02).is_err(), "{n}");
+    }
+}
+
+/// Bars of light and heavy elements with a consistent mass: light nodes are the fastest, and have little of the mass.
+#[test]
+fn consistent_masses_are_judged_by_their_lightest_nodes() {
+    let mut random = Congruential(3);
+    for case in 0..300 {
+        let n = 3 + case % 8;
+        let (mut m, mut k) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
+        for i in 1..n {
+            let (mass, stiffness) = (10.0_f64.powf(-5.0 * random.unit()), 0.5 + random.unit());
+            for (a, b) in [(i - 1, i), (i, i - 1)] {
+                m[(a, a)] += mass / 3.0;
+                m[(a, b)] += mass / 6.0;
+                k[(a, a)] += stiffness;
+                k[(a, b)] -= stiffness;
+            }
+        }
+        // The highest eigenvalue of L⁻¹ K L⁻ᵀ with M = L Lᵀ.
+        let factor = m.llt(Side::Lower).unwrap();
+        let mut y = k.clone();
+        factor.L().solve_lower_triangular_in_place(&mut y);
+        let mut symmetric = y.transpose().to_owned();
+        factor.L().solve_lower_triangular_in_place(&mut symmetric);
+        let highest = symmetric.self_adjoint_eigenvalues(Side::Lower).unwrap()[n - 1];
+        let limit = 2.0 / highest.sqrt();
+        let build = |share: f64| {
+            let entries = |a: &Mat<f64>| (0..n * n).map(|e| (e % n, e / n, a[(e % n, e / n)])).collect::<Vec<_>>();
+            let system = LinearSystem::<f64>::new(matrix(n, entries(&m)), matrix(n, entries(&k))).unwrap();
+            Simulation::builder(system, CdLagrange, share * limit).build()
+        };
+        assert!(build(0.99).is_ok(), "case {case}");
+        for share in [1.01, 1.1, 2.0] {
+            assert!(matches!(build(share), Err(Error::BeyondStability { .. })), "case {case}: {share}");
+        }
     }
 }
 
