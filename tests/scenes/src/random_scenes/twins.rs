@@ -13,6 +13,8 @@ pub(super) struct Trace {
     lists: [Vec<f64>; 5],
     /// Steps that were refused so far, and taken again with half the size.
     refused: u64,
+    /// The size of the next step.
+    h: f64,
 }
 
 const NAMES: [&str; 5] = ["u", "v", "a", "forces", "raw forces"];
@@ -33,6 +35,7 @@ impl Trace {
                 list(contacts.raw_forces(), force),
             ],
             refused: run.statistics().refused_steps,
+            h: run.step_size() / time,
         }
     }
 
@@ -74,7 +77,7 @@ impl Trace {
         };
         let [u, v, a, forces, raw] = &self.lists;
         let lists = [by_dof(u), by_dof(v), by_dof(a), by_row(forces), by_row(raw)];
-        Self { lists, refused: self.refused }
+        Self { lists, ..*self }
     }
 }
 
@@ -222,10 +225,13 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             }
             h = run.run.time() - start;
         }
-        // (Control halves a step or does not: where one of them decides otherwise they are discretized differently, and
-        // agree to the order of the scheme.)
-        let refused = [&run, &one, &two].map(|run| run.run.statistics().refused_steps);
-        if refused.iter().any(|&refused| refused != trace.refused) {
+        // (Control halves a step, or lets it grow, or does not: where one of them decides otherwise they are discretized
+        // differently, and agree to the order of the scheme.)
+        let alike = |run: &Run<'_, T>| {
+            let size = run.run.step_size() / run.recipe.units[2];
+            run.run.statistics().refused_steps == trace.refused && (size / trace.h - 1.0).abs() < 1e-6
+        };
+        if ![&run, &one, &two].into_iter().all(alike) {
             break;
         }
         let trace = trace.clone().on_dofs(recipe);

@@ -1,7 +1,7 @@
 //! The state at the start, and the past that a multistep scheme reads (theory, section 2.4).
 
 use super::correct::leaves_smooth_motion;
-use super::dense::{add, dot, product, size};
+use super::dense::{Matrix, add, dot, product, size};
 use super::problem::{Contact, Friction, Problem};
 use super::stage::is_at_bound;
 use super::{Contacts, Motion, Scene, history};
@@ -82,13 +82,21 @@ fn back(now: &Motion, time: f64, straight: bool) -> Motion {
     past
 }
 
-/// Whether no acceleration changes a velocity in a step, now and in a past on a straight line.
+/// Whether no acceleration changes a velocity in a step, now and in a past on a straight line, but by what rounding
+/// makes of forces that cancel.
 fn is_free_flight(scene: &Scene, past: &[Motion]) -> bool {
     let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
-    let bound = 64.0 * f64::EPSILON * largest(&past[0].v);
-    let flies =
-        |state: &Motion| scene.h * largest(&scene.accelerate(&scene.force(state.t, &state.u, &state.v))) <= bound;
-    scene.h * largest(&past[0].a) <= bound && past.iter().skip(1).all(flies)
+    let sums = |a: &Matrix, by: f64| a.iter().map(|row| by * row.iter().map(|x| x.abs()).sum::<f64>()).collect();
+    let rounding = |state: &Motion| {
+        let mut forces: Vec<f64> = sums(&scene.stiffness, largest(&state.u));
+        if let Some(damping) = &scene.damping {
+            add(&mut forces, 1.0, &sums(damping, largest(&state.v)));
+        }
+        64.0 * f64::EPSILON * (largest(&past[0].v) + scene.h * largest(&scene.accelerate(&forces)))
+    };
+    let flies = |a: &[f64], state: &Motion| scene.h * largest(a) <= rounding(state);
+    let force = |state: &Motion| scene.force(state.t, &state.u, &state.v);
+    flies(&past[0].a, &past[0]) && past.iter().skip(1).all(|state| flies(&scene.accelerate(&force(state)), state))
 }
 
 /// a += c M⁻¹ Gᵀ r over all rows and tangents.
