@@ -11,9 +11,9 @@ use crate::state::{Motion, State};
 /// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a
 /// smaller one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is
 /// taken again with half the size; after two steps that went well the size doubles where that meets the nominal grid
-/// again, so every nominal time is met. If doubling fails at once, it waits twice as long the next time. It does not come
-/// back to a size that was found too long for the stiffness of the system ([`Error::Stiffened`]), or of a contact as long
-/// as such contacts press: a step beyond the limit of stability adds energy before it is found to be one.
+/// again, so every nominal time is met. If doubling fails at once, it waits twice as long the next time. It does not
+/// come back to a size that was found too long for the stiffness of the system ([`Error::Stiffened`]), or of a contact
+/// as long as such contacts press: a step beyond the limit of stability adds energy before it is found to be one.
 /// [`set_step_size`](crate::Simulation::set_step_size) makes sizes up to the one given admissible again.
 ///
 /// Two judgements may be added: an estimate of the [local error](Self::local_error), and a limit to the

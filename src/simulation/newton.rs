@@ -36,9 +36,9 @@ impl TangentUpdate {
 ///
 /// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
 /// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of
-/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, to 0.85 in eight where
-/// the tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are raised to
-/// it.
+/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, to 0.85 in eight
+/// where the tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are
+/// raised to it.
 ///
 /// ```
 /// use contact_dynamics::Newton;

@@ -92,19 +92,26 @@ impl<T: Real> Correction<'_, T> {
 
     /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
     /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative. (The force of the
-    /// impact itself is none that holds them together, and with damping not zero.) Those that are held together by a
-    /// multiple of its row are so by the choice of one: the energy is that one's then.
+    /// impact itself is none that holds them together, and with damping not zero.)
     pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let speed = (T::of(2.0) * s * energy).sqrt();
         let Some(noise) = self.parts_by_rounding(row, speed)? else { return Ok(false) };
-        if let Some(other) = self.multiple_of(row) {
-            self.contacts.dissipated[row] = T::zero();
-            self.contacts.dissipated[other] += energy;
-            return Ok(true);
-        }
         let struck = s * self.buffers.struck[row].abs() > T::of(0.1 * self.h) * speed;
         Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
+    }
+
+    /// Passes on what an impact took from a contact that has opened by rounding to a row that presses and is a multiple
+    /// of its own, if there is one: which of both presses is the solver's choice, and both are one contact.
+    pub(in crate::corrector) fn passes_on(&mut self, row: usize) -> Result<bool> {
+        let energy = self.contacts.dissipated[row];
+        let speed = (T::of(2.0) * self.compliance(row)? * energy).sqrt();
+        let held = self.parts_by_rounding(row, speed)?.and_then(|_| self.multiple_of(row));
+        if let Some(other) = held {
+            self.contacts.dissipated[row] = T::zero();
+            self.contacts.dissipated[other] += energy;
+        }
+        Ok(held.is_some())
     }
 
     /// A row that is pressed and a multiple of another one.

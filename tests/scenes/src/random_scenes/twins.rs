@@ -225,8 +225,8 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             }
             h = run.run.time() - start;
         }
-        // (Control halves a step, or lets it grow, or does not: where one of them decides otherwise they are discretized
-        // differently, and agree to the order of the scheme.)
+        // (Control halves a step, or lets it grow, or does not: where one of them decides otherwise they are
+        // discretized differently, and agree to the order of the scheme.)
         let alike = |run: &Run<'_, T>| {
             let size = run.run.step_size() / run.recipe.units[2];
             run.run.statistics().refused_steps == trace.refused && (size / trace.h - 1.0).abs() < 1e-6
