@@ -432,7 +432,7 @@ fn a_modified_iteration_is_linear_and_finds_the_same() {
     for run in [&modified, &searching] {
         close(full.state().displacement(), run.state().displacement(), 1e-6, "displacement");
     }
-    let [full, modified] = [full, modified].map(|run| *run.statistics());
+    let [full, modified] = [&full, &modified].map(|run| *run.statistics());
     assert!(modified.newton_iterations > full.newton_iterations);
     // One factorization a step, and two when the scheme and its start were compiled.
     assert_eq!(modified.factorizations, 200 + 2);

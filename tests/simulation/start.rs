@@ -328,10 +328,9 @@ fn a_rigid_motion_of_a_stiff_body_begins_with_its_past() {
     for case in 0..200 {
         let stiffness = 10.0_f64.powf(8.0 * random.unit());
         let (n, speed, place) = (12, 1e3 * random.signed(), if case % 2 == 0 { 0.0 } else { 1e3 * random.signed() });
-        let mut dofs: Vec<usize> = (0..n).collect();
-        for i in (1..n).rev() {
-            dofs.swap(i, (random.unit() * (i + 1) as f64) as usize);
-        }
+        let mut dofs: Vec<(f64, usize)> = (0..n).map(|dof| (random.unit(), dof)).collect();
+        dofs.sort_by(|x, y| x.0.total_cmp(&y.0));
+        let dofs: Vec<usize> = dofs.into_iter().map(|(_, dof)| dof).collect();
         let mut springs = Vec::new();
         for i in 0..n {
             let others = [i + 1, i + 3].into_iter().filter(|&j| j < n);
