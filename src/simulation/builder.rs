@@ -543,7 +543,7 @@ fn newton<T: Real>(
     scheme: &Scheme<'_>,
     program: &Program<T>,
     motion: &Motion<T>,
-) -> Result<Option<NewtonWork<T>>> {
+) -> Result<Option<Box<NewtonWork<T>>>> {
     let linearity = system.linearity();
     if settings.is_none() && linearity == Linearity::Linear {
         return Ok(None);
@@ -554,7 +554,7 @@ fn newton<T: Real>(
     }
     let dofs = motion.u.len();
     let path = along_path.then(|| PathWork::new(dofs));
-    Ok(Some(NewtonWork::new(settings.unwrap_or_default(), dofs, path)))
+    Ok(Some(Box::new(NewtonWork::new(settings.unwrap_or_default(), dofs, path))))
 }
 
 /// The judge of the steps of a run that controls them.

@@ -26,7 +26,7 @@ pub(super) struct Workspace<T: Real> {
     pub(super) vectors: StageVectors<T>,
     pub(super) contact: ContactWork<T>,
     /// For nonlinear systems.
-    pub(super) newton: Option<NewtonWork<T>>,
+    pub(super) newton: Option<Box<NewtonWork<T>>>,
     /// Free dofs without mass.
     pub(super) massless: Vec<usize>,
     /// For explicit schemes, if there are dofs without mass.
