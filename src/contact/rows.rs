@@ -1,5 +1,6 @@
 //! What contact knows of the gaps between two searches: the rows of G, and the rates that do not come from them.
 
+use super::share_of_rounding;
 use crate::real::Real;
 use std::ops::Range;
 
@@ -151,6 +152,14 @@ impl<T: Real> ContactJacobian<T> {
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
         let range = self.pointers[row]..self.pointers[row + 1];
         self.dofs[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
+    }
+
+    /// Whether two rows are multiples of each other but for a share of rounding: one contact, written twice.
+    pub(crate) fn are_multiples(&self, row: usize, other: usize) -> bool {
+        let largest = |row| self.row(row).map(|(_, weight)| weight.abs()).fold(T::zero(), T::max);
+        let (own, size, near) = (largest(row), largest(other), share_of_rounding::<T>());
+        let same = |((dof, x), (at, y)): ((usize, T), (usize, T))| dof == at && (x / own - y / size).abs() <= near;
+        self.row(row).count() == self.row(other).count() && self.row(row).zip(self.row(other)).all(same)
     }
 
     /// `G_row · x`.

@@ -106,24 +106,14 @@ impl<T: Real> Correction<'_, T> {
     pub(in crate::corrector) fn passes_on(&mut self, row: usize) -> Result<bool> {
         let energy = self.contacts.dissipated[row];
         let speed = (T::of(2.0) * self.compliance(row)? * energy).sqrt();
-        let held = self.parts_by_rounding(row, speed)?.and_then(|_| self.multiple_of(row));
+        let opens = self.parts_by_rounding(row, speed)?.is_some();
+        let mut pressed = self.buffers.closed.iter().copied().filter(|&other| self.is_pressed(other));
+        let held = if opens { pressed.find(|&other| self.g.are_multiples(row, other)) } else { None };
         if let Some(other) = held {
             self.contacts.dissipated[row] = T::zero();
             self.contacts.dissipated[other] += energy;
         }
         Ok(held.is_some())
-    }
-
-    /// A row that is pressed and a multiple of another one.
-    fn multiple_of(&self, row: usize) -> Option<usize> {
-        let largest = |row| self.g.row(row).map(|(_, weight)| weight.abs()).fold(T::zero(), T::max);
-        let own = largest(row);
-        let mut pressed = self.buffers.closed.iter().copied().filter(|&other| self.is_pressed(other));
-        pressed.find(|&other| {
-            let (size, near) = (largest(other), share_of_rounding::<T>());
-            let same = |((dof, x), (at, y)): ((usize, T), (usize, T))| dof == at && (x / own - y / size).abs() <= near;
-            self.g.row(row).count() == self.g.row(other).count() && self.g.row(row).zip(self.g.row(other)).all(same)
-        })
     }
 
     /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
