@@ -417,6 +417,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         }
         let mut projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
         let is_smooth = self.correctors.iter().any(Corrector::leaves_smooth_motion);
+        let is_resumed = resumed.is_some();
         let begun = if let Some((state, history)) = resumed {
             take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
             Begun { state, history, adjustment: None }
@@ -434,10 +435,18 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             correctors.extend(default_corrections(&scheme.tableau, &constraints, &massless));
         }
         let limit = match self.stability {
-            Stability::Checked => {
-                stability::check_step((&mut *system, together), &scheme, &state.motion, history.clock.h)?
-            }
             Stability::Unchecked => StepLimit::Unchecked,
+            Stability::Checked => {
+                let h = history.clock.h;
+                match stability::check_step((&mut *system, together), &scheme, &state.motion, h) {
+                    // (The run that left this state had no tangent of it either: explicit steps read none.)
+                    Err(error) if is_resumed && error.is_recoverable() => {
+                        together.caught();
+                        StepLimit::Cleared(h)
+                    }
+                    found => found?,
+                }
+            }
         };
 
         let (interface, unit) = (constraints.interface(), Unit::of(&constraints));

@@ -5,9 +5,9 @@ use contact_dynamics::contact::{ContactLaw, GapFunction, Side, Sphere};
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::tableau::{ContactLevel, Stage};
 use contact_dynamics::{
-    Bathe, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha, LinearRows, LinearSystem,
-    Linearity, Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Result, Simulation, StartUp, StepControl,
-    System, TangentWeights, TimeIntegrator,
+    Bathe, CentralDifference, Composite, Corrector, DampingForce, EnergyMomentum, Error, GeneralizedAlpha, LinearRows,
+    LinearSystem, Linearity, Mass, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Result, Simulation,
+    StartUp, StepControl, System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::hosts::{self, Bare, Hooked};
 use contact_dynamics_scenes::schemes::{Listed, all};
@@ -946,7 +946,44 @@ fn a_run_goes_on_from_a_state_that_the_host_does_not_admit() {
         assert_eq!(run.state().displacement(), other.state().displacement());
         assert_eq!(run.state().acceleration(), other.state().acceleration());
     }
-    // At the start accelerations come from the balance there: it is refused.
-    let refused = builder(0.0).displacement(vec![1.0]).build();
+    // Explicit steps read no tangent, though their limit is checked by it where a run is built.
+    let builder = |refused: f64| {
+        let spring = LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap();
+        let host = Hooked::new(spring, move |method, t, _| match method {
+            "tangent" if t.to_bits() == refused.to_bits() => {
+                Err(Error::Inadmissible { callback: method, source: "an element is turned inside out".into() })
+            }
+            _ => Ok(()),
+        });
+        Simulation::builder(host.linearity(Linearity::Nonlinear), CentralDifference, h).displacement(vec![1.0])
+    };
+    let mut run = builder(3.0 * h).build().unwrap();
+    for _ in 0..3 {
+        run.step().unwrap();
+    }
+    let mut other = builder(3.0 * h).resume(run.state().clone(), run.history().clone()).build().unwrap();
+    for _ in 0..3 {
+        run.step().unwrap();
+        other.step().unwrap();
+        assert_eq!(run.state(), other.state());
+    }
+    let refused = builder(0.0).build();
+    assert!(matches!(refused, Err(Error::Inadmissible { callback: "tangent", .. })), "{:?}", refused.err());
+}
+
+/// At the start accelerations come from the balance there: a state that the host does not admit is refused.
+#[test]
+fn a_start_that_the_host_does_not_admit_is_refused() {
+    let h = 0.25;
+    let spring = LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 4.0)])).unwrap();
+    let host = Hooked::new(spring, move |method, t, _| match method {
+        "force" | "tangent" if t == 0.0 => {
+            Err(Error::Inadmissible { callback: method, source: "an element is turned inside out".into() })
+        }
+        _ => Ok(()),
+    });
+    let host = host.linearity(Linearity::Nonlinear);
+    let builder = Simulation::builder(host, GeneralizedAlpha::chung_hulbert(0.5).unwrap(), h).energy_balance();
+    let refused = builder.displacement(vec![1.0]).build();
     assert!(matches!(refused, Err(Error::Inadmissible { callback: "force", .. })), "{:?}", refused.err());
 }
