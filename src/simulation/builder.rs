@@ -437,15 +437,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let limit = match self.stability {
             Stability::Unchecked => StepLimit::Unchecked,
             Stability::Checked => {
-                let h = history.clock.h;
-                match stability::check_step((&mut *system, together), &scheme, &state.motion, h) {
-                    // (The run that left this state had no tangent of it either: explicit steps read none.)
-                    Err(error) if is_resumed && error.is_recoverable() => {
-                        together.caught();
-                        StepLimit::Cleared(h)
-                    }
-                    found => found?,
-                }
+                let at = (&state.motion, history.clock.h);
+                step_limit((&mut *system, together), &scheme, at, is_resumed)?
             }
         };
 
@@ -518,6 +511,23 @@ fn take_up<T: Real>(
     // (A past that is resampled at once is projected onto gaps as the last step has measured them.)
     constraints.keep_depths(&state.motion, 0.0)?;
     RateCheck::new(constraints.len()).check(constraints, &state.motion, h, g)
+}
+
+/// What is known of the largest stable step. A run that goes on from a state whose tangent the host does not admit had
+/// none there either: explicit steps read none.
+fn step_limit<T: Real>(
+    (system, together): (&mut dyn System<T>, &Together<T>),
+    scheme: &Scheme<'_>,
+    (motion, h): (&Motion<T>, f64),
+    is_resumed: bool,
+) -> Result<StepLimit> {
+    match stability::check_step((system, together), scheme, motion, h) {
+        Err(error) if is_resumed && error.is_recoverable() => {
+            together.caught();
+            Ok(StepLimit::Cleared(h))
+        }
+        found => found,
+    }
 }
 
 /// The free dofs without mass. Over ranks, none of which has all of their stiffness, they are refused.
