@@ -370,8 +370,8 @@ impl<T: Real> Correction<'_, T> {
         let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
         let change = &mut buffers.damping;
         // (What rounds is no force on dofs without mass.)
-        let largest = change.iter().fold(T::zero(), |largest, force| largest.max(force.abs()));
-        let reaches = massless.iter().all(|&dof| change[dof].abs() <= share_of_rounding::<T>() * largest);
+        let least = if massless.is_empty() { T::zero() } else { share_of_rounding::<T>() * T::largest(change) };
+        let reaches = massless.iter().all(|&dof| change[dof].abs() <= least);
         if reaches && !scheme.read.iter().any(|[.., a]| *a) {
             // No step starts from a.
             projection.apply_inverse(change)?;

@@ -65,7 +65,7 @@ fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Res
     for i in 0..step.released().len() {
         let row = step.released()[i];
         let taken = step.contacts().dissipated()[row];
-        if taken > T::zero() && !step.passes_on(row)? && !step.opens_by_rounding(row, taken)? {
+        if taken > T::zero() && !step.withholds(row, taken)? {
             given.rows.push(row);
             given.energies.push(taken);
         }

@@ -444,8 +444,7 @@ fn is_free_flight<T: Real>(
 
 /// The largest size of an entry of a vector, infinite if one is no number.
 fn largest<T: Real>(x: &[T], together: &Together<T>) -> Result<f64> {
-    let own = x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
-    let own = if T::all_finite(x) { own } else { T::infinity() };
+    let own = if T::all_finite(x) { T::largest(x) } else { T::infinity() };
     together.max(Ok([own.value()])).map(|[largest]| largest)
 }
 

@@ -90,30 +90,22 @@ impl<T: Real> Correction<'_, T> {
         Ok(if factor.is_finite() { factor } else { T::one() })
     }
 
-    /// Whether a contact that took `energy` at impact opens by rounding alone: bodies that stay together without force
-    /// do so by the sign of the last bit. Measured by the speed that was taken, which is relative. (The force of the
-    /// impact itself is none that holds them together, and with damping not zero.)
-    pub(in crate::corrector) fn opens_by_rounding(&mut self, row: usize, energy: T) -> Result<bool> {
+    /// Whether a contact that took `energy` at impact does not give it back, for it opens by rounding alone: bodies that
+    /// stay together without force do so by the sign of the last bit. Measured by the speed that was taken, which is
+    /// relative. (The force of the impact itself is none that holds them together, and with damping not zero.) What
+    /// opens beside a row that presses and is a multiple of its own is one contact with it, to which the energy passes.
+    pub(in crate::corrector) fn withholds(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let speed = (T::of(2.0) * s * energy).sqrt();
         let Some(noise) = self.parts_by_rounding(row, speed)? else { return Ok(false) };
-        let struck = s * self.buffers.struck[row].abs() > T::of(0.1 * self.h) * speed;
-        Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
-    }
-
-    /// Passes on what an impact took from a contact that has opened by rounding to a row that presses and is a multiple
-    /// of its own, if there is one: which of both presses is the solver's choice, and both are one contact.
-    pub(in crate::corrector) fn passes_on(&mut self, row: usize) -> Result<bool> {
-        let energy = self.contacts.dissipated[row];
-        let speed = (T::of(2.0) * self.compliance(row)? * energy).sqrt();
-        let opens = self.parts_by_rounding(row, speed)?.is_some();
         let mut pressed = self.buffers.closed.iter().copied().filter(|&other| self.is_pressed(other));
-        let held = if opens { pressed.find(|&other| self.g.are_multiples(row, other)) } else { None };
-        if let Some(other) = held {
+        if let Some(other) = pressed.find(|&other| self.g.are_multiples(row, other)) {
             self.contacts.dissipated[row] = T::zero();
             self.contacts.dissipated[other] += energy;
+            return Ok(true);
         }
-        Ok(held.is_some())
+        let struck = s * self.buffers.struck[row].abs() > T::of(0.1 * self.h) * speed;
+        Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
     }
 
     /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
