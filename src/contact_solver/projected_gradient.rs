@@ -106,24 +106,27 @@ impl<T: Real> Memory<T> {
         evaluate(problem, multipliers, &mut self.gaps);
     }
 
-    /// Whether W bends no more than L along the step: then the step cannot overshoot. (Products of small differences
-    /// may be below the numbers of `f32`.)
+    /// Whether W bends no more than L along the step: then the step cannot overshoot. (Products of two small
+    /// differences may be below all numbers: one of them is taken as a share of the largest.)
     fn is_bounded(&self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &[T]) -> bool {
+        let difference = |i: usize| (multipliers[i] - self.ahead[i]).value();
+        let largest = (0..multipliers.len()).fold(0.0_f64, |most, i| most.max(difference(i).abs()));
         let mut sums = (0.0, 0.0);
-        for (i, (&new, &ahead)) in multipliers.iter().zip(&self.ahead).enumerate() {
-            let difference = (new - ahead).value();
-            sums.0 += difference * (self.gaps[i] - self.ahead_gaps[i]).value();
-            sums.1 += difference * difference * problem.delassus(i, i).value();
+        for i in (0..multipliers.len()).filter(|_| largest > 0.0) {
+            let share = difference(i) / largest;
+            sums.0 += share * (self.gaps[i] - self.ahead_gaps[i]).value();
+            sums.1 += share * difference(i) * problem.delassus(i, i).value();
         }
         sums.0 <= lipschitz.value() * sums.1
     }
 
     /// Whether the momentum points uphill.
     fn is_uphill(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
-        let product = |(i, &new): (usize, &T)| {
-            problem.delassus(i, i).value() * ((self.ahead[i] - new).value() * (new - self.old[i]).value())
-        };
-        multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
+        let way = |i: usize| (multipliers[i] - self.old[i]).value();
+        let largest = (0..multipliers.len()).fold(0.0_f64, |most, i| most.max(way(i).abs()));
+        let product =
+            |i: usize| problem.delassus(i, i).value() * ((self.ahead[i] - multipliers[i]).value() * (way(i) / largest));
+        largest > 0.0 && (0..multipliers.len()).map(product).sum::<f64>() > 0.0
     }
 
     /// Goes on from the iterate, with this share of the last step as momentum.
