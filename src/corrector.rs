@@ -99,6 +99,16 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none")
     }
 
+    /// Whether it can act on contacts under [`ContactLaw::PersistencySwitch`](crate::contact::ContactLaw), which hold
+    /// the rate of a gap once that is closed, or why not; asked once, at build. Default: it can.
+    ///
+    /// # Errors
+    ///
+    /// The reason, as from [`check`](Self::check).
+    fn check_switch(&self) -> std::result::Result<(), &'static str> {
+        Ok(())
+    }
+
     /// Whether it takes the forces of closed contacts out of the accelerations, and leaves those of the smooth motion.
     /// Those of the start are without them then, and friction holds the way made in a stage, not its velocity, which
     /// the correction changes. Default: the forces stay.
@@ -163,6 +173,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn check_friction(&self) -> std::result::Result<(), &'static str> {
         (**self).check_friction()
+    }
+    fn check_switch(&self) -> std::result::Result<(), &'static str> {
+        (**self).check_switch()
     }
     fn leaves_smooth_motion(&self) -> bool {
         (**self).leaves_smooth_motion()

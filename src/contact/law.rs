@@ -80,7 +80,8 @@ pub enum ContactLaw {
     ///   it. The second one leaves a gap that is not mended while contact lasts, up to half a step's approach where the
     ///   change of u is the mean of v (so a run may start inside). Accelerations are free to alternate: by the
     ///   trapezoidal rule forces do, and energy may rise. Rows of curved surfaces that are not followed drift as
-    ///   under `RateCondition`.
+    ///   under `RateCondition`. With [`LaursenLove`](crate::corrector::LaursenLove), by which contacts rebound, it is
+    ///   refused.
     PersistencySwitch,
     /// λ = k ⟨−g⟩: a linear spring in compression.
     Penalty {

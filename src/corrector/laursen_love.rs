@@ -16,7 +16,8 @@ use crate::tableau::Tableau;
 /// with the root that separates. For schemes whose balance holds in the middle of the step, where λ (g' − g) is what
 /// contact does: with the midpoint rule, `Gssss::new(1.0, 1.0, 1.0)`, and with
 /// [`EnergyMomentum`](crate::EnergyMomentum) every step ends with the energy it began with, whatever the mesh and the
-/// step. Linear momentum is conserved.
+/// step. Linear momentum is conserved. Contacts under [`PersistencySwitch`](crate::contact::ContactLaw) are refused:
+/// the law holds the rate of a gap while that rebounds, and energy would grow without bound.
 ///
 /// Known failure: the contact nodes rebound elastically, one element deep, so that contact is lost and found again
 /// while the bodies stay together: forces come as a train of pulses, and the velocity of contact nodes is wrong by its
@@ -41,6 +42,13 @@ impl<T: Real> Corrector<T> for LaursenLove {
             true => Ok(()),
             false => Err("it needs a scheme whose balance, with the force of contact, holds in the middle of the step"),
         }
+    }
+
+    fn check_switch(&self) -> std::result::Result<(), &'static str> {
+        // (A rate held at the end of a step that begins with a rebound: the force acts on the gap that opens, and there
+        // is no velocity left that could give this work back.)
+        Err("contacts rebound by it, and this law holds their rate while they leave: energy would grow without bound; \
+             choose `ContactLaw::Rigid`, or `PersistencyCorrection`")
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

@@ -21,6 +21,8 @@ pub(crate) struct Admitted {
     /// Why laws that read the gap at the start of a stage are refused, if they are, and why the persistency switch is.
     pub(crate) no_start: Option<&'static str>,
     pub(crate) no_switch: Option<&'static str>,
+    /// The correction that cannot act on the persistency switch, and why not.
+    pub(crate) uncorrected_switch: Option<(String, &'static str)>,
     /// Why friction is refused, if it is.
     pub(crate) no_friction: Option<&'static str>,
     /// The contact solver, if there are sets that it does not take, and these.
@@ -37,11 +39,15 @@ impl Admitted {
                 reason: "the contact solver does not take what this law asks of its multipliers; choose `ActiveSet`",
             });
         }
+        let switches = law.measure(true) == Measure::Rate;
+        if let Some((corrector, reason)) = self.uncorrected_switch.as_ref().filter(|_| switches) {
+            return Err(Error::Incompatible { part: format!("{law:?} with {corrector}"), reason });
+        }
         let reasons = [
             self.no_rigid.filter(|_| law.needs_multiplier()),
             self.no_restitution.filter(|_| law.rebounds()),
             self.no_start.filter(|_| law.reads_start()),
-            self.no_switch.filter(|_| law.measure(true) == Measure::Rate),
+            self.no_switch.filter(|_| switches),
             self.no_prediction.filter(|_| law.is_predictive()),
         ];
         match reasons.into_iter().flatten().next() {
@@ -98,6 +104,8 @@ pub(super) fn admitted<T: Real>(
     let solver = if no_sets.is_empty() { String::new() } else { format!("{solver:?}") };
     let mut admitted = Admitted { integrator: integrator.name(), solver, no_sets, ..Admitted::default() };
     admitted.no_friction = correctors.iter().find_map(|corrector| corrector.check_friction().err());
+    admitted.uncorrected_switch =
+        correctors.iter().find_map(|corrector| corrector.check_switch().err().map(|reason| (corrector.name(), reason)));
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
         admitted.no_prediction = Some(

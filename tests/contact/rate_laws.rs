@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 use contact_dynamics::contact::{ContactLaw, GapOffset, Side, Sphere};
+use contact_dynamics::corrector::LaursenLove;
 use contact_dynamics::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
     Bathe, Bdf2, Composite, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
@@ -629,4 +630,20 @@ fn schemes_take_the_laws_they_can_serve() {
     assert!(build(Box::new(late.clone()), ContactLaw::Penalty { stiffness: 1.0 }).is_ok());
     let refused = build(Box::new(late), ContactLaw::Rigid).unwrap_err();
     assert!(refused.to_string().contains("cannot stop an approach"), "{refused}");
+}
+
+/// What rebounds is not held at rest: the work of the force that does is not given back.
+#[test]
+fn what_rebounds_by_laursen_and_love_is_not_switched() {
+    let build = |law| {
+        let rows = LinearRows::new().row(law, &[(0, 1.0)], 0.1);
+        let run = Simulation::builder(chain(&[1.0], 0.0), midpoint(), 0.01).constraint(rows).corrector(LaursenLove);
+        run.build().map(|_| ())
+    };
+    let refused = build(ContactLaw::PersistencySwitch).unwrap_err();
+    assert!(matches!(refused, Error::Incompatible { .. }), "{refused}");
+    assert!(refused.to_string().contains("PersistencySwitch with Laursen–Love"), "{refused}");
+    for law in [ContactLaw::Rigid, ContactLaw::RateCondition, ContactLaw::Penalty { stiffness: 1.0 }] {
+        build(law).unwrap();
+    }
 }

@@ -261,6 +261,10 @@ impl Corrector<f64> for Remedy {
         self.0.note("check_friction");
         Ok(())
     }
+    fn check_switch(&self) -> std::result::Result<(), &'static str> {
+        self.0.note("check_switch");
+        Ok(())
+    }
     fn leaves_smooth_motion(&self) -> bool {
         self.0.note("leaves_smooth_motion");
         true
