@@ -20,6 +20,7 @@ pub use order::{Order, order};
 pub use overshoot::{Overshoot, overshoot, overshoot_growth};
 pub use period::period_elongation;
 pub use report::{Report, report};
+pub(crate) use stability::critical_step;
 pub use stability::{ZeroStability, critical_omega, radius_at_infinity, zero_stability};
 
 use crate::tableau::Tableau;
@@ -46,7 +47,12 @@ fn matrix(rows: &[Vec<f64>]) -> Mat<f64> {
 ///
 /// For Ω > 1 the matrix is scaled to (U, V/Ω, A/Ω²) first: eigenvalues stay, rounding does not grow with Ω.
 pub fn eigenvalues(tableau: &Tableau, omega: f64, xi: f64) -> Vec<c64> {
-    let a = amplification(tableau, omega, xi);
+    roots(tableau, omega, 2.0 * xi * omega)
+}
+
+/// Eigenvalues at Ω and Δ = c h, which for a mode without stiffness is not 2 ξ Ω.
+fn roots(tableau: &Tableau, omega: f64, delta: f64) -> Vec<c64> {
+    let a = matrix(&tableau.step_map([omega * omega, delta, 1.0]));
     let scale = |i: usize| match i % 3 {
         0 => 1.0,
         1 => omega.max(1.0),
@@ -59,7 +65,11 @@ pub fn eigenvalues(tableau: &Tableau, omega: f64, xi: f64) -> Vec<c64> {
 
 /// Spectral radius at Ω and damping ratio ξ; NaN if the tableau is not finite there.
 pub fn spectral_radius(tableau: &Tableau, omega: f64, xi: f64) -> f64 {
-    moduli(&eigenvalues(tableau, omega, xi)).fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
+    largest_modulus(&eigenvalues(tableau, omega, xi))
+}
+
+fn largest_modulus(roots: &[c64]) -> f64 {
+    moduli(roots).fold(0.0, |largest, x| if x.is_nan() || x > largest { x } else { largest })
 }
 
 fn moduli(roots: &[c64]) -> impl Iterator<Item = f64> + '_ {

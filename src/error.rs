@@ -207,9 +207,9 @@ pub enum Error {
     },
     /// A step beyond the stability limit of the scheme.
     #[error(
-        "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system is \
-         {frequency:e} (1/time) or more, for which h may be {largest:e}; take smaller steps or an implicit scheme \
-         (`SimulationBuilder::unchecked_stability` takes the step as it is)"
+        "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system, or the rate of \
+         its strongest damping, is {frequency:e} (1/time) or more, for which h may be {largest:e}; take smaller steps \
+         or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)"
     )]
     BeyondStability {
         /// Name of the integrator.
@@ -218,7 +218,8 @@ pub enum Error {
         h: f64,
         /// The largest step size that is stable.
         largest: f64,
-        /// The highest circular frequency of M⁻¹ K that was found.
+        /// The highest circular frequency of M⁻¹ K that was found; or the highest rate of M⁻¹ C, if that is more and
+        /// the scheme takes damping forces from before the step.
         frequency: f64,
     },
     /// A step has become too long: a compliant contact that presses, or a system that stiffens, has a frequency beyond

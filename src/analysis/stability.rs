@@ -1,6 +1,6 @@
 //! Stability: the limit of high frequencies, the critical frequency, and zero-stability.
 
-use super::{matrix, moduli, spectral_radius};
+use super::{largest_modulus, matrix, moduli, roots};
 use crate::tableau::Tableau;
 use faer::{Mat, c64};
 
@@ -61,8 +61,20 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
 /// assert_eq!(analysis::critical_omega(&Composite.tableau(), 0.0), None);
 /// ```
 pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
-    // Roots that are nearly double at 1 are known to eps/Ω, matrices of size Ω to eps Ω. NaN counts as unstable.
-    let is_stable = |omega: f64| spectral_radius(tableau, omega, xi) <= 1.0 + 1e-11 + 1e-13 * omega;
+    critical_along(tableau, 1.0, 2.0 * xi)
+}
+
+/// The longest stable step of the mode a + c v + ω² u = 0, which may have no stiffness; `None` as above.
+pub(crate) fn critical_step(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
+    let rate = omega.max(damping);
+    (rate > 0.0).then(|| critical_along(tableau, omega / rate, damping / rate)).flatten().map(|x| x / rate)
+}
+
+/// x up to which a step with Ω = x `omega` and Δ = x `damping` is stable, one of which is 1 at least.
+fn critical_along(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
+    // Roots that are nearly double at 1 are known to eps/x, matrices of size x to eps x. NaN counts as unstable.
+    let radius = |x: f64| largest_modulus(&roots(tableau, x * omega, x * damping));
+    let is_stable = |x: f64| radius(x) <= 1.0 + 1e-11 + 1e-13 * x;
     let at = |i: i32| 10_f64.powf(f64::from(i) / 80.0);
     let first = (-160..=320).find(|&i| !is_stable(at(i)))?;
     if first == -160 {

@@ -104,7 +104,7 @@ pub(super) fn check_step<T: Real>(
     h: f64,
 ) -> Result<StepLimit> {
     let tableau = &scheme.tableau;
-    let Some(mut critical) = critical(scheme) else {
+    let Some(critical) = critical(scheme) else {
         return Ok(StepLimit::Cleared(f64::INFINITY));
     };
     let allowance = allowance::<T>();
@@ -122,6 +122,7 @@ pub(super) fn check_step<T: Real>(
         };
     }
     let mut lanczos = Lanczos::new(system)?;
+    let mut even = None;
     let highest = if let Some(omega) = system.highest_frequency() {
         Highest { at_least: omega * omega, at_most: omega * omega }
     } else {
@@ -131,7 +132,7 @@ pub(super) fn check_step<T: Real>(
             if h <= largest * allowance && !lags {
                 return Ok(StepLimit::Cleared(h.max(largest)));
             }
-            lanczos.start = circles.rows;
+            even = Some(std::mem::replace(&mut lanczos.start, circles.rows));
         }
         if !stiffness.is_symmetric() {
             // Ritz values are no bounds then.
@@ -140,27 +141,33 @@ pub(super) fn check_step<T: Real>(
         let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
         lanczos.highest(system, enough, |system, x, y| stiffness.product(system, x, y))?
     };
-    if lags && highest.at_least > 0.0 {
+    let mut strongest = 0.0;
+    if lags {
         // The highest mode is taken to have the strongest damping of all modes: exact for Rayleigh damping, on the safe
-        // side otherwise.
+        // side otherwise. (Damping may act where no stiffness does.)
+        lanczos.start = even.unwrap_or(lanczos.start);
         let still = vec![T::zero(); system.dofs()];
         let damping = lanczos.highest(system, 0.0, |system, x, y| match system.damping_force() {
             Some(damping) => damping.evaluate(&still, x, y),
             None => Ok(()),
         })?;
-        let xi = 0.5 * damping.at_least / highest.at_least.sqrt();
-        critical = analysis::critical_omega(tableau, xi).map_or(critical, |damped| damped.min(critical));
+        strongest = damping.at_least;
     }
-    let step = |square: f64| if square > 0.0 { critical / square.sqrt() } else { f64::INFINITY };
-    if h > step(highest.at_least) * allowance {
+    let longest = |square: f64| {
+        let omega = square.sqrt();
+        let damped = if lags { analysis::critical_step(tableau, omega, strongest) } else { None };
+        let undamped = if omega > 0.0 { critical / omega } else { f64::INFINITY };
+        damped.map_or(undamped, |damped| damped.min(undamped))
+    };
+    if h > longest(highest.at_least) * allowance {
         return Err(Error::BeyondStability {
             integrator: scheme.integrator.name(),
             h,
-            largest: step(highest.at_most),
-            frequency: highest.at_least.sqrt(),
+            largest: longest(highest.at_most),
+            frequency: highest.at_least.sqrt().max(strongest),
         });
     }
-    Ok(StepLimit::Cleared(h.max(step(highest.at_most))))
+    Ok(StepLimit::Cleared(h.max(longest(highest.at_most))))
 }
 
 /// The highest frequency of bodies over ranks: what the host knows, or the bound by Gershgorin's circles, of which each

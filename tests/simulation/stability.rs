@@ -281,3 +281,28 @@ fn damping_that_lags_lowers_the_limit() {
         assert!(build(1.0).is_ok() && build(1.02).is_err());
     }
 }
+
+/// Free masses, and nearly free ones, that damping stops: c h has a limit too, whatever the stiffness.
+#[test]
+fn damping_has_a_limit_of_its_own() {
+    let scheme = NohBathe::new(0.54).unwrap();
+    // (With next to no stiffness.)
+    let radius = |delta: f64| analysis::spectral_radius(&scheme.tableau(), 1e-6, 0.5e6 * delta);
+    let limit = (1..100_000).map(|k| 1e-4 * f64::from(k)).find(|&delta| radius(delta) > 1.0 + 1e-9).unwrap();
+    for stiffness in [0.0, 1e-12, 1e-6] {
+        let build = |share: f64| {
+            let k = matrix(2, [(0, 0, stiffness), (1, 1, 0.0)]);
+            let system = LinearSystem::lumped(vec![2.0, 1.0], k).unwrap().rayleigh(0.5, 0.0).unwrap();
+            Simulation::builder(system, scheme, share * limit / 0.5).velocity(vec![1.0, -1.0]).build()
+        };
+        let mut run = build(0.99).unwrap();
+        for _ in 0..200 {
+            run.step().unwrap();
+        }
+        assert!(run.state().velocity().iter().all(|v: &f64| v.abs() <= 1.0), "{:?}", run.state().velocity());
+        let refused = build(1.01).unwrap_err();
+        assert!(
+            matches!(refused, Error::BeyondStability { largest, .. } if (largest * 0.5 / limit - 1.0).abs() < 1e-3)
+        );
+    }
+}
