@@ -174,13 +174,15 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             none if none == T::zero() => StoredDamping::None,
             _ => StoredDamping::Rayleigh { mass, stiffness },
         };
-        let consistent_mass = match &self.mass {
-            StoredMass::Consistent(m) if mass > T::zero() => Some(m.symbolic()),
-            _ => None,
-        };
-        let sources: Vec<_> = std::iter::once(self.stiffness.symbolic()).chain(consistent_mass).collect();
         self.union = match mass > T::zero() {
-            true => Some(Combination::new(self.dofs(), &[], &sources)?),
+            true => {
+                let consistent_mass = match &self.mass {
+                    StoredMass::Consistent(m) => Some(m.symbolic()),
+                    StoredMass::Lumped(_) => None,
+                };
+                let sources: Vec<_> = std::iter::once(self.stiffness.symbolic()).chain(consistent_mass).collect();
+                Some(Combination::new(self.dofs(), &[], &sources)?)
+            }
             false => None,
         };
         self.scratch = vec![T::zero(); self.dofs()];

@@ -486,6 +486,21 @@ fn found(contact: &mut Mortar<f64>, u: &[f64]) -> Vec<Found> {
     gaps.iter().enumerate().map(|(k, &gap)| (contacts.name(k), gap, row(k))).collect()
 }
 
+/// A search looks as far as the bodies move in the step, whichever of them does.
+#[test]
+fn a_search_looks_ahead() {
+    let stack = Stack::new(plates(3, 4), 0.5, |x| x);
+    for (moves, (ahead, rows)) in [0, 1].into_iter().flat_map(|moves| [(0.1, 0), (0.3, 5)].map(|case| (moves, case))) {
+        let mut contact = stack.mortar(true).unwrap().reach(0.3).unwrap();
+        let dofs = contact.dofs().to_vec();
+        let toward = [1.0, -1.0][moves];
+        let is_moving = |dof: usize| dof % 2 == 1 && usize::from(dof >= 2 * stack.split) == moves;
+        let velocity: Vec<f64> = dofs.iter().map(|&dof| if is_moving(dof) { toward } else { 0.0 }).collect();
+        contact.search(0.0, &vec![0.0; dofs.len()], &velocity, ahead).unwrap();
+        assert_eq!(Contacts::of(&contact).len(), rows, "body {moves}, {ahead}");
+    }
+}
+
 /// Surfaces are outside of their facets by offsets, and are found as far apart as the reach.
 #[test]
 fn the_reach_is_that_of_surfaces_with_thickness() {

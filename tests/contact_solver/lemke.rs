@@ -171,6 +171,14 @@ fn contradictions_are_proven() {
     let failed = solve(&mut Lemke::<f64>::default(), (&w, &[-1.0, 0.5, -1.0, 2.0], &sets));
     let Err(ContactFailure::Contradictory { row, other, residual }) = failed else { panic!("{failed:?}") };
     assert!(row + other == 1 && row != other && (residual - 0.25).abs() < 1e-15, "{failed:?}");
+    // Of directions whose products are rounded, in any unit of compliance.
+    for scale in [1e-9, 1.0, 1e9] {
+        let rows = [1.0, -0.3, 0.7];
+        let w: Vec<f64> = rows.iter().flat_map(|x| rows.map(|y| scale * x * y)).collect();
+        let failed = solve(&mut Lemke::<f64>::default(), (&w, &[-1.0, 0.2, 1.0], &[AdmissibleSet::NonNegative; 3]));
+        let Err(ContactFailure::Contradictory { row, other, .. }) = failed else { panic!("{scale:e}: {failed:?}") };
+        assert_eq!([row.min(other), row.max(other)], [0, 1], "{scale:e}");
+    }
     // With room between them there is none.
     assert!(solve(&mut Lemke::default(), (&w, &[-1.0, 1.5, -1.0, 2.0], &sets)).is_ok());
 }

@@ -79,6 +79,8 @@ fn contact_dofs_loads_and_settings() {
         assert_refused!(reduce(&[0]).softening(softening).modes(3), Error::Parameter { .. });
     }
     assert_refused!(reduce(&[0]).damping_ratio(|_| -0.1).modes(3), Error::Parameter { value: -0.1, .. });
+    // (Of rigid motions it is not asked.)
+    assert!(reduce(&[0]).damping_ratio(|omega| 0.1 / omega).modes(3).is_ok());
     assert_refused!(reduce(&[0]).rayleigh(0.0, f64::NAN).modes(3), Error::Parameter { .. });
     // All modes leave nothing between them and the contact dofs, and one that is left does not do for two of these.
     for boundary in [Boundary::Tapered, Boundary::Untapered] {

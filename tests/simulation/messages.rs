@@ -101,8 +101,8 @@ fn inverted_facets_are_named() {
         assert!(error.to_string().contains("inverted") && error.to_string().contains("turn it"), "{error}");
         let Error::InvertedFacet { facet, nodes, .. } = error else { panic!("{error}") };
         assert_eq!((facet, &nodes[..]), (turned, &facets[turned][..]));
-        // Without area, and folded.
-        for (wrong, words) in [([0, 2, 4, 2], "area"), ([0, 3, 2, 1], "both sides")] {
+        // Without area, without at a corner, and folded.
+        for (wrong, words) in [([0, 2, 4, 2], "area"), ([0, 2, 4, 5], "straight"), ([0, 3, 2, 1], "both sides")] {
             let mut facets: Vec<_> = (0..3).map(quad).collect();
             facets[0] = wrong;
             let error = build(facets).unwrap_err();

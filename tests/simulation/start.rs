@@ -1,6 +1,6 @@
 //! Starts: dofs without mass that are not in static balance, and bodies that overlap.
 
-use contact_dynamics::contact::Plane;
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, Plane};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Park,
@@ -347,5 +347,37 @@ fn a_rigid_motion_of_a_stiff_body_begins_with_its_past() {
                 .unwrap();
             assert_eq!(run.history().len(), known, "case {case}: stiffness {stiffness:e}, load {load}");
         }
+    }
+}
+
+/// A node that is deep in two facets beside each other: the overlap is that with the deeper one, for both.
+#[derive(Debug)]
+struct InDent([f64; 2]);
+
+impl ContactConstraint<f64> for InDent {
+    fn dofs(&self) -> &[usize] {
+        &[0]
+    }
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        for facet in 0..2 {
+            contacts.push((4, facet), ContactLaw::Rigid, &[(0, 1.0)]);
+        }
+    }
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<(), Error> {
+        gaps.copy_from_slice(&self.0.map(|depth| u[0] - depth));
+        Ok(())
+    }
+}
+
+#[test]
+fn of_several_overlaps_of_a_node_the_deepest_counts() {
+    for depths in [[1e-3, 2e-3], [2e-3, 1e-3], [1.5e-3, 1.5e-3]] {
+        let mut run = Simulation::builder(pendulum(), Newmark::trapezoidal(), 0.01)
+            .constraint(InDent(depths))
+            .initial_overclosure(InitialOverclosure::AdjustedGaps)
+            .build()
+            .unwrap();
+        run.run_until(0.2, &mut ()).unwrap();
+        assert_eq!(run.state().displacement(), [0.0], "{depths:?}");
     }
 }

@@ -1,5 +1,6 @@
 //! Changes of the step size, restarts and start-up.
 
+use contact_dynamics::contact::GapOffset;
 use contact_dynamics::observer::ContactRecorder;
 use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::{
@@ -281,10 +282,11 @@ fn a_past_made_anew_after_an_impact_has_no_kink() {
     let h = 1e-2;
     let mut made = 0;
     for listed in correctable() {
-        // The past as the scheme reads it, and the one that is kept since the step has changed.
-        for (law, earlier) in [ContactLaw::RateCondition, ContactLaw::PersistencySwitch]
+        // The past as the scheme reads it, and the one that is kept since the step has changed; right after the impact,
+        // and a step later, when the mass rests.
+        for (law, (earlier, later)) in [ContactLaw::RateCondition, ContactLaw::PersistencySwitch]
             .into_iter()
-            .flat_map(|law| [h, 0.7 * h].map(|earlier| (law, earlier)))
+            .flat_map(|law| [(h, 0), (h, 1), (0.7 * h, 0), (0.7 * h, 1)].map(|case| (law, case)))
         {
             let system = LinearSystem::lumped(vec![2.0], matrix(1, [(0, 0, 0.0)])).unwrap().load(|_, f| f[0] = -3.0);
             let mut run = Simulation::builder(system, (listed.make)(), h)
@@ -300,6 +302,9 @@ fn a_past_made_anew_after_an_impact_has_no_kink() {
             while !run.state().contacts().closed()[0] {
                 run.step().unwrap();
             }
+            for _ in 0..later {
+                run.step().unwrap();
+            }
             let changed = 0.4 * h;
             run.set_step_size(changed).unwrap();
             let [v, a] = [run.state().stored_velocity()[0], run.state().stored_acceleration()[0]];
@@ -312,10 +317,39 @@ fn a_past_made_anew_after_an_impact_has_no_kink() {
                 miss[1] = miss[1].max((past.1[0] - expected[1]).abs());
                 made += 1;
             }
-            assert!(miss[0].min(miss[1]) < 1e-10, "{}, {law:?}, {earlier}: {miss:?}", listed.name());
+            assert!(miss[0].min(miss[1]) < 1e-10, "{}, {law:?}, {earlier}, {later}: {miss:?}", listed.name());
         }
     }
     assert!(made > 20, "{made}");
+}
+
+/// A past that is made anew lies on an obstacle that moves as it did then.
+#[test]
+fn a_past_made_anew_follows_its_obstacle() {
+    let h = 1e-2;
+    for listed in correctable() {
+        let wall = |t: f64| [0.05 + 0.5 * t * t, t, 1.0];
+        let system = LinearSystem::lumped(vec![2.0], matrix(1, [(0, 0, 0.0)])).unwrap();
+        let gap = GapOffset::moving(move |t| wall(t).map(|x| -x));
+        let mut run = Simulation::builder(system, (listed.make)(), h)
+            .start_time(1.0)
+            .displacement(vec![wall(1.0)[0] + 0.0313])
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0)], gap))
+            .corrector(PersistencyCorrection::new())
+            .build()
+            .unwrap();
+        while !run.state().contacts().closed()[0] {
+            run.step().unwrap();
+        }
+        let (changed, t) = (0.4 * h, run.time());
+        run.set_step_size(changed).unwrap();
+        for k in 1..=run.history().len() {
+            let (u, v, a) = run.history().past(k).unwrap();
+            let there = wall(t - k as f64 * changed);
+            let miss = [u[0] - there[0], v[0] - there[1], a[0] - there[2]];
+            assert!(miss.iter().all(|x| x.abs() < 1e-12), "{}, {k}: {miss:?}", listed.name());
+        }
+    }
 }
 
 /// Free flight is the same with any steps, and so is the momentum of a free body that vibrates.

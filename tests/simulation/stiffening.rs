@@ -231,6 +231,29 @@ impl System<f64> for Hardening {
     }
 }
 
+/// A mass on a spring, pressed to a wall: neither spring is beyond the limit, but both are, as is found by what grows.
+#[test]
+fn systems_that_may_stiffen_are_judged_with_the_contacts_that_press() {
+    for (beyond, h) in [0.99_f64, 1.02].into_iter().flat_map(|beyond| [1e-3, 0.1, 10.0].map(|h| (beyond, h))) {
+        let k = 0.5 * (2.0 * beyond / h).powi(2);
+        let wall = LinearRows::new().row(ContactLaw::Penalty { stiffness: k }, &[(0, 1.0)], -20.0);
+        let mut run = Simulation::builder(Hardening::new(1, k, 0.0), CentralDifference, h)
+            .displacement(vec![10.0])
+            .velocity(vec![1e-3 / h])
+            .constraint(wall)
+            .build()
+            .unwrap();
+        let outcome = run.run_until(600.0 * h, &mut ());
+        match outcome {
+            Ok(_) => assert!(beyond < 1.0 && (run.state().displacement()[0] - 10.0).abs() < 0.1, "{h}"),
+            Err(Error::Stiffened { .. }) => {
+                assert!(beyond > 1.0 && (run.state().displacement()[0] - 10.0).abs() < 5.0, "{h}");
+            }
+            Err(error) => panic!("{beyond} {h}: {error}"),
+        }
+    }
+}
+
 /// u″ = −u³ with amplitude A thrown from u = 0, where it has no stiffness: hA from resolved motions to absurd ones.
 /// What is not refused keeps its energy, and what is resolved is not refused.
 #[test]

@@ -4,8 +4,8 @@ use approx::assert_relative_eq;
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::observer::{Control, StepView};
 use contact_dynamics::{
-    CdLagrange, Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation,
-    TimeIntegrator,
+    CdLagrange, Composite, Error, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
+    Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::sparse::{element, matrix};
 
@@ -276,6 +276,19 @@ fn a_driven_dof_is_a_moving_obstacle() {
                 assert!((x - y).abs() < 1e-6 * (1.0 + y.abs()), "{}, {kind:?}, step {step}: {x} {y}", scheme().name());
             }
             assert!(as_gap.statistics().contact_solves > 5, "the impact is part of the run");
+        }
+    }
+}
+
+/// A motion that is no number is refused at the start, whichever part of it is none.
+#[test]
+fn supports_that_start_nowhere_are_refused() {
+    for part in 0..3 {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let motion = move |_: f64| std::array::from_fn(|i| if i == part { bad } else { 0.0 });
+            let system = bar(2, 10.0, 1.0, Kind::Lumped).drive(1, motion).unwrap();
+            let refused = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build().unwrap_err();
+            assert!(matches!(refused, Error::SupportNotFinite { t: 0.0, dof: 1, .. }), "{part}: {refused}");
         }
     }
 }

@@ -51,7 +51,7 @@ impl Surface {
             }
             if !facet.shape(coordinates).is_regular() {
                 let reason = match facet.shape(coordinates).is_degenerate() {
-                    true => "it has no length or area",
+                    true => "it has no length or area, or a corner that is straight",
                     false => "its normals point to both sides; give its nodes in the order around it",
                 };
                 return Err(Error::InvertedFacet { facet: index, nodes: nodes.to_vec(), reason });

@@ -295,7 +295,7 @@ impl Shape {
         unit(mean).is_some_and(|mean| (0..self.count).all(|k| dot(mean, corner(k)) > SMALL * size * size))
     }
 
-    /// Whether it has no length or area.
+    /// Whether it has no length or area, or none at one of its corners.
     pub(crate) fn is_degenerate(&self) -> bool {
         const SMALL: f64 = 1e-10;
         let size = self.size();

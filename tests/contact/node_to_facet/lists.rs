@@ -220,6 +220,21 @@ fn facing_keeps_nodes_from_the_far_side_of_a_thin_body() {
     assert!(gaps(&mut short, &u).is_empty());
 }
 
+/// Said of two passes, it leaves the first one.
+#[test]
+fn facing_makes_one_pass() {
+    let mut mesh = Mesh::<2>::default();
+    mesh.nodes([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]);
+    mesh.facets.extend((0..3).map(|k| Facet::from([k + 1, k])));
+    let above = mesh.nodes([[0.5, 0.1], [2.5, 0.1]]);
+    let own = || [Facet::from([above[0], above[1]])];
+    let u = vec![0.0; mesh.size()];
+    assert_eq!(gaps(&mut mesh.both(own(), 0.5), &u).len(), 4);
+    let mut one = mesh.both(own(), 0.5).facing(own()).unwrap();
+    let rows = gaps(&mut one, &u);
+    assert!(rows.len() == 2 && rows.iter().all(|row| (row.1 - 0.1).abs() < 1e-15), "{rows:?}");
+}
+
 #[test]
 fn the_parts_of_the_interface() {
     let mut mesh = grid(2, Cells::Quadrilaterals, |_, _| 0.0);

@@ -187,6 +187,10 @@ impl Recipe {
         self.mass.len()
     }
 
+    pub(super) fn has_mass(&self) -> bool {
+        self.mass.iter().any(|&m| m > 0.0) || self.elements.iter().any(|element| element.shared_mass > 0.0)
+    }
+
     /// What it is made of, in a line.
     #[must_use]
     pub fn summary(&self) -> String {

@@ -45,7 +45,8 @@ impl<'a> Watch<'a> {
         };
         let mut watch = Self {
             recipe,
-            explicit_on_springs: listed.critical.is_some() && recipe.rows.iter().all(is_spring),
+            // (Nor does anything move without mass: its energy is rounding.)
+            explicit_on_springs: listed.critical.is_some() && recipe.rows.iter().all(is_spring) && recipe.has_mass(),
             on_positions: listed.takes_corrections(),
             is_free,
             conserves: rests && recipe.load.constant.is_empty(),
