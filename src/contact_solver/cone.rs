@@ -111,8 +111,10 @@ fn slip_direction<T: Real>(
     }
     let (mut low, mut high) = (T::zero(), T::infinity());
     // The slip S g + c of the guess g is −γ g for the solution.
-    let along = |k: usize| guess[k] * (schur[k][0] * guess[0] + schur[k][1] * guess[1] + c[k]);
-    let gamma = -(along(0) + along(1)) / (guess[0] * guess[0] + guess[1] * guess[1]);
+    let length = norm(guess);
+    let guess = guess.map(|f| f / length);
+    let along = |k: usize| guess[k] * (schur[k][0] * guess[0] + schur[k][1] * guess[1] + c[k] / length);
+    let gamma = -(along(0) + along(1));
     let mut gamma = if gamma > T::zero() && gamma.is_finite() { gamma } else { T::zero() };
     let mut f = solve_two(schur, gamma, c);
     for _ in 0..STEPS {
@@ -123,11 +125,10 @@ fn slip_direction<T: Real>(
         } else {
             low = gamma;
         }
-        // d f/d γ = −(S + γ)⁻¹ f.
-        let slope = solve_two(schur, gamma, f);
-        let length_slope = (f[0] * slope[0] + f[1] * slope[1]) / length;
-        let radius_slope = change(slope);
-        let step = (length - radius) * length / (radius_slope * length - radius * length_slope);
+        // d f/d γ = −(S + γ)⁻¹ f. (As shares of |f|: where S is nearly singular |f|² may be beyond all numbers of `f32`.)
+        let (share, unit) = (radius / length, f.map(|f| f / length));
+        let slope = solve_two(schur, gamma, unit);
+        let step = (T::one() - share) / (change(slope) - share * (unit[0] * slope[0] + unit[1] * slope[1]));
         let next = gamma + step;
         // (NaN is in no interval.)
         let next = if next >= low && next <= high && next.is_finite() {
