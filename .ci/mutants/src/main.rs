@@ -149,11 +149,19 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn new(options: &Options, rooms: &'static [Room], source: &Path, folder: &str) -> Result<Self, String> {
+    /// `folder` keeps what is found, `place` the copy of the package.
+    fn new(
+        options: &Options,
+        rooms: &'static [Room],
+        source: &Path,
+        [folder, place]: [&str; 2],
+    ) -> Result<Self, String> {
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
         let target = std::path::absolute(target).map_err(|error| error.to_string())?;
         let state = target.join("mutants").join(folder);
-        let package = Package::copy(source, &state.join("package"), &target)?;
+        // (One place for all seeds: cargo tells packages by their names and places below, and took the binaries of
+        // another seed for its own.)
+        let package = Package::copy(source, &target.join("mutants").join(place), &target)?;
         let draw = Draw::new(rooms, &package.texts, options.seed, options.count, &state)?;
         Ok(Self { package, draw, state })
     }
@@ -266,7 +274,7 @@ impl Run {
 /// The sample package, all of whose mutants end as `expected.txt` has it.
 fn quick(options: Options) -> Result<(), String> {
     let (source, options) = (Path::new(".ci/mutants/sample"), Options { count: usize::MAX, ..options });
-    let drawn = Drawn::new(&options, &SAMPLE, source, "sample")?;
+    let drawn = Drawn::new(&options, &SAMPLE, source, ["sample", "sample/package"])?;
     let mut run = Run::new(options, &SAMPLE, drawn)?;
     // (Nothing of earlier runs.)
     run.ends.known = Mutex::default();
@@ -295,7 +303,7 @@ fn run() -> Result<(), String> {
     if options.quick {
         return quick(options);
     }
-    let drawn = Drawn::new(&options, &ROOMS, Path::new("."), &format!("seed-{}", options.seed))?;
+    let drawn = Drawn::new(&options, &ROOMS, Path::new("."), [&format!("seed-{}", options.seed), "package"])?;
     if options.list {
         for (at, mutant) in drawn.draw.drawn().into_iter().enumerate() {
             println!("{} {}:{} {}", at + 1, mutant.path, mutant.line, mutant.key);
