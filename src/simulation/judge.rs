@@ -139,19 +139,19 @@ impl<T: Real> Judge<T> {
         }
     }
 
-    /// Judges a step that ends with u and v, after contacts have closed or opened: how many of them make the motion
-    /// jump, and how many there are.
+    /// Judges a step that ends with u and v, after contacts have closed or opened: whether the motion jumps with
+    /// them, and how many there are.
     pub(super) fn judge(
         &mut self,
         together: &Together<T>,
         [u, v]: [&[T]; 2],
         prescribed: &[usize],
         h: f64,
-        [jumps, changes]: [usize; 2],
+        (jumps, changes): (bool, usize),
     ) -> Result<Verdict> {
         self.excess = 0.0;
         if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
-            let factor = if jumps > 0 { 1.0 } else { local.factor };
+            let factor = if jumps { 1.0 } else { local.factor };
             // (The largest of numbers leaves NaN out.)
             let distance = self.distance([u, v], prescribed, h);
             let distance = if distance.is_nan() { f64::INFINITY } else { distance };

@@ -17,20 +17,20 @@ fn exerts<T: Real>(contacts: &ContactState<T>, row: usize) -> bool {
     contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()
 }
 
-/// How many of the contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion
-/// jump.
+/// Whether contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion jump.
 ///
 /// Bodies that touch without force come apart, and together, by the sign of the last bit, and so do rows whose force
 /// others hold. Nothing of the motion may follow from that. A contact counts that exerts a force, or has exerted one at
 /// the start of the step or within it, and along whose row the velocity has changed in the step, or h times the
-/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step.
+/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step. Rows that are multiples
+/// of each other are one contact: which of them has its force is the solver's choice.
 pub(super) fn jumps<T: Real>(
     constraints: &Constraints<'_, T>,
     g: &ContactJacobian<T>,
     [start, new]: [&Motion<T>; 2],
     h: f64,
     contact: &ContactWork<T>,
-) -> usize {
+) -> bool {
     let ContactWork { trial, closed_at_start, exerting_at_start, .. } = contact;
     let flags = trial.closed.iter().zip(closed_at_start).enumerate();
     let changed = flags.filter(|(_, (now, before))| now != before).map(|(row, _)| row);
@@ -52,5 +52,11 @@ pub(super) fn jumps<T: Real>(
         let stays = of_v.0.max(h * of_a.0) <= least;
         !stays
     };
-    changed.filter(makes_jump).count()
+    // (All rows are looked at for those alone that seem to jump, up to the first that does.)
+    let held = |row: usize, holds: &dyn Fn(usize) -> bool| {
+        holds(row) || (0..trial.closed.len()).any(|other| holds(other) && g.are_multiples(row, other))
+    };
+    let before = |row: usize| closed_at_start[row] && exerting_at_start[row];
+    let now = |row: usize| trial.closed[row] && exerts(trial, row);
+    changed.filter(makes_jump).any(|row| !(held(row, &before) && held(row, &now)))
 }

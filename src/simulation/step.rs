@@ -123,9 +123,10 @@ impl<T: Real> Simulation<'_, T> {
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
         // (What a bond has let go at the end of the last step is open in this one.)
         let broken = state.broken_at(past[stages - 1].t).len();
-        let jumps = broken.max(jumps(constraints, g, [work.backup.start(past), new], history.clock.h, &work.contact));
+        let ends = [work.backup.start(past), new];
+        let jumps = broken > 0 || jumps(constraints, g, ends, history.clock.h, &work.contact);
         let changes = changes.max(broken);
-        let from = (jumps == 0).then(|| &past[stages - 1]);
+        let from = (!jumps).then(|| &past[stages - 1]);
         let finite = scheme.show(new, from, &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
         // Recovery has checked what it wrote. Still to be checked are dofs whose velocity is differenced, and what
@@ -151,7 +152,7 @@ impl<T: Real> Simulation<'_, T> {
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         if let Some(judge) = judge {
             let (prescribed, h) = (&work.vectors.supports.dofs[..], history.clock.h);
-            let verdict = judge.judge(together, [motion[0], motion[1]], prescribed, h, [jumps, changes])?;
+            let verdict = judge.judge(together, [motion[0], motion[1]], prescribed, h, (jumps, changes))?;
             if verdict == Verdict::Coarse {
                 return Ok(verdict);
             }
@@ -178,7 +179,7 @@ impl<T: Real> Simulation<'_, T> {
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;
         history.known = (history.known + 1).min(depth);
-        history.smooth = if jumps > 0 { 1 } else { history.smooth + 1 };
+        history.smooth = if jumps { 1 } else { history.smooth + 1 };
         if !history.trail.is_empty() {
             history.trail.push(&history.slots[1], history.made_with);
             for (field, unmoved) in (1..).zip(&mut history.unmoved) {
