@@ -159,6 +159,7 @@ impl Drawn {
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
         let target = std::path::absolute(target).map_err(|error| error.to_string())?;
         let state = target.join("mutants").join(folder);
+        fs::create_dir_all(&state).map_err(|error| format!("{}: {error}", state.display()))?;
         // (One place for all seeds: cargo tells packages by their names and places below, and took the binaries of
         // another seed for its own.)
         let package = Package::copy(source, &target.join("mutants").join(place), &target)?;
