@@ -7,14 +7,28 @@ use crate::corrector::{Gaps, rounding, share_of_rounding};
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
 
-/// Which contacts exert a force, in place of what `exerting` said before.
-pub(super) fn note_exerting<T: Real>(contacts: &ContactState<T>, exerting: &mut Vec<bool>) {
+/// Which contacts exert a force where displacements are u, in place of what `exerting` said before.
+pub(super) fn note_exerting<T: Real>(
+    (constraints, g): (&Constraints<'_, T>, &ContactJacobian<T>),
+    contacts: &ContactState<T>,
+    u: &[T],
+    exerting: &mut Vec<bool>,
+) {
     exerting.clear();
-    exerting.extend((0..contacts.gap.len()).map(|row| exerts(contacts, row)));
+    exerting.extend((0..contacts.gap.len()).map(|row| exerts((constraints, g), contacts, u, row)));
 }
 
-fn exerts<T: Real>(contacts: &ContactState<T>, row: usize) -> bool {
-    contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()
+fn exerts<T: Real>(
+    (constraints, g): (&Constraints<'_, T>, &ContactJacobian<T>),
+    contacts: &ContactState<T>,
+    u: &[T],
+    row: usize,
+) -> bool {
+    let gap = contacts.gap[row];
+    // (The force of a spring that just touches is the rounding of its gap.)
+    let is_pressed =
+        || !constraints.law(row).is_spring() || -gap > constraints.gap_rounding(row, g.magnitude(row, u), gap);
+    (contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()) && is_pressed()
 }
 
 /// Whether contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion jump.
@@ -37,8 +51,9 @@ pub(super) fn jumps<T: Real>(
     let share = share_of_rounding::<T>();
     let per_rounding = share / rounding(T::one());
     let h = T::of(h);
+    let exerts = |row: usize| exerts((constraints, g), trial, &new.u, row);
     let makes_jump = |&row: &usize| {
-        if !(exerting_at_start[row] || exerts(trial, row) || trial.impulse[row] != T::zero()) {
+        if !(exerting_at_start[row] || exerts(row) || trial.impulse[row] != T::zero()) {
             return false;
         }
         // (The change of the one and of the other, and what they are sums of.)
@@ -57,6 +72,6 @@ pub(super) fn jumps<T: Real>(
         holds(row) || (0..trial.closed.len()).any(|other| holds(other) && g.are_multiples(row, other))
     };
     let before = |row: usize| closed_at_start[row] && exerting_at_start[row];
-    let now = |row: usize| trial.closed[row] && exerts(trial, row);
+    let now = |row: usize| trial.closed[row] && exerts(row);
     changed.filter(makes_jump).any(|row| !(held(row, &before) && held(row, &now)))
 }

@@ -3,7 +3,7 @@
 use super::closing::{Booking, note_slips};
 use super::constraints::Constraints;
 use super::contact_rows::Part;
-use super::contact_step::ContactStep;
+use super::contact_step::{ContactStep, ContactWork};
 use super::energy::StepBooks;
 use super::finite::{Extent, check_contacts, check_motion};
 use super::judge::Verdict;
@@ -49,7 +49,8 @@ impl<T: Real> Simulation<'_, T> {
             ledger.begin(state);
         }
         work.contact.closed_at_start.clone_from(&work.contact.trial.closed);
-        note_exerting(&work.contact.trial, &mut work.contact.exerting_at_start);
+        let ContactWork { trial, exerting_at_start, .. } = &mut work.contact;
+        note_exerting((constraints, g), trial, &state.motion.u, exerting_at_start);
         work.backup.begin();
         work.correction.energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);

@@ -23,7 +23,7 @@ fn scenes_by_chance_hold_what_must_hold() {
 #[test]
 fn scenes_that_have_failed_hold() {
     let by_units = [40_062_161, 50_043_714, 50_122_859, 50_123_697, 90_017_504, 91_237_725];
-    let by_units = by_units.into_iter().chain([80_276_381, 92_222_309, 92_405_630]);
+    let by_units = by_units.into_iter().chain([80_276_381, 92_222_309, 92_405_630, 94_064_348]);
     let by_order = [40_073_095, 50_175_212, 60_019_637, 60_025_014, 70_203_147, 80_267_802, 80_288_695, 80_397_469];
     let by_order = by_order.into_iter().chain([80_649_817, 91_268_618, 92_799_461]);
     let by_velocity = [70_113_558, 80_083_120, 80_155_686, 90_202_306];
