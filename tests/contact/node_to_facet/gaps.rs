@@ -376,3 +376,27 @@ fn nodes_in_a_dent_have_a_row_for_each_side() {
         assert_eq!(gaps(&mut contact(rise, node), &zero).len(), 1, "{rise} {node:?}");
     }
 }
+
+/// On a side that two facets share the normal is between theirs where the node is, also of warped ones.
+#[test]
+fn the_normal_on_a_side_is_that_of_the_place() {
+    for s in [0.1, 0.3, 0.5, 0.8] {
+        let mut mesh = Mesh::<3>::default();
+        mesh.nodes([[0.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -0.1]]);
+        mesh.nodes([[1.0, 1.0, -0.9]]);
+        mesh.facets.extend([[0, 1, 3, 2], [2, 3, 5, 4]].map(Facet::from));
+        let node = mesh.nodes([[s, 0.0, 0.0]])[0];
+        let mut contact = mesh.contact(&[node], 0.5);
+        let u = vec![0.0; mesh.size()];
+        assert!(gaps(&mut contact, &u).iter().all(|row| row.1.abs() < 1e-15));
+        // The slope of the warped one there; the other one is level.
+        let slope = 0.1 + 0.8 * s;
+        let length = f64::hypot(1.0, slope);
+        let sum = [0.0, slope / length, 1.0 + 1.0 / length];
+        let size = f64::hypot(sum[1], sum[2]);
+        let g = rows(&contact);
+        for (dof, weight) in g.row(0).filter(|&(dof, _)| dof / 3 == node) {
+            assert!((weight - sum[dof % 3] / size).abs() < 1e-12, "{s}: {weight} of {sum:?}");
+        }
+    }
+}
