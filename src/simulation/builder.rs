@@ -342,9 +342,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`). What comes
     /// later, a system that stiffens or compliant contacts that press, is looked at in each step, which ends with
     /// [`Error::Stiffened`] if its frequency is beyond the limit. Damping counts if the scheme takes its forces from
-    /// before the step. It is then assumed that the highest mode has the strongest damping, which is exact for Rayleigh
-    /// damping and otherwise may refuse a stable step. Of a K that is not symmetric only Gershgorin's
-    /// circles count.
+    /// before the step, of bodies without stiffness too. It is then assumed that the highest mode has the strongest
+    /// damping, which is exact for Rayleigh damping and otherwise may refuse a stable step. Of a K that is not
+    /// symmetric only Gershgorin's circles count.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
         self.stability = Stability::Unchecked;

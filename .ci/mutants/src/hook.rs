@@ -26,24 +26,30 @@ pub(crate) fn is(number: u32) -> bool {
 #[inline(never)]
 fn ask(number: u32) -> bool {
     if ALIVE.load(Relaxed) == UNKNOWN {
-        let mut environment = [0; 1 << 17];
-        let alive = match variable(b"MUTANT_REACH=", &mut environment) {
-            Some(file) => {
-                let open = || OpenOptions::new().create(true).append(true).open(OsStr::from_bytes(file));
-                REACH.get_or_init(|| open().expect("the file of reach"));
-                RECORD
-            }
-            None => {
-                let number = variable(b"MUTANT=", &mut environment).and_then(|number| std::str::from_utf8(number).ok());
-                number.and_then(|number| number.parse().ok()).unwrap_or(0)
-            }
-        };
-        ALIVE.store(alive, Relaxed);
+        ALIVE.store(read(), Relaxed);
     }
     if ALIVE.load(Relaxed) == RECORD {
         record(number);
     }
     ALIVE.load(Relaxed) == number
+}
+
+/// What the environment says. (Apart, for its memory on the stack takes a time.)
+#[cold]
+#[inline(never)]
+fn read() -> u32 {
+    let mut environment = [0; 1 << 17];
+    match variable(b"MUTANT_REACH=", &mut environment) {
+        Some(file) => {
+            let open = || OpenOptions::new().create(true).append(true).open(OsStr::from_bytes(file));
+            REACH.get_or_init(|| open().expect("the file of reach"));
+            RECORD
+        }
+        None => {
+            let number = variable(b"MUTANT=", &mut environment).and_then(|number| std::str::from_utf8(number).ok());
+            number.and_then(|number| number.parse().ok()).unwrap_or(0)
+        }
+    }
 }
 
 /// What stands behind a name in the environment. Without memory from the heap, as all of this: there are tests that
@@ -60,9 +66,10 @@ fn variable<'b>(name: &[u8], environment: &'b mut [u8]) -> Option<&'b [u8]> {
     environment[..size].split(|&byte| byte == 0).find_map(|entry| entry.strip_prefix(name))
 }
 
+/// Writes a number down the first time that it is asked for.
 fn record(number: u32) {
-    let bit = 1 << (number % 64);
-    if SEEN[number as usize / 64].fetch_or(bit, Relaxed) & bit == 0 {
+    let (seen, bit) = (&SEEN[number as usize / 64], 1 << (number % 64));
+    if seen.load(Relaxed) & bit == 0 && seen.fetch_or(bit, Relaxed) & bit == 0 {
         let (mut line, mut rest) = (*b"00000\n", number);
         for digit in line[..5].iter_mut().rev() {
             *digit = b'0' + (rest % 10) as u8;
