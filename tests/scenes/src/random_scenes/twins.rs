@@ -217,6 +217,8 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
     let runs = (Run::<T>::new(&other.recipe), Run::<T>::new(&other.rounded[0]), Run::<T>::new(&other.rounded[1]));
     let (Ok(mut run), Ok(mut one), Ok(mut two)) = runs else { return None };
     let (mut scales, mut least, mut most) = (Scales::default(), 0.0_f64, 0.0_f64);
+    // (Raw forces keep for some steps what rounding was in one, also where control has let the size grow since.)
+    let mut shortest = f64::INFINITY;
     for (step, trace) in first.iter().enumerate() {
         // (Control has chosen the size of the next step when this one is over.)
         let (start, mut h) = (run.run.time(), run.run.history().step_size());
@@ -242,7 +244,8 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             let of_run = Trace::of(run.recipe, &run.run).on_dofs(recipe);
             least = least.max(scales.difference(&trace, &of_run, [0.0; 2]).0);
         }
-        let known = scales.known(recipe, h / other.recipe.units[2], eps);
+        shortest = shortest.min(h);
+        let known = scales.known(recipe, shortest / other.recipe.units[2], eps);
         let (size, name) = scales.difference(&trace, &other.read(&run).on_dofs(recipe), known);
         most = most.max(size);
         if least > eps.powf(0.6) {
