@@ -564,11 +564,11 @@ fn a_block_that_gives_way_along_one_direction_is_held() {
 #[test]
 fn nearly_singular_blocks_do_not_depend_on_the_unit() {
     let rows = [[-0.164_229, 0.984_099], [-0.751_325, -0.169_238], [-0.639_171, -0.053_92]];
-    let product = |i: usize, j: usize| 3e-8 * (rows[i][0] * rows[j][0] + rows[i][1] * rows[j][1]) as f32;
+    let product = |i: usize, j: usize| f32::of(3e-8 * (rows[i][0] * rows[j][0] + rows[i][1] * rows[j][1]));
     let w: Vec<f32> = (0..9).map(|entry| product(entry / 3, entry % 3)).collect();
     let mut random = Congruential(71);
     for trial in 0..200 {
-        let q = [-1.3e-3, 4e-4 * random.signed(), 3e-4 * random.signed()].map(|x| x as f32);
+        let q = [-1.3e-3, 4e-4 * random.signed(), 3e-4 * random.signed()].map(f32::of);
         let solved = |unit: i32| {
             let unit = 2.0_f32.powi(unit);
             let q = q.map(|x| x * unit);
