@@ -1,6 +1,7 @@
 //! Nothing that is NaN or infinite is published, whoever made it, and a step that fails leaves no trace.
 
 use contact_dynamics::contact::{ContactLaw, GapFunction, GapOffset, NodesOnObstacle, Plane};
+use contact_dynamics::contact_solver::{ContactFailure, ContactProblem, ContactSolver};
 use contact_dynamics::corrector::{ContactStabilized, LaursenLove, Release, TaylorPapadopoulos};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use contact_dynamics::observer::EnergyRecorder;
@@ -442,4 +443,35 @@ fn stiffnesses_beyond_the_scalar_are_refused() {
     }
     run(ContactLaw::Penalty { stiffness: 1e30 }).unwrap();
     run(ContactLaw::Bipenalty { stiffness: 10.0, mass: 0.0 }).unwrap();
+}
+
+/// A contact solver that fails, and leaves so much of the gap.
+#[derive(Debug)]
+struct Failing(f64);
+
+impl ContactSolver<f64> for Failing {
+    fn solve(&mut self, _: &ContactProblem<'_, f64>, _: &mut [f64]) -> Result<usize, ContactFailure<f64>> {
+        Err(ContactFailure::NotConverged { iterations: 3, row: 0, residual: self.0 })
+    }
+}
+
+/// That numbers have gone beyond those of the scalar is another failure than that a solver has not converged.
+#[test]
+fn a_solver_that_leaves_no_number_is_told_from_one_that_does_not_converge() {
+    let failed = |residual: f64| {
+        let system = LinearSystem::lumped(vec![1.0], matrix(1, &[(0, 0, 0.0)])).unwrap();
+        let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1)
+            .velocity(vec![-1.0])
+            .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 0.15))
+            .contact_solver(Failing(residual))
+            .build()
+            .unwrap();
+        run.run_until(1.0, &mut ()).unwrap_err()
+    };
+    for residual in [f64::NAN, f64::INFINITY] {
+        let error = failed(residual);
+        assert!(matches!(error, Error::ContactNotFinite { value, .. } if !value.is_finite()), "{error}");
+    }
+    let error = failed(0.25);
+    assert!(matches!(error, Error::Contact { iterations: 3, residual: 0.25, .. }), "{error}");
 }

@@ -381,3 +381,25 @@ fn of_several_overlaps_of_a_node_the_deepest_counts() {
         assert_eq!(run.state().displacement(), [0.0], "{depths:?}");
     }
 }
+
+/// A damped dof without mass that a wall holds at the start has no velocity toward it.
+#[test]
+fn what_a_wall_holds_does_not_begin_to_creep() {
+    for make in schemes() {
+        let k = matrix(2, spring(0, 1, 4.0));
+        let system = LinearSystem::lumped(vec![1.0, 0.0], k).unwrap().damping(matrix(2, [(1, 1, 0.5)])).unwrap();
+        let name = make.name();
+        let built = Simulation::builder(system, make, 0.01)
+            .displacement(vec![-0.1, 0.0])
+            .constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0))
+            .build();
+        let Ok(mut run) = built else { continue };
+        assert_eq!(run.state().velocity()[1], 0.0, "{name}");
+        for _ in 0..5 {
+            run.step().unwrap();
+            let u: f64 = run.state().displacement()[1];
+            assert!(u.abs() < 1e-15, "{name}: {u:e}");
+        }
+        assert!(run.state().contacts().forces()[0] > 0.3, "{name}");
+    }
+}
