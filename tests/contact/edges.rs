@@ -209,6 +209,32 @@ fn rows_and_rates_are_derivatives_of_gaps() {
     }
 }
 
+/// Beyond an end, of either edge, the gap opens, and rows are its derivatives.
+#[test]
+fn beyond_an_end_rows_are_derivatives_too() {
+    for shares in [[-0.03, 0.5], [1.03, 0.4], [0.6, -0.03], [0.5, 1.03]] {
+        let pair = Pair::new(1.1, shares, 0.1);
+        let mut contact = pair.contact::<f64>();
+        let at = |contact: &mut EdgeToEdge<f64>, dof: usize, by: f64| {
+            let mut u = vec![0.0; 24];
+            u[dof] = by;
+            contact.search_on(0.0, &u, &[0.0; 24], 0.0).unwrap();
+            let row = ridges(contact).unwrap();
+            let mut gaps = vec![0.0; contact.candidates()];
+            contact.gap(0.0, &u, &mut gaps);
+            (row, gaps[row])
+        };
+        assert!(at(&mut contact, 0, 0.0).1 > 0.1, "{shares:?}");
+        for dof in 0..24 {
+            let [before, after] = [-1e-6, 1e-6].map(|by| at(&mut contact, dof, by).1);
+            let (row, _) = at(&mut contact, dof, 0.0);
+            let place = contact.dofs().iter().position(|&other| other == dof).unwrap();
+            let entry = Contacts::of(&contact).row(row).find(|entry| entry.0 == place).map_or(0.0, |entry| entry.1);
+            assert!(((after - before) / 2e-6 - entry).abs() < 1e-7, "{shares:?}, {dof}: {entry}");
+        }
+    }
+}
+
 #[test]
 fn forces_keep_both_momenta_far_from_the_origin_too() {
     for far in [0.0, 1e6] {
