@@ -234,6 +234,9 @@ fn what_is_no_surface_of_cells_is_refused() {
     assert!(refused(&[vec![0, 1, 2, 3, 4, 5, 6]]).contains("has 4 or 10 nodes"));
     assert!(refused(&[vec![0, 1, 2, 99]]).contains("99"));
     assert!(refused(&[vec![0, 1, 2, 3]]).contains("no volume"));
+    let line = [[0.0, 0.1], [1.0, 0.4], [2.0, 0.7], [0.5, 2.0]];
+    let flat = |cell: [usize; 3]| Surface::of_cells(&line, [cell]).map(drop);
+    assert!(flat([0, 1, 3]).is_ok() && flat([0, 1, 2]).unwrap_err().to_string().contains("no volume"));
     assert!(matches!(Surface::of_cells(nodes, [[0; 0]; 0]), Err(Error::Empty { .. })));
     let element = block.elements[0].clone();
     assert!(matches!(Surface::of_cells(nodes, [&element, &element]), Err(Error::Empty { .. })));
