@@ -203,6 +203,8 @@ fn what_is_refused() {
     assert!(matches!(modal, Err(Error::Incompatible { .. })));
     let rubbing = with(LinearRows::new().unilateral(&[(8, 1.0)], 0.0).friction(0.3, &[&[(8, 1.0)]]));
     assert!(matches!(rubbing, Err(Error::Incompatible { .. })));
+    let bonded = with(LinearRows::new().bond(1.0, &[(8, 1.0)], 0.0));
+    assert!(matches!(bonded, Err(Error::Incompatible { .. })));
     let short = ModalPropagation::builder(&[&body], 1.0).velocity(vec![0.0; 3]).build();
     assert!(matches!(short, Err(Error::Dimension { expected: 9, found: 3, .. })));
     let reduction = Reduction::new(mass.as_ref(), stiffness.as_ref(), &[0]).boundary(Boundary::CraigBampton);
