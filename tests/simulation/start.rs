@@ -403,3 +403,29 @@ fn what_a_wall_holds_does_not_begin_to_creep() {
         assert!(run.state().contacts().forces()[0] > 0.3, "{name}");
     }
 }
+
+/// Damped dofs without mass between springs that differ much begin in balance too, to the rounding of the stiffest.
+#[test]
+fn damped_dofs_between_soft_and_stiff_springs_begin_in_balance() {
+    let mut random = Congruential(83);
+    for trial in 0..50 {
+        // (Masses at both ends, and two dofs without that a stiff one ties.)
+        let stiff = [1e-3 * 10.0_f64.powi(trial / 10), 10.0_f64.powi(trial % 10), 1e-3 * (1.0 + random.unit())];
+        let k = matrix(4, (0..3).flat_map(|i| spring(i, i + 1, stiff[i])));
+        let u = random.vector(4, 1e-3);
+        let system = LinearSystem::lumped(vec![1.0, 0.0, 0.0, 1.0], k).unwrap().rayleigh(0.0, 0.01).unwrap();
+        let run = Simulation::builder(system, Newmark::trapezoidal(), 1e-4)
+            .displacement(u.clone())
+            .velocity(random.vector(4, 1.0))
+            .build()
+            .unwrap();
+        let v = run.state().velocity();
+        for dof in [1, 2] {
+            let pull = |x: &[f64], i: usize| stiff[i] * (x[i + 1] - x[i]);
+            let terms = [dof - 1, dof].map(|i| pull(&u, i) + 0.01 * pull(v, i));
+            let scale = [dof - 1, dof].map(|i| stiff[i] * (0.01 * v[i].abs().max(v[i + 1].abs()) + 1e-3));
+            let miss = (terms[1] - terms[0]).abs() / (scale[0] + scale[1]);
+            assert!(miss < 1e-13, "{trial}, {dof}: {miss:e}");
+        }
+    }
+}
