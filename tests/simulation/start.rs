@@ -394,7 +394,7 @@ fn what_a_wall_holds_does_not_begin_to_creep() {
             .constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0))
             .build();
         let Ok(mut run) = built else { continue };
-        assert_eq!(run.state().velocity()[1], 0.0, "{name}");
+        assert_eq!(run.state().velocity()[1..], [0.0], "{name}");
         for _ in 0..5 {
             run.step().unwrap();
             let u: f64 = run.state().displacement()[1];
