@@ -64,7 +64,8 @@ pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
     critical_along(tableau, 1.0, 2.0 * xi)
 }
 
-/// The longest stable step of the mode a + c v + ω² u = 0, which may have no stiffness; `None` as above.
+/// The longest stable step of the mode a + c v + ω² u = 0, which may have no stiffness; `None` if all are, as far as
+/// [`critical_omega`] looks.
 pub(crate) fn critical_step(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
     let rate = omega.max(damping);
     (rate > 0.0).then(|| critical_along(tableau, omega / rate, damping / rate)).flatten().map(|x| x / rate)

@@ -36,8 +36,8 @@ fn exerts<T: Real>(
 /// Bodies that touch without force come apart, and together, by the sign of the last bit, and so do rows whose force
 /// others hold. Nothing of the motion may follow from that. A contact counts that exerts a force, or has exerted one at
 /// the start of the step or within it, and along whose row the velocity has changed in the step, or h times the
-/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step. Rows that are multiples
-/// of each other are one contact: which of them has its force is the solver's choice.
+/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step. Rows that are
+/// multiples of each other are one contact: which of them has its force is the solver's choice.
 pub(super) fn jumps<T: Real>(
     constraints: &Constraints<'_, T>,
     g: &ContactJacobian<T>,

@@ -167,8 +167,8 @@ pub(super) fn balance_rates<T: Real>(system: &mut dyn System<T>, dofs: &[usize],
         if !T::all_finite(&motion.v) {
             break;
         }
-        // (Where what is around them lets them stand, they are known to the rounding of that. Between springs that differ
-        // much they are known to that of the stiffest, below which nothing falls.)
+        // (Where what is around them lets them stand, they are known to the rounding of that. Between springs that
+        // differ much they are known to that of the stiffest, below which nothing falls.)
         let largest = T::largest(&motion.v);
         let stays = size <= T::epsilon().powf(T::of(0.25)) * largest && size > T::of(0.5) * before;
         if size <= T::of(1e3) * T::epsilon() * largest || stays {
