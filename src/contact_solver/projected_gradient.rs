@@ -109,24 +109,28 @@ impl<T: Real> Memory<T> {
     /// Whether W bends no more than L along the step: then the step cannot overshoot. (Products of two small
     /// differences may be below all numbers: one of them is taken as a share of the largest.)
     fn is_bounded(&self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &[T]) -> bool {
-        let difference = |i: usize| (multipliers[i] - self.ahead[i]).value();
-        let largest = (0..multipliers.len()).fold(0.0_f64, |most, i| most.max(difference(i).abs()));
+        let largest = farthest(&self.ahead, multipliers);
+        if largest == 0.0 {
+            return true;
+        }
         let mut sums = (0.0, 0.0);
-        for i in (0..multipliers.len()).filter(|_| largest > 0.0) {
-            let share = difference(i) / largest;
+        for (i, (&new, &ahead)) in multipliers.iter().zip(&self.ahead).enumerate() {
+            let difference = (new - ahead).value();
+            let share = difference / largest;
             sums.0 += share * (self.gaps[i] - self.ahead_gaps[i]).value();
-            sums.1 += share * difference(i) * problem.delassus(i, i).value();
+            sums.1 += share * difference * problem.delassus(i, i).value();
         }
         sums.0 <= lipschitz.value() * sums.1
     }
 
     /// Whether the momentum points uphill.
     fn is_uphill(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
-        let way = |i: usize| (multipliers[i] - self.old[i]).value();
-        let largest = (0..multipliers.len()).fold(0.0_f64, |most, i| most.max(way(i).abs()));
-        let product =
-            |i: usize| problem.delassus(i, i).value() * ((self.ahead[i] - multipliers[i]).value() * (way(i) / largest));
-        largest > 0.0 && (0..multipliers.len()).map(product).sum::<f64>() > 0.0
+        let largest = farthest(&self.old, multipliers);
+        let product = |(i, &new): (usize, &T)| {
+            let share = (new - self.old[i]).value() / largest;
+            problem.delassus(i, i).value() * ((self.ahead[i] - new).value() * share)
+        };
+        largest > 0.0 && multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
     }
 
     /// Goes on from the iterate, with this share of the last step as momentum.
@@ -138,6 +142,11 @@ impl<T: Real> Memory<T> {
             *old = new;
         }
     }
+}
+
+/// The largest change from one list to another.
+fn farthest<T: Real>(from: &[T], to: &[T]) -> f64 {
+    from.iter().zip(to).fold(0.0, |most: f64, (&from, &to)| most.max((to - from).value().abs()))
 }
 
 /// y = W λ + q.

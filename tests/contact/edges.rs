@@ -117,6 +117,21 @@ fn ridges(contact: &EdgeToEdge<f64>) -> Option<usize> {
     })
 }
 
+/// The same after a search, with its gap.
+fn ridges_at(contact: &mut EdgeToEdge<f64>, u: &[f64], v: &[f64]) -> (usize, f64) {
+    contact.search_on(0.0, u, v, 0.0).unwrap();
+    let row = ridges(contact).unwrap();
+    let mut gaps = vec![0.0; contact.candidates()];
+    contact.gap(0.0, u, &mut gaps);
+    (row, gaps[row])
+}
+
+/// Its entry for a dof of the system.
+fn entry(contact: &EdgeToEdge<f64>, row: usize, dof: usize) -> f64 {
+    let place = contact.dofs().iter().position(|&other| other == dof).unwrap();
+    Contacts::of(contact).row(row).find(|entry| entry.0 == place).map_or(0.0, |entry| entry.1)
+}
+
 #[test]
 fn gaps_and_rows_are_those_of_two_crossed_lines() {
     let mut random = Congruential(3);
@@ -182,20 +197,14 @@ fn rows_and_rates_are_derivatives_of_gaps() {
         let mut contact = pair.contact::<f64>().friction(0.3);
         let ridges = |contact: &mut EdgeToEdge<f64>, along: &[f64], by: f64| {
             let x: Vec<f64> = u.iter().zip(along).map(|(u, v)| u + by * v).collect();
-            contact.search_on(0.0, &x, &v, 0.0).unwrap();
-            let row = ridges(contact).unwrap();
-            let mut gaps = vec![0.0; contact.candidates()];
-            contact.gap(0.0, &x, &mut gaps);
-            (row, gaps[row])
+            ridges_at(contact, &x, &v)
         };
         for dof in 0..24 {
             let mut along = vec![0.0; 24];
             along[dof] = 1.0;
             let [before, after] = [-1e-5, 1e-5].map(|by| ridges(&mut contact, &along, by).1);
             let (row, _) = ridges(&mut contact, &along, 0.0);
-            let place = contact.dofs().iter().position(|&other| other == dof).unwrap();
-            let entry = Contacts::of(&contact).row(row).find(|entry| entry.0 == place).map_or(0.0, |entry| entry.1);
-            assert!(((after - before) / 2e-5 - entry).abs() < 1e-8, "{dof}");
+            assert!(((after - before) / 2e-5 - entry(&contact, row, dof)).abs() < 1e-8, "{dof}");
         }
         let step = 1e-4;
         let [before, now, after] = [-step, 0.0, step].map(|by| ridges(&mut contact, &v, by).1);
@@ -218,18 +227,13 @@ fn beyond_an_end_rows_are_derivatives_too() {
         let at = |contact: &mut EdgeToEdge<f64>, dof: usize, by: f64| {
             let mut u = vec![0.0; 24];
             u[dof] = by;
-            contact.search_on(0.0, &u, &[0.0; 24], 0.0).unwrap();
-            let row = ridges(contact).unwrap();
-            let mut gaps = vec![0.0; contact.candidates()];
-            contact.gap(0.0, &u, &mut gaps);
-            (row, gaps[row])
+            ridges_at(contact, &u, &[0.0; 24])
         };
         assert!(at(&mut contact, 0, 0.0).1 > 0.1, "{shares:?}");
         for dof in 0..24 {
             let [before, after] = [-1e-6, 1e-6].map(|by| at(&mut contact, dof, by).1);
             let (row, _) = at(&mut contact, dof, 0.0);
-            let place = contact.dofs().iter().position(|&other| other == dof).unwrap();
-            let entry = Contacts::of(&contact).row(row).find(|entry| entry.0 == place).map_or(0.0, |entry| entry.1);
+            let entry = entry(&contact, row, dof);
             assert!(((after - before) / 2e-6 - entry).abs() < 1e-7, "{shares:?}, {dof}: {entry}");
         }
     }

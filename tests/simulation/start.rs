@@ -385,6 +385,7 @@ fn of_several_overlaps_of_a_node_the_deepest_counts() {
 /// A damped dof without mass that a wall holds at the start has no velocity toward it.
 #[test]
 fn what_a_wall_holds_does_not_begin_to_creep() {
+    let mut tried = 0;
     for make in schemes() {
         let k = matrix(2, spring(0, 1, 4.0));
         let system = LinearSystem::lumped(vec![1.0, 0.0], k).unwrap().damping(matrix(2, [(1, 1, 0.5)])).unwrap();
@@ -401,7 +402,10 @@ fn what_a_wall_holds_does_not_begin_to_creep() {
             assert!(u.abs() < 1e-15, "{name}: {u:e}");
         }
         assert!(run.state().contacts().forces()[0] > 0.3, "{name}");
+        tried += 1;
     }
+    // (Explicit schemes may refuse damping there.)
+    assert!(tried >= 3, "{tried}");
 }
 
 /// Damped dofs without mass between springs that differ much begin in balance too, to the rounding of the stiffest.
