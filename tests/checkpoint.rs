@@ -443,6 +443,38 @@ fn bytes_that_are_cut_or_flipped_are_refused_or_run() {
     }
 }
 
+/// In text there are no such numbers, in bytes there are.
+#[test]
+fn bytes_of_numbers_that_are_not_finite_are_refused() {
+    for Files { text, bytes } in samples() {
+        let mut all = Vec::new();
+        let document = serde_json::from_str(&text).unwrap();
+        paths(&document, "", &mut all);
+        let mut tried = 0;
+        for path in all {
+            let Some(number) = document.pointer(&path).filter(|value| value.is_f64()).and_then(Value::as_f64) else {
+                continue;
+            };
+            // (Of zeros and ones there are more than those of this place.)
+            let written = number.to_le_bytes();
+            let places = bytes.windows(8).enumerate().filter(|(_, window)| *window == written).map(|(place, _)| place);
+            for place in places.filter(|_| written[..4] != [0; 4]) {
+                for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let mut changed = bytes.clone();
+                    changed[place..place + 8].copy_from_slice(&wrong.to_le_bytes());
+                    let refused = match postcard::from_bytes(&changed) {
+                        Ok(checkpoint) => try_out(checkpoint).is_err(),
+                        Err(_) => true,
+                    };
+                    assert!(refused, "{path}, {number}: {wrong}");
+                    tried += 1;
+                }
+            }
+        }
+        assert!(tried > 100, "{tried}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 

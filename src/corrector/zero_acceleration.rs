@@ -12,7 +12,7 @@ use crate::real::Real;
 /// they are. Linear momentum is not conserved where bodies differ, nor for an obstacle that accelerates: what is left
 /// of a is removed, though nothing pushes. The impulse of a contact books the relative part alone, so that it misses
 /// the change of momentum of the schemes that read a. Where rows are oblique to the dofs, tangential accelerations
-/// vanish too.
+/// vanish too. Contacts that hold their bodies by no more than the rounding of gaps and rates are left alone.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -31,8 +31,17 @@ impl<T: Real> Corrector<T> for ZeroAcceleration {
         step.solve_velocity_jumps()?;
         step.solve_acceleration_jumps()?;
         let (share, weight) = (T::of(step.force_share()), T::of(step.momentum_weights()[2]));
+        let mut place = 0;
         for i in 0..step.engaged().len() {
             let (row, force) = (step.engaged()[i], step.jump_forces()[i]);
+            // (Engaged rows are some of the closed ones, in their order.)
+            while step.closed()[place] != row {
+                place += 1;
+            }
+            // Bodies that stay together without force are closed by the sign of the last bit.
+            if !step.holds(row, step.jump_impulses()[place])? {
+                continue;
+            }
             step.report_force(row, step.contacts().forces()[row] + share * force);
             step.book_impulse(row, weight * force);
             for (dof, _) in step.row(row).filter(|(_, entry)| *entry != T::zero()) {

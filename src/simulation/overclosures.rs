@@ -73,3 +73,25 @@ impl<T: Real> Overclosures<T> {
         found.map_or(T::zero(), |at| self.depths[at].1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_that_is_left_falls_smoothly_with_the_derivatives_that_it_says() {
+        let (start, over) = (0.7, 2.5);
+        let overclosures = Overclosures::<f64>::new(&[], start, Some(over));
+        let share = |t: f64| overclosures.share(t);
+        let [first, last] = [share(start), share(start + over)];
+        assert!((first[0] - 1.0).abs() < 1e-15 && first[1].abs() < 1e-15, "{first:?}");
+        assert!(last.iter().all(|x| x.abs() < 1e-15), "{last:?}");
+        let d = 1e-5;
+        for t in [0.9, 1.3, 1.95, 2.4, 3.1] {
+            let [before, here, after] = [-d, 0.0, d].map(|by| share(t + by));
+            let slopes = [0, 1].map(|k| (after[k] - before[k]) / (2.0 * d));
+            assert!((slopes[0] - here[1]).abs() < 1e-9 && (slopes[1] - here[2]).abs() < 1e-9, "{t}: {here:?}");
+            assert!((0.0..1.0).contains(&here[0]) && here[1] < 0.0, "{t}: {here:?}");
+        }
+    }
+}

@@ -169,3 +169,32 @@ impl Pace {
         (self.steps, self.grown) = (0, true);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Good steps until the size may grow.
+    fn wait(pace: &mut Pace) -> usize {
+        (1..1000).find(|_| pace.advance(|| false)).unwrap()
+    }
+
+    #[test]
+    fn growth_that_is_refused_at_once_waits_twice_as_long_each_time() {
+        let mut pace = Pace::new(1.0);
+        pace.halve(Refusal::Passing);
+        let mut waits = Vec::new();
+        for _ in 0..8 {
+            waits.push(wait(&mut pace));
+            pace.double();
+            pace.halve(Refusal::Passing);
+        }
+        assert_eq!(waits, [2, 4, 8, 16, 32, 64, 64, 64]);
+        // One good step after growth, and it begins anew.
+        wait(&mut pace);
+        pace.double();
+        pace.advance(|| false);
+        pace.halve(Refusal::Passing);
+        assert_eq!(wait(&mut pace), 2);
+    }
+}

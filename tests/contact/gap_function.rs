@@ -1,7 +1,7 @@
 //! Gaps given by functions of the host: derivatives, following, what is refused, and runs.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
-use contact_dynamics::contact::{Candidates, ContactId, ContactJacobian, GapFunction, GapRates};
+use contact_dynamics::contact::{Candidates, ContactId, ContactJacobian, Contacts, GapFunction, GapRates};
 use contact_dynamics::{ContactConstraint, ContactLaw, Error, Newmark, PersistencyCorrection, Simulation, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::sparse::free;
@@ -183,4 +183,18 @@ fn a_tether_holds_two_particles_on_a_circle() {
     let (force, stretch) = run(2e-3);
     // At constant speed the trapezoidal rule is exact but for the way.
     assert!(force < 1e-11 && stretch < 1e-12, "{force:e} {stretch:e}");
+}
+
+#[test]
+fn friction_is_that_of_the_last_function() {
+    let along = |_: f64, _: &[f64], tangent: &mut [f64]| {
+        tangent.copy_from_slice(&[1.0, 0.0]);
+        [[0.0; 2]; 2]
+    };
+    let mut contact = both().friction(0.4, 1, along);
+    let u = [0.1, -0.2, 0.4, 0.3, -0.1, 0.2];
+    contact.search_on(0.3, &u, &[0.0; 6], 0.0).unwrap();
+    let contacts = Contacts::of(&contact);
+    assert_eq!([0, 1].map(|row| contacts.tangents(row).len()), [0, 1]);
+    assert_eq!([0, 1].map(|row| contacts.friction(row)), [0.0, 0.4]);
 }

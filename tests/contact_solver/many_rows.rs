@@ -99,3 +99,36 @@ fn four_hundred_supports_of_a_rigid_table() {
     // Of the many ways to carry it one without peaks.
     assert!(lambda.iter().all(|lambda| lambda * (n as f64) < 1.5), "{lambda:?}");
 }
+
+/// Stiffnesses over six decades along directions that have nothing to do with the rows: conjugate gradients do not end
+/// in time, and no sparse approximate inverse helps them.
+#[test]
+fn rows_that_iteration_cannot_solve_for_are_solved_all_the_same() {
+    let n = 280;
+    let mut random = Congruential(11);
+    let mut w: Vec<f64> =
+        (0..n * n).map(|e| if e / n == e % n { 1e-6_f64.powf((e % n) as f64 / 279.0) } else { 0.0 }).collect();
+    for _ in 0..3 {
+        // W ← H W H with a reflection H = 1 − 2 v vᵀ.
+        let v: Vec<f64> = (0..n).map(|_| random.signed()).collect();
+        let length = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let v: Vec<f64> = v.iter().map(|v| v / length).collect();
+        let wv: Vec<f64> = w.chunks_exact(n).map(|row| row.iter().zip(&v).map(|(w, v)| w * v).sum()).collect();
+        let vwv: f64 = v.iter().zip(&wv).map(|(v, x)| v * x).sum();
+        for (e, w) in w.iter_mut().enumerate() {
+            let (i, j) = (e / n, e % n);
+            *w += 4.0 * vwv * v[i] * v[j] - 2.0 * (v[i] * wv[j] + wv[i] * v[j]);
+        }
+    }
+    // (Rounding has left it symmetric but for the last bits.)
+    let w: Vec<f64> = (0..n * n).map(|e| 0.5 * (w[e] + w[e % n * n + e / n])).collect();
+    let multipliers: Vec<f64> = (0..n).map(|_| random.within(0.2, 1.0)).collect();
+    let offset = offset(&w, &multipliers, &vec![0.0; n]);
+    let (sets, tolerance) = (vec![AdmissibleSet::NonNegative; n], vec![0.0; n]);
+    let problem = ContactProblem::new(&w, &offset, &sets, &tolerance).unwrap();
+    let mut found = vec![0.0; n];
+    ActiveSet::default().solve(&problem, &mut found).unwrap();
+    for (found, exact) in found.iter().zip(&multipliers) {
+        assert!((found - exact).abs() < 1e-8, "{found} {exact}");
+    }
+}

@@ -5,8 +5,8 @@ use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::{
-    Composite, Corrector, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark, Newton,
-    PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
+    Bdf2, Composite, Corrector, EnergyMomentum, Error, GeneralizedAlpha, Gssss, LinearRows, LinearSystem, Newmark,
+    Newton, PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::{Figures, figures, record_run};
 use contact_dynamics_scenes::sparse::{free, matrix, spring, springs};
@@ -235,6 +235,40 @@ fn zero_acceleration_is_the_acceleration_part_between_equal_bars_alone() {
     // Elsewhere it takes momentum away.
     let unequal = Bars { young: [49.0, 100.0], ..equal };
     assert!(zero(&unequal).1.drift > 1e-6 && part(&unequal).1.drift < 1e-10);
+}
+
+/// Two masses that touch and fly on together, slowed by damping that both have: which of them is closed is decided by
+/// rounding, and a = −α v all the same.
+#[test]
+fn zero_acceleration_leaves_bodies_alone_that_stay_together_without_force() {
+    let damping = 0.05;
+    for (k, mass) in [[1.0, 1.3], [1.28, 1.82], [3.0, 0.7], [1e-3, 1.0]].into_iter().enumerate() {
+        for unit in [1.0, 10.0, 1e-3, 77.7] {
+            let rows = LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.0);
+            // (A wall stops the first; after that they are on their own.)
+            let rows = rows.unilateral(&[(0, 1.0)], 0.31 * unit);
+            let mut run = Simulation::builder(free(&mass).rayleigh(damping, 0.0).unwrap(), Bdf2, 0.12)
+                .velocity(vec![-0.35 * unit; 2])
+                .constraint(rows)
+                .corrector(ZeroAcceleration)
+                .build()
+                .unwrap();
+            let mut alone = 0;
+            for step in 0..60 {
+                run.step().unwrap();
+                let (v, a) = (run.state().velocity(), run.state().acceleration());
+                // (Without a force beyond rounding in this step, and the next.)
+                if run.state().contacts().raw_forces().iter().any(|force| *force > 1e-9 * unit) {
+                    alone = 0;
+                    continue;
+                }
+                alone += 1;
+                let slows = (0..2).all(|i| (a[i] + damping * v[i]).abs() < 1e-9 * unit);
+                assert!(slows, "{k}, {unit}, step {step}: {v:?} {a:?}");
+            }
+            assert!(alone > 20, "{k}, {unit}: {alone}");
+        }
+    }
 }
 
 #[test]

@@ -212,3 +212,27 @@ fn a_dragged_node_without_mass_is_the_play_of_its_spring() {
         assert!(ways[0] > 1.0 && ways[1] > 1.0, "{ways:?}");
     }
 }
+
+/// A body that starts as fast as its belt, but for the last bit, does not slide.
+#[test]
+fn a_slip_of_rounding_is_none_at_the_start() {
+    for scheme in schemes() {
+        for (v, belt) in [(0.1 + 0.2, 0.3), (0.3, 0.1 + 0.2), (-0.7 - 0.1, -0.8), (0.8, 0.7 + 0.1)] {
+            let system = masses(vec![1.0; 2], vec![0.0, -GRAVITY]).unwrap();
+            let floor = LinearRows::new()
+                .unilateral(&[(1, 1.0)], 0.0)
+                .friction(0.5, &[&[(0, 1.0)]])
+                .dragging(move |_| [[belt, 0.0], [0.0; 2]]);
+            let mut run = run(system, (scheme.make)(), 1e-2, vec![0.0; 2])
+                .velocity(vec![v, 0.0])
+                .constraint(floor)
+                .build()
+                .unwrap();
+            for step in 0..3 {
+                let friction = run.state().contacts().friction_forces(0)[0];
+                assert!(friction.abs() < 1e-10, "{}, {v} on {belt}, step {step}: {friction}", scheme.name());
+                run.step().unwrap();
+            }
+        }
+    }
+}

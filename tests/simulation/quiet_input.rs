@@ -64,6 +64,10 @@ fn walls_that_move_without_rates_are_refused() {
             assert!(matches!(error, Error::SilentMotion { .. }) && !error.is_recoverable(), "{error}");
             assert!(error.to_string().contains("rates"), "{error}");
             over_wall(t, h, scale, move |s| [-speed * (s - t), -speed, 0.0]).unwrap();
+            // What the wall did before does not count, what it will do does.
+            let begins = over_wall(t, h, scale, move |s| [-speed * (s - t).max(0.0), 0.0, 0.0]);
+            assert!(matches!(begins, Err(Error::SilentMotion { .. })), "{t}, {h}, {scale}");
+            over_wall(t, h, scale, move |s| [-speed * (s - t).min(0.0), 0.0, 0.0]).unwrap();
             // At rest at the start, at rest but for a kink at the start or within the step, and a jump.
             let omega = TAU / (20.0 * h);
             let smooth = move |s: f64| {

@@ -1,10 +1,10 @@
 //! Starts: dofs without mass that are not in static balance, and bodies that overlap.
 
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, Plane};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapOffset, Plane};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Park,
-    PersistencyCorrection, Simulation, TimeIntegrator,
+    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, MoreauJean, Newmark,
+    NodesOnObstacle, Park, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::random::Congruential;
@@ -430,6 +430,32 @@ fn damped_dofs_between_soft_and_stiff_springs_begin_in_balance() {
             let scale = [dof - 1, dof].map(|i| stiff[i] * (0.01 * v[i].abs().max(v[i + 1].abs()) + 1e-3));
             let miss = (terms[1] - terms[0]).abs() / (scale[0] + scale[1]);
             assert!(miss < 1e-13, "{trial}, {dof}: {miss:e}");
+        }
+    }
+}
+
+/// A weight on a floor that moves evenly, as fast as the weight: the force at the start is the weight, also of schemes
+/// that impose contact on velocities.
+#[test]
+fn a_floor_that_moves_carries_its_weight_from_the_start() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+        [|| Box::new(CdLagrange), || Box::new(MoreauJean::new(0.5).unwrap()), || Box::new(Newmark::trapezoidal())];
+    for scheme in schemes {
+        for speed in [-3.0, 0.0, 0.2, 3.0] {
+            let system = LinearSystem::lumped(vec![2.0], matrix(1, [(0, 0, 0.0)])).unwrap().load(|_, f| f[0] = -14.0);
+            let floor = GapOffset::moving(move |t: f64| [-speed * t, -speed, 0.0]);
+            let mut run = Simulation::builder(system, scheme(), 1e-2)
+                .velocity(vec![speed])
+                .constraint(LinearRows::new().unilateral(&[(0, 1.0)], floor))
+                .uncorrected()
+                .build()
+                .unwrap();
+            for step in 0..4 {
+                let force = run.state().contacts().forces()[0];
+                assert!((force - 14.0).abs() < 1e-11, "{}, {speed}, step {step}: {force}", scheme().name());
+                assert!((run.state().velocity()[0] - speed).abs() < 1e-13);
+                run.step().unwrap();
+            }
         }
     }
 }

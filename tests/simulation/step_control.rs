@@ -489,6 +489,23 @@ fn runs_land_on_any_time() {
     }
 }
 
+/// A time within a billionth of a step counts as reached, whatever time is counted in.
+#[test]
+fn runs_land_alike_in_any_unit_of_time() {
+    let landed = |unit: f64, steps: f64| {
+        let mut run =
+            Simulation::builder(oscillator(0.0), Newmark::trapezoidal(), unit).velocity(vec![1.0]).build().unwrap();
+        run.land_on(steps * unit, &mut ()).unwrap();
+        (run.statistics().steps, run.time() / unit)
+    };
+    for (steps, expected) in [(3.0 - 4e-10, (3, 3.0)), (3.0 + 4e-10, (3, 3.0)), (3.0 - 4e-7, (3, 3.0 - 4e-7))] {
+        for unit in [2.0_f64.powi(-40), 1.0, 2.0_f64.powi(40)] {
+            let (count, time) = landed(unit, steps);
+            assert!(count == expected.0 && (time - expected.1).abs() < 1e-14, "{unit}: {count} {time}");
+        }
+    }
+}
+
 #[test]
 fn absurd_settings_are_refused() {
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {

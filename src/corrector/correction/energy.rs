@@ -108,6 +108,21 @@ impl<T: Real> Correction<'_, T> {
         Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
     }
 
+    /// Whether a closed row holds its bodies by more than rounding: its force moves the gap within a step, or the impulse
+    /// of its velocity jump the gap rate, by more than these are known to. (Of rates that is a share of ε^⅔.)
+    pub(in crate::corrector) fn holds(&mut self, row: usize, impulse: T) -> Result<bool> {
+        let s = self.compliance(row)?;
+        let h = T::of(self.h);
+        let of_rate =
+            share_of_rounding::<T>() * (self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let magnitude = self.g.magnitude(row, &self.new.u);
+        let of_gap = self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]) + h * of_rate;
+        let by_force = T::of(self.scheme.response[0].abs()) * h * h * s * self.contacts.lambda_raw[row].abs();
+        // (Written so that NaN holds.)
+        let by_rounding = by_force <= of_gap && s * impulse.abs() <= of_rate;
+        Ok(!by_rounding)
+    }
+
     /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
     /// miss a share of ε^⅔: how fast that is.
     pub(in crate::corrector) fn parts_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
