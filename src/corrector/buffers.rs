@@ -50,6 +50,8 @@ pub(crate) struct Buffers<T> {
     pub(super) change: Vec<T>,
     pub(super) damping: Vec<T>,
     pub(super) before: Vec<T>,
+    /// Whether damping acts on dofs without mass.
+    pub(crate) damps_massless: bool,
     /// Contacts on dofs without mass that close or open.
     pub(crate) switching: Box<Switching<T>>,
     /// Contacts that get energy together.
@@ -115,6 +117,7 @@ impl<T: Real> Buffers<T> {
             change: vec![T::zero(); damped],
             damping: vec![T::zero(); damped],
             before: vec![T::zero(); damped],
+            damps_massless: false,
             switching: Box::new(Switching::new(rows, switching)),
             given: Box::new(given),
         }

@@ -8,7 +8,7 @@ mod past;
 
 use super::group_problem::Jumps;
 use super::{Buffers, Corrector, JumpProjection};
-use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding, share_of_rounding};
+use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -277,7 +277,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// ```text
     /// a ← a − M⁻¹ C δv               by schemes that read no a: the balance holds at the corrected state
-    /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others, and where dofs without mass are damped: it holds to order h
+    /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others, and in systems with damped dofs without mass: it holds to order h
     /// ```
     ///
     /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of
@@ -368,11 +368,9 @@ impl<T: Real> Correction<'_, T> {
     /// Adds to a what the change of damping forces in `damping` makes.
     fn accelerate_by_damping(&mut self) -> Result<()> {
         let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
-        let change = &mut buffers.damping;
-        // (What rounds is no force on dofs without mass.)
-        let least = if massless.is_empty() { T::zero() } else { share_of_rounding::<T>() * T::largest(change) };
-        let reaches = massless.iter().all(|&dof| change[dof].abs() <= least);
-        if reaches && !scheme.read.iter().any(|[.., a]| *a) {
+        let Buffers { damping: change, damps_massless, .. } = &mut **buffers;
+        // (Not asked of this change: where it reaches them by rounding, or hardly, either answer must be the same.)
+        if !*damps_massless && !scheme.read.iter().any(|[.., a]| *a) {
             // No step starts from a.
             projection.apply_inverse(change)?;
             T::axpy(-T::one(), change, &mut new.a);

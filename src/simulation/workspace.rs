@@ -6,7 +6,7 @@ use super::contact_rows::ContactRowsWork;
 use super::contact_step::ContactWork;
 use super::excess_forces::ExcessForces;
 use super::interface::InterfaceWork;
-use super::massless::MasslessBlock;
+use super::massless::{MasslessBlock, is_damped};
 use super::mixing::Mixing;
 use super::newton::NewtonWork;
 use super::program::Program;
@@ -17,9 +17,10 @@ use super::supports::Supports;
 use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
 use crate::error::Result;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{ContactState, Motion};
-use crate::system::System;
+use crate::system::{Linearity, System};
 
 /// Memory of a step.
 pub(super) struct Workspace<T: Real> {
@@ -140,7 +141,7 @@ impl<T: Real> Workspace<T> {
     pub(super) fn keep_massless(
         &mut self,
         massless: Vec<usize>,
-        system: &mut dyn System<T>,
+        (system, together): (&mut dyn System<T>, &Together<T>),
         (program, follower): (&Program<T>, Option<String>),
         at: &Motion<T>,
         interface: &[usize],
@@ -150,6 +151,16 @@ impl<T: Real> Workspace<T> {
             self.contact.rows.on_massless = vec![false; self.rows];
         } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
             self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
+        }
+        let buffers = &mut self.correction.buffers;
+        if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
+            // (Forces that are not linear may act on them later.)
+            let damps = is_damped(system, &massless).map(|damps| {
+                let may_damp = system.linearity() == Linearity::Nonlinear && !massless.is_empty();
+                [f64::from(u8::from(damps || may_damp))]
+            });
+            let [damps] = together.max(damps)?;
+            buffers.damps_massless = damps > 0.0;
         }
         self.contact.rows.massless.clone_from(&massless);
         self.massless = massless;

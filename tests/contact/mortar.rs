@@ -602,3 +602,27 @@ fn what_cannot_be_a_surface_is_refused() {
     let contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[1, 0]]).unwrap();
     assert!(matches!(contact.reach(-1.0), Err(Error::Parameter { .. })));
 }
+
+#[test]
+fn normals_point_to_where_gaps_open() {
+    for from_above in [true, false] {
+        let along = if from_above { 1.0 } else { -1.0 };
+        let plates = Stack::new(plates(3, 4), 0.01, |x| x);
+        let blocks = Stack::new(blocks([3, 3, 1], [2, 2, 1]), 0.01, |x| x);
+        let normals = |contact: &mut Mortar<f64>, dofs: usize| {
+            contact.search(0.0, &vec![0.0; dofs], &vec![0.0; dofs], 0.0).unwrap();
+            let contacts = Contacts::of(contact);
+            (0..contacts.len()).map(|row| contacts.normal(row).unwrap()).collect::<Vec<_>>()
+        };
+        let mut in_plane = mortar(&plates, from_above);
+        let mut in_space = mortar(&blocks, from_above);
+        let dofs = [&in_plane, &in_space].map(|contact| contact.dofs().len());
+        for (found, axis) in [(normals(&mut in_plane, dofs[0]), 1), (normals(&mut in_space, dofs[1]), 2)] {
+            assert!(found.len() >= 4, "{}", found.len());
+            for normal in found {
+                let rest: f64 = (0..3).filter(|k| *k != axis).map(|k| normal[k].abs()).sum();
+                assert!((normal[axis] - along).abs() < 1e-12 && rest < 1e-12, "{from_above}: {normal:?}");
+            }
+        }
+    }
+}

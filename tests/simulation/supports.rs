@@ -292,3 +292,19 @@ fn supports_that_start_nowhere_are_refused() {
         }
     }
 }
+
+/// A support that accelerates from the start pulls by the mass that it shares with its neighbor.
+#[test]
+fn the_acceleration_of_a_support_is_felt_at_the_start() {
+    let (m, acceleration) = (3.0, 7.0);
+    for (kind, shared) in [(Kind::Lumped, 0.0), (Kind::Consistent, m / 6.0)] {
+        let own = if kind == Kind::Lumped { m / 2.0 } else { m / 3.0 };
+        let system = bar(1, 5.0, m, kind)
+            .drive(0, move |t| [0.5 * acceleration * t * t, acceleration * t, acceleration])
+            .unwrap();
+        let run = Simulation::builder(system, Newmark::trapezoidal(), 1e-3).build().unwrap();
+        let a = run.state().acceleration();
+        assert_relative_eq!(a[0], acceleration);
+        assert_relative_eq!(a[1], -shared / own * acceleration);
+    }
+}

@@ -3,6 +3,7 @@
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
+use contact_dynamics_scenes::truth::Bodies;
 
 /// Columns as in `rigid.rs`.
 const TABLE: &str = "\
@@ -47,7 +48,7 @@ fn runs_with_friction_are_those_of_the_truth() {
         law: ContactLaw::Rigid,
         mixed: false,
         rubs: true,
-        hardens: false,
+        bodies: Bodies::Linear,
         seeds: 6,
     };
     let swept = sweep.run();

@@ -3,6 +3,7 @@
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
+use contact_dynamics_scenes::truth::Bodies;
 
 /// With stiffnesses in units of a spring of the scene, and the mass in those of k h².
 const LAWS: [ContactLaw; 8] = [
@@ -95,7 +96,7 @@ fn table(laws: &[ContactLaw], rubs: bool) -> String {
     let mut lines: Vec<[String; 2]> = Vec::new();
     let mut worst = 0.0_f64;
     for &law in laws {
-        let swept = Sweep { corrections: &CORRECTIONS, law, mixed: true, rubs, hardens: false, seeds: 3 }.run();
+        let swept = Sweep { corrections: &CORRECTIONS, law, mixed: true, rubs, bodies: Bodies::Linear, seeds: 3 }.run();
         worst = worst.max(swept.worst);
         for (i, line) in swept.table.lines().enumerate() {
             let (flags, name) = line.split_once(' ').expect("flags and a name");

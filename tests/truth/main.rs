@@ -5,6 +5,7 @@
 
 mod friction;
 mod laws;
+mod massless;
 mod newton;
 mod rigid;
 mod sweep;

@@ -5,6 +5,7 @@ use crate::rigid;
 use crate::sweep::{ALONG_PATHS, Sweep};
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
+use contact_dynamics_scenes::truth::Bodies;
 
 #[test]
 fn runs_by_newtons_method_are_those_of_the_truth() {
@@ -14,7 +15,7 @@ fn runs_by_newtons_method_are_those_of_the_truth() {
             law: ContactLaw::Rigid,
             mixed: false,
             rubs,
-            hardens: true,
+            bodies: Bodies::Hardening,
             seeds: 3,
         };
         let swept = sweep.run();

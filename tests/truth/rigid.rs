@@ -3,6 +3,7 @@
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
+use contact_dynamics_scenes::truth::Bodies;
 
 /// One column a correction, in the order of `Correction::ALL`: none, λ_v/λ_a, the same with the past projected, release
 /// after it, Taylor–Papadopoulos, splitting, contact-implicit, contact-stabilized, the same on closed contacts,
@@ -49,7 +50,7 @@ fn runs_are_those_of_the_truth() {
         law: ContactLaw::Rigid,
         mixed: false,
         rubs: false,
-        hardens: false,
+        bodies: Bodies::Linear,
         seeds: 6,
     };
     let swept = sweep.run();

@@ -3,7 +3,7 @@
 use contact_dynamics::{ContactLaw, Error};
 use contact_dynamics_scenes::combinations::Correction;
 use contact_dynamics_scenes::schemes;
-use contact_dynamics_scenes::truth::{Compared, Kind, Outcome, Setting, compare};
+use contact_dynamics_scenes::truth::{Bodies, Compared, Kind, Outcome, Setting, compare};
 use std::fmt::Write;
 
 /// Largest difference, over the size of what is compared.
@@ -22,8 +22,7 @@ pub(crate) struct Sweep<'c> {
     /// Whether every other row is rigid.
     pub(crate) mixed: bool,
     pub(crate) rubs: bool,
-    /// Whether springs harden.
-    pub(crate) hardens: bool,
+    pub(crate) bodies: Bodies,
     pub(crate) seeds: u64,
 }
 
@@ -69,7 +68,7 @@ impl Sweep<'_> {
         let mut swept = Swept { table: String::new(), pairs: Vec::new(), worst: 0.0 };
         let mut differences = Vec::new();
         // (Forces along a path, of cubic springs, are no part of the truth.)
-        let is_told = |listed: &schemes::Listed| !(self.hardens && listed.name() == ALONG_PATHS);
+        let is_told = |listed: &schemes::Listed| !(self.bodies == Bodies::Hardening && listed.name() == ALONG_PATHS);
         for listed in schemes::all().into_iter().filter(is_told) {
             let mut flags = String::new();
             for &correction in self.corrections {
@@ -99,13 +98,17 @@ impl Sweep<'_> {
                 continue;
             }
             for seed in 0..self.seeds {
-                let Self { law, mixed, rubs, hardens, .. } = *self;
-                let scene = Setting { kind, critical: listed.critical, law, mixed, rubs, hardens }.scene(seed);
+                let Self { law, mixed, rubs, bodies, .. } = *self;
+                let scene = Setting { kind, critical: listed.critical, law, mixed, rubs, bodies }.scene(seed);
                 let place = format!("{}, {law:?}, {kind:?} {seed}", pair.name);
                 match compare(&scene, listed.make, correction, STEPS) {
                     // (Where friction holds bodies at rest increments are rounding, which never becomes small beside
                     // the whole one: with the tolerances of users, which are wider, these runs go on.)
-                    Err(Error::NewtonNotConverged { .. }) if hardens && rubs && kind == Kind::Rest => {}
+                    Err(Error::NewtonNotConverged { .. })
+                        if bodies == Bodies::Hardening && rubs && kind == Kind::Rest => {}
+                    // (Explicit stages know where bodies will be: a dof without mass between two of them may find no room.)
+                    Err(Error::ContradictoryContacts { .. })
+                        if bodies == Bodies::Massless && listed.critical.is_some() => {}
                     Err(error) => differences.push(format!("{place}: {error}")),
                     Ok(Outcome::Refused(_)) => {
                         pair.refused += 1;

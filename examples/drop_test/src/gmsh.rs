@@ -65,17 +65,24 @@ pub fn read(path: &Path, unit: f64) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Refuses what is no Gmsh file of format 4.1, with the way to make it one.
+/// Refuses what is no Gmsh file of format 4.1, with the way to make it one, and numbers in the head of the file that the
+/// parser takes for granted.
 fn check_format(bytes: &[u8]) -> std::result::Result<(), String> {
-    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(64)]);
-    let mut lines = head.lines();
-    if lines.next().map(str::trim) != Some("$MeshFormat") {
+    let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
+    if lines.next().is_none_or(|line| line.trim() != "$MeshFormat") {
         return Err("is no Gmsh mesh: it does not begin with $MeshFormat".into());
     }
-    match lines.next().and_then(|line| line.split_whitespace().next()) {
-        Some("4.1") => Ok(()),
-        other => {
-            let version = other.unwrap_or("unknown");
+    let line = lines.next().unwrap_or_default();
+    let words: Vec<&str> = line.split_whitespace().collect();
+    match words[..] {
+        ["4.1", "0" | "1", "4" | "8"] => Ok(()),
+        ["4.1", ..] => {
+            Err("is damaged: its second line says neither `4.1 0 8` nor, for a binary file, `4.1 1 8`; write \
+                            it again with `gmsh -3 MODEL.geo -format msh41`"
+                .into())
+        }
+        _ => {
+            let version = words.first().copied().unwrap_or("unknown");
             Err(format!(
                 "is of Gmsh's format {version}: write format 4.1, with `gmsh IN.msh -save -format msh41 -o OUT.msh`"
             ))

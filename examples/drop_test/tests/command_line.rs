@@ -243,6 +243,9 @@ fn bad_input_is_refused_with_what_to_do() {
     refused(&["--restart", "gone.bin", "--friction", "0.1"], "cannot be used with");
     refused(&[&file("text.msh", "solid cube")], "is no Gmsh mesh");
     refused(&[&file("old.msh", &good.replace("4.1 0 8", "2.2 0 8"))], "format 2.2");
+    for head in ["4.1 0 8999999999999999999999", "4.1 0 3", "4.1 7 8", "4.1 0"] {
+        refused(&[&file("head.msh", &good.replace("4.1 0 8", head))], "its second line");
+    }
     refused(&[&file("short.msh", &good[..good.len() / 2])], "is damaged");
     refused(
         &[&file("flat.msh", &good.replace("3 1 5 1\n1 1 2", "3 1 5 1\n1 2 1"))],

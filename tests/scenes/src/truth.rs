@@ -14,7 +14,7 @@ mod stage;
 mod start;
 
 pub use against::{Compared, Deviation, Outcome, compare};
-pub use chance::{Kind, Setting};
+pub use chance::{Bodies, Kind, Setting};
 pub use scene::{Offset, Row, Scene};
 
 use crate::combinations::Correction;
@@ -55,6 +55,8 @@ pub struct Truth<'s> {
     /// The states that are known, the newest first.
     past: Vec<Motion>,
     contacts: Contacts,
+    /// Displacement of the last step over its size, of dofs without mass.
+    slopes: Vec<f64>,
     steps: u32,
 }
 
@@ -69,13 +71,15 @@ struct Place<'p> {
     /// States made in this step, this one included: behind them comes the state that the step starts from.
     made: usize,
     closed_at_start: &'p [bool],
+    slopes: &'p [f64],
 }
 
 impl<'s> Truth<'s> {
     pub fn new(scene: &'s Scene, scheme: &dyn TimeIntegrator, correction: Correction) -> Self {
         let tableau = scheme.tableau();
         let (past, contacts) = start::begin(scene, &tableau, correction);
-        Self { scene, tableau, correction, past, contacts, steps: 0 }
+        let slopes = past[0].v.clone();
+        Self { scene, tableau, correction, past, contacts, slopes, steps: 0 }
     }
 
     /// The newest state.
@@ -98,6 +102,7 @@ impl<'s> Truth<'s> {
         let closed_at_start = self.contacts.closed.clone();
         let before = self.contacts.forces.clone();
         let mut reported = before[..self.scene.rows.len()].to_vec();
+        let slopes = self.slopes.clone();
         for (s, stage) in tableau.stages.iter().enumerate() {
             let last = self.tableau.stages.len() - 1;
             let reads = history::reads_after(&self.tableau, if starts { last } else { s });
@@ -109,6 +114,7 @@ impl<'s> Truth<'s> {
                 is_last: s + 1 == stages,
                 made: s + 1,
                 closed_at_start: &closed_at_start,
+                slopes: &slopes,
             };
             if !place.is_first {
                 // A contact that opens within the step keeps the last force that was reported of it.
@@ -120,6 +126,8 @@ impl<'s> Truth<'s> {
         }
         // States between stages are forgotten.
         self.past.drain(1..stages);
+        let ways = self.past[0].u.iter().zip(&self.past[1].u);
+        self.slopes = ways.map(|(now, before)| (now - before) / self.scene.h).collect();
         self.past.truncate(depth);
         self.steps += 1;
     }

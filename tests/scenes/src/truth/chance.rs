@@ -23,6 +23,17 @@ impl Kind {
     pub const ALL: [Self; 4] = [Self::Bounce, Self::Press, Self::Rest, Self::Flight];
 }
 
+/// What bodies are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bodies {
+    /// Masses and springs.
+    Linear,
+    /// Springs harden; nothing is damped.
+    Hardening,
+    /// Some dofs have no mass.
+    Massless,
+}
+
 /// What a scene is made for.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
@@ -35,14 +46,13 @@ pub struct Setting {
     pub mixed: bool,
     /// Whether dofs are those of nodes in the plane, and contacts rub.
     pub rubs: bool,
-    /// Whether springs harden; nothing is damped then.
-    pub hardens: bool,
+    pub bodies: Bodies,
 }
 
 impl Setting {
     /// Rigid contacts without friction.
     pub fn rigid(kind: Kind, critical: Option<f64>) -> Self {
-        Self { kind, critical, law: ContactLaw::Rigid, mixed: false, rubs: false, hardens: false }
+        Self { kind, critical, law: ContactLaw::Rigid, mixed: false, rubs: false, bodies: Bodies::Linear }
     }
 
     /// The scene of a seed.
@@ -51,9 +61,18 @@ impl Setting {
         let mut random = Congruential(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
         (0..4).for_each(|_| _ = random.unit());
         let n = if self.rubs { 4 + 2 * (seed % 2) as usize } else { 3 + (seed % 4) as usize };
-        let [mass, stiffness] = bodies(n, self.rubs, kind, seed % 3 == 1, &mut random);
-        let damping = (seed % 2 == 1 && kind != Kind::Flight && !self.hardens).then(|| {
+        let [mut mass, stiffness] = bodies(n, self.rubs, kind, seed % 3 == 1, &mut random);
+        if self.bodies == Bodies::Massless {
+            let without: &[usize] = [&[0][..], &[1], &[0, 2], &[0, 1]][(seed % 4) as usize];
+            for &dof in without {
+                mass.iter_mut().for_each(|row| row[dof] = 0.0);
+                mass[dof].fill(0.0);
+            }
+        }
+        let damping = (seed % 2 == 1 && kind != Kind::Flight && self.bodies != Bodies::Hardening).then(|| {
             let (alpha, beta) = (random.within(0.0, 0.3), random.within(0.0005, 0.003));
+            // (What is damped without a mass, and touches from the start, begins out of balance.)
+            let beta = if self.bodies == Bodies::Massless && kind == Kind::Rest { 0.0 } else { beta };
             let entry = |i: usize, j: usize| alpha * mass[i][j] + beta * stiffness[i][j];
             (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
         });
@@ -79,7 +98,7 @@ impl Setting {
         };
         self.put_rows(&mut scene, &mut random);
         self.put_motion(&mut scene, &mut random);
-        if self.hardens {
+        if self.bodies == Bodies::Hardening {
             self.put_cubic(&mut scene, &mut random);
         }
         if kind == Kind::Flight && seed.is_multiple_of(2) {
@@ -177,7 +196,9 @@ impl Setting {
                 for row in &scene.rows {
                     let push = random.within(0.2, 1.0) / h;
                     for (i, g) in row.g.iter().enumerate() {
-                        scene.constant[i] -= 0.3 * push * g;
+                        // (Contacts without mass that close at the start, with a velocity, are none at rest.)
+                        let waits = self.kind == Kind::Press && scene.mass[i][i] <= 0.0;
+                        scene.constant[i] -= if waits { 0.0 } else { 0.3 * push * g };
                         scene.amplitude[i] -= push * g;
                     }
                     if let Some((coefficient, tangent)) = &row.friction {
@@ -256,5 +277,7 @@ fn in_units(law: ContactLaw, scene: &Scene) -> ContactLaw {
 fn highest(mass: &Matrix, stiffness: &Matrix) -> f64 {
     let rows = |a: &Matrix| a.iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
     let least = mass.iter().enumerate().map(|(i, row)| 2.0 * row[i] - row.iter().map(|x| x.abs()).sum::<f64>());
+    // (Dofs without mass follow the others.)
+    let least = least.filter(|least| *least > 0.0);
     (rows(stiffness) / least.fold(f64::INFINITY, f64::min)).sqrt()
 }

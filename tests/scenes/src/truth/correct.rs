@@ -58,7 +58,8 @@ pub fn correct(
     (past, contacts): (&mut Vec<Motion>, &mut Contacts),
 ) {
     let rigid = |i: &usize| !scene.rows[*i].law.is_compliant();
-    let closed = (0..scene.rows.len()).filter(rigid).filter(|&i| contacts.closed[i]).collect();
+    // (Nothing stops at once where there is no mass.)
+    let closed = (0..scene.rows.len()).filter(rigid).filter(|&i| contacts.closed[i] && !scene.is_static(i)).collect();
     let rows = place.stage.recovery.each();
     let mut step = Step {
         scene,
@@ -210,10 +211,12 @@ impl Step<'_> {
         }
         let Some(damping) = scene.damping.as_ref().filter(|_| change.iter().any(|x| x.abs() > 0.0)) else { return };
         let mut force = product(damping, &change);
-        if self.place.reads.iter().any(|[.., a]| *a) {
+        if self.place.reads.iter().any(|[.., a]| *a) || scene.damps_massless() {
             let mut matrix = self.before.matrix.clone();
             scene.hold(&mut matrix, &mut force);
-            let response = solve(matrix, force).expect("an effective matrix that is regular");
+            let mut response = solve(matrix, force).expect("an effective matrix that is regular");
+            // (They respond, and have no acceleration.)
+            scene.massless().into_iter().for_each(|dof| response[dof] = 0.0);
             add(&mut new.a, -self.place.stage.balance.a.z / (h * h), &response);
         } else {
             add(&mut new.a, -1.0, &scene.accelerate(&force));
@@ -365,7 +368,8 @@ impl Step<'_> {
     fn released(&self) -> Vec<usize> {
         let opens = |&i: &usize| {
             let closed = self.before.was_closed[i] || self.place.closed_at_start[i];
-            self.place.is_last && closed && !self.contacts.closed[i] && !self.scene.rows[i].law.is_compliant()
+            let corrects = !self.scene.rows[i].law.is_compliant() && !self.scene.is_static(i);
+            self.place.is_last && closed && !self.contacts.closed[i] && corrects
         };
         (0..self.scene.rows.len()).filter(opens).collect()
     }

@@ -118,10 +118,29 @@ impl Scene {
         k
     }
 
-    /// M⁻¹ f on the dofs that are free.
+    /// Dofs without mass.
+    pub fn massless(&self) -> Vec<usize> {
+        (0..self.dofs()).filter(|&dof| self.mass[dof][dof] <= 0.0).collect()
+    }
+
+    /// Whether damping acts on dofs without mass.
+    pub fn damps_massless(&self) -> bool {
+        let damps = |damping: &Matrix| self.massless().iter().any(|&dof| damping[dof].iter().any(|c| c.abs() > 0.0));
+        self.damping.as_ref().is_some_and(damps)
+    }
+
+    /// Whether a row acts on dofs without mass.
+    pub fn is_static(&self, row: usize) -> bool {
+        self.massless().iter().any(|&dof| self.rows[row].g[dof].abs() > 0.0)
+    }
+
+    /// M⁻¹ f on the dofs that are free and have a mass.
     pub fn accelerate(&self, f: &[f64]) -> Vec<f64> {
         let (mut mass, mut f) = (self.mass.clone(), f.to_vec());
         self.hold(&mut mass, &mut f);
+        for dof in self.massless() {
+            (mass[dof][dof], f[dof]) = (1.0, 0.0);
+        }
         solve(mass, f).expect("a mass that is positive definite")
     }
 

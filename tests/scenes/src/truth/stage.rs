@@ -4,6 +4,7 @@
 use super::dense::{Matrix, add, dot, product, size, solve as solve_dense, zeros};
 use super::problem::{Contact, Friction, Problem};
 use super::rows::{Affine, Target, motion, target};
+use super::start::settle;
 use super::{Contacts, Motion, Place, Scene};
 use crate::combinations::Correction;
 use contact_dynamics::ContactLaw;
@@ -57,6 +58,8 @@ struct Stage<'s> {
     t_new: f64,
     /// The solution without contact.
     free: Vec<f64>,
+    /// Whether dofs without mass have been settled already, with the contacts that act on them.
+    follows: bool,
 }
 
 pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Contacts, correction: Correction) -> Solved {
@@ -78,9 +81,21 @@ pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Conta
         add(&mut new[0].known, 1.0, &shift);
         add(&mut balance[0].known, stage.balance.u.z / stage.recovery.u.z, &shift);
     }
-    let (mut matrix, free) = balanced(scene, &balance, t_balance, &vec![0.0; scene.dofs()]);
+    // Where the displacements of the others are known, those without mass follow before anything else is solved for.
+    let follows = !scene.massless().is_empty() && stage.recovery.u.z.abs() <= 0.0;
+    let mut pressed = Vec::new();
+    if follows {
+        let mut u = new[0].known.clone();
+        pressed = settle(scene, &mut u, t_balance, t_new);
+        for dof in scene.massless() {
+            (new[0].known[dof], balance[0].known[dof]) = (u[dof], u[dof]);
+        }
+    }
+    let mut given = vec![0.0; scene.dofs()];
+    pressed.iter().for_each(|(i, force)| add(&mut given, *force, &scene.rows[*i].g));
+    let (mut matrix, free) = balanced(scene, &balance, (t_balance, &given), &vec![0.0; scene.dofs()]);
     let target = target(stage, past, scene, place.t);
-    let mut work = Stage { scene, place, past, new, balance, target, t_balance, t_new, free };
+    let mut work = Stage { scene, place, past, new, balance, target, t_balance, t_new, free, follows };
     if let (Correction::Stabilized | Correction::StabilizedClosed, None) = (correction, &work.target.forecast) {
         work.target.values = work.new[0].clone();
     }
@@ -101,24 +116,26 @@ pub fn solve(scene: &Scene, place: &Place<'_>, past: &[Motion], contacts: &Conta
                 solve_dense(a, f).expect("an effective matrix that is regular")
             })
             .collect();
-        let raw = work.multipliers(forms.clone(), &responses);
+        let mut raw = work.multipliers(forms.clone(), &responses);
         let before = std::mem::replace(&mut z, work.free.clone());
         raw.iter().zip(&responses).for_each(|(r, response)| add(&mut z, *r, response));
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
         let mut moved = z.clone();
         add(&mut moved, -1.0, &before);
         steps += 1;
+        pressed.iter().for_each(|(i, force)| raw[*i] = *force);
         if scene.cubic.is_empty() || largest(&moved) <= 4.0 * f64::EPSILON * largest(&z) || steps == 40 {
             return work.finish(&forms, &z, raw, matrix);
         }
-        (matrix, work.free) = balanced(scene, &work.balance, t_balance, &z);
+        (matrix, work.free) = balanced(scene, &work.balance, (t_balance, &given), &z);
     }
 }
 
-/// The effective matrix about some z, and z without contact.
-fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], t: f64, z: &[f64]) -> (Matrix, Vec<f64>) {
+/// The effective matrix about some z, and z without contact but for forces that are given.
+fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], (t, given): (f64, &[f64]), z: &[f64]) -> (Matrix, Vec<f64>) {
     let n = scene.dofs();
     let mut f = scene.force(t, &u.at(z), &v.at(z));
+    add(&mut f, 1.0, given);
     add(&mut f, -1.0, &product(&scene.mass, &a.at(z)));
     let stiffness = scene.stiffness_at(&u.at(z));
     let mut matrix = zeros(n, n);
@@ -127,6 +144,9 @@ fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], t: f64, z: &[f64]) -> (Matri
             let damping = scene.damping.as_ref().map_or(0.0, |c| c[i][j]);
             *entry = stiffness[i][j] * u.weight[j] + damping * v.weight[j] + scene.mass[i][j] * a.weight[j];
         }
+    }
+    for dof in scene.massless().into_iter().filter(|_| u.weight.iter().all(|weight| weight.abs() <= 0.0)) {
+        (matrix[dof][dof], f[dof]) = (1.0, 0.0);
     }
     scene.hold(&mut matrix, &mut f);
     let mut free = solve_dense(matrix.clone(), f).expect("an effective matrix that is regular");
@@ -143,7 +163,7 @@ fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool],
     }
     let rows: Vec<usize> = (0..scene.rows.len())
         .filter(|&i| matches!(scene.rows[i].law, ContactLaw::Rigid | ContactLaw::Equality))
-        .filter(|&i| correction == Correction::Stabilized || closed[i])
+        .filter(|&i| (correction == Correction::Stabilized || closed[i]) && !scene.is_static(i))
         .collect();
     let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
     let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
@@ -227,6 +247,9 @@ impl Stage<'_> {
 
     /// Whether a contact may press: where velocities are constrained if its gap is forecast to be closed.
     fn enables(&self, i: usize) -> bool {
+        if self.follows && self.scene.is_static(i) {
+            return false;
+        }
         let Some((u, t)) = &self.target.forecast else { return true };
         let row = &self.scene.rows[i];
         let x = self.target.values.at(&self.free);
@@ -325,12 +348,22 @@ impl Stage<'_> {
     /// The state at z, and which contacts are closed.
     fn finish(&self, forms: &[Form], z: &[f64], raw: Vec<f64>, matrix: Matrix) -> Solved {
         let (scene, h, t) = (self.scene, self.scene.h, self.t_new);
-        let [u, v, a] = [0, 1, 2].map(|field| self.new[field].at(z));
+        let [u, mut v, mut a] = [0, 1, 2].map(|field| self.new[field].at(z));
+        for dof in scene.massless() {
+            // The parabola through the displacements now, where the step starts, and a step before that.
+            let since = self.place.stage.end * h;
+            let newest = (u[dof] - self.past[self.place.made - 1].u[dof]) / since;
+            (v[dof], a[dof]) = (newest + since / (since + h) * (newest - self.place.slopes[dof]), 0.0);
+        }
         let (mut closed, mut slides) = (Vec::new(), Vec::new());
         for (i, row) in scene.rows.iter().enumerate() {
             let form = &forms[i];
             let tolerance = form.noise + 1e-10 * h * scene.rate(i, t, &v).abs();
-            let touches = form.enabled && form.at(z) <= tolerance && !row.law.is_compliant();
+            let touches = match self.follows && scene.is_static(i) {
+                // (Of these the gap of the state is constrained.)
+                true => scene.gap(i, t, &u) <= scene.rounding(i, t, &u) + 1e-10 * h * scene.rate(i, t, &v).abs(),
+                false => form.enabled && form.at(z) <= tolerance && !row.law.is_compliant(),
+            };
             closed.push(raw[i] > 0.0 || touches || row.law == ContactLaw::Equality);
             slides.push(match (&row.friction, scene.tangent(i)) {
                 (Some((coefficient, tangent)), Some(k)) => {

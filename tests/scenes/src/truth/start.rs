@@ -1,7 +1,7 @@
 //! The state at the start, and the past that a multistep scheme reads (theory, section 2.4).
 
 use super::correct::leaves_smooth_motion;
-use super::dense::{Matrix, add, dot, product, size};
+use super::dense::{Matrix, add, dot, product, size, solve};
 use super::problem::{Contact, Friction, Problem};
 use super::stage::is_at_bound;
 use super::{Contacts, Motion, Scene, history};
@@ -16,6 +16,12 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
     if let Some((dof, [u, v, a])) = scene.driven(0.0) {
         (now.u[dof], now.v[dof], now.a[dof]) = (u, v, a);
     }
+    let pressed = if scene.damps_massless() {
+        balance_rates(scene, &now.u, &mut now.v);
+        Vec::new()
+    } else {
+        settle(scene, &mut now.u, 0.0, 0.0)
+    };
     let mut f = scene.force(0.0, &now.u, &now.v);
     add(&mut f, -1.0, &product(&scene.mass, &now.a));
     let driven = now.a.clone();
@@ -33,6 +39,11 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
         };
         (raw[i], closed[i]) = (force, force > 0.0);
     }
+    for (i, force) in pressed {
+        raw[i] = force;
+        closed[i] =
+            force > 0.0 || scene.rows[i].law == ContactLaw::Equality || gaps[i] <= scene.rounding(i, 0.0, &now.u);
+    }
     push(scene, &raw, 1.0, &mut now.a);
     let (rigid, resting, stopped) = rigid_forces(scene, tableau, &now, &gaps);
     for (i, force) in rigid.iter().enumerate() {
@@ -44,7 +55,7 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
     push(scene, &rigid, 1.0, &mut now.a);
     if leaves_smooth_motion(correction) {
         let jumps = |(i, force): (usize, &f64)| {
-            let springs = scene.rows.get(i).is_some_and(|row| row.law.is_compliant());
+            let springs = scene.rows.get(i).is_some_and(|row| row.law.is_compliant() || scene.is_static(i));
             if springs { 0.0 } else { *force }
         };
         let jumps: Vec<f64> = rigid.iter().enumerate().map(jumps).collect();
@@ -66,6 +77,43 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
     let slides = (0..rows).map(slides).collect();
     let contacts = Contacts { forces: raw.clone(), raw, closed, slides, taken: vec![0.0; rows], gaps };
     (states, contacts)
+}
+
+/// What some dofs do under forces, by their part of a matrix; the others stay.
+fn answer(matrix: &Matrix, dofs: &[usize], f: &[f64]) -> Vec<f64> {
+    let part = dofs.iter().map(|&i| dofs.iter().map(|&j| matrix[i][j]).collect()).collect();
+    let found = solve(part, dofs.iter().map(|&dof| f[dof]).collect()).expect("a matrix that is regular");
+    let mut x = vec![0.0; f.len()];
+    dofs.iter().zip(found).for_each(|(&dof, found)| x[dof] = found);
+    x
+}
+
+/// Damped dofs without mass begin where they are, with the velocities that balance asks for. (No contact acts on them.)
+fn balance_rates(scene: &Scene, u: &[f64], v: &mut [f64]) {
+    let Some(damping) = &scene.damping else { return };
+    let change = answer(damping, &scene.massless(), &scene.force(0.0, u, v));
+    add(v, 1.0, &change);
+}
+
+/// Brings dofs without mass into balance, 0 = f_b + G_bᵀ λ with 0 ≤ g ⊥ λ ≥ 0, with the load and the gaps of given
+/// times. Returns the multipliers of the rows that act on them.
+pub fn settle(scene: &Scene, u: &mut [f64], t_load: f64, t: f64) -> Vec<(usize, f64)> {
+    let dofs = scene.massless();
+    let rows: Vec<usize> = (0..scene.rows.len()).filter(|&i| scene.is_static(i)).collect();
+    let follow = |f: &[f64]| answer(&scene.stiffness, &dofs, f);
+    let free = follow(&scene.force(t_load, u, &vec![0.0; u.len()]));
+    add(u, 1.0, &free);
+    let responses: Vec<Vec<f64>> = rows.iter().map(|&i| follow(&scene.rows[i].g)).collect();
+    let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
+    let problem = Problem {
+        contacts: rows.iter().map(|&i| Contact { held: held(i), friction: None }).collect(),
+        w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
+        q: rows.iter().map(|&i| scene.gap(i, t, u)).collect(),
+        noise: rows.iter().map(|&i| scene.rounding(i, t, u)).collect(),
+    };
+    let forces = problem.solve();
+    forces.iter().zip(&responses).for_each(|(force, response)| add(u, *force, response));
+    rows.into_iter().zip(forces).collect()
 }
 
 /// The state a time earlier, on a straight line or by Taylor's expansion.
@@ -159,7 +207,7 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
         (_, true) => (dot(tangent, &ahead) - dot(tangent, &now.u)) / (0.5 * lead * lead),
         (_, false) => dot(tangent, &now.a),
     };
-    let taken: Vec<usize> = (0..rows.len()).filter(|&i| asks(i).is_some()).collect();
+    let taken: Vec<usize> = (0..rows.len()).filter(|&i| !scene.is_static(i) && asks(i).is_some()).collect();
     let tangents: Vec<usize> = taken.iter().filter_map(|&i| scene.tangent(i)).collect();
     let axes = scene.axes();
     let all: Vec<usize> = taken.iter().chain(&tangents).copied().collect();
