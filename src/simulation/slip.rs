@@ -43,7 +43,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
         let tangents = self.constraints.tangents();
         for row in tangents.contacts() {
-            let is_massless = !rows.massless.is_empty() && self.g.acts_on(row, &rows.massless);
+            let is_massless = tangents.act_on(self.g, row, &rows.massless);
             let (_, weight) = source(self.stage, is_massless || rows.slides_by_way);
             // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
             let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
@@ -83,7 +83,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         constraints.finite_slip_rates(t, &new.u, &new.v, slips)?;
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
-            let is_massless = !massless.is_empty() && g.acts_on(row, massless);
+            let is_massless = tangents.act_on(g, row, massless);
             let (source, weight) = source(stage, is_massless || *slides_by_way);
             for k in tangents.of(row) {
                 let own = slips[k - tangents.all().start].rate;

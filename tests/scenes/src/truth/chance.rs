@@ -63,7 +63,9 @@ impl Setting {
         let n = if self.rubs { 4 + 2 * (seed % 2) as usize } else { 3 + (seed % 4) as usize };
         let [mut mass, stiffness] = bodies(n, self.rubs, kind, seed % 3 == 1, &mut random);
         if self.bodies == Bodies::Massless {
-            let without: &[usize] = [&[0][..], &[1], &[0, 2], &[0, 1]][(seed % 4) as usize];
+            // (In the plane one of two nodes at least has a mass along each axis.)
+            let apart: &[usize] = if self.rubs { &[0, 3] } else { &[0, 2] };
+            let without = [&[0][..], &[1], apart, &[0, 1]][(seed % 4) as usize];
             for &dof in without {
                 mass.iter_mut().for_each(|row| row[dof] = 0.0);
                 mass[dof].fill(0.0);

@@ -59,7 +59,7 @@ pub fn correct(
 ) {
     let rigid = |i: &usize| !scene.rows[*i].law.is_compliant();
     // (Nothing stops at once where there is no mass.)
-    let closed = (0..scene.rows.len()).filter(rigid).filter(|&i| contacts.closed[i] && !scene.is_static(i)).collect();
+    let closed = (0..scene.rows.len()).filter(rigid).filter(|&i| contacts.closed[i] && scene.has_mass(i)).collect();
     let rows = place.stage.recovery.each();
     let mut step = Step {
         scene,
@@ -368,7 +368,7 @@ impl Step<'_> {
     fn released(&self) -> Vec<usize> {
         let opens = |&i: &usize| {
             let closed = self.before.was_closed[i] || self.place.closed_at_start[i];
-            let corrects = !self.scene.rows[i].law.is_compliant() && !self.scene.is_static(i);
+            let corrects = !self.scene.rows[i].law.is_compliant() && self.scene.has_mass(i);
             self.place.is_last && closed && !self.contacts.closed[i] && corrects
         };
         (0..self.scene.rows.len()).filter(opens).collect()

@@ -129,9 +129,20 @@ impl Scene {
         self.damping.as_ref().is_some_and(damps)
     }
 
+    /// Whether an axis acts on dofs without mass.
+    pub fn acts_on_massless(&self, axis: &[f64]) -> bool {
+        self.massless().iter().any(|&dof| axis[dof].abs() > 0.0)
+    }
+
     /// Whether a row acts on dofs without mass.
     pub fn is_static(&self, row: usize) -> bool {
-        self.massless().iter().any(|&dof| self.rows[row].g[dof].abs() > 0.0)
+        self.acts_on_massless(&self.rows[row].g)
+    }
+
+    /// Whether impulses of a contact reach all that it acts on, by its gap and its friction.
+    pub fn has_mass(&self, row: usize) -> bool {
+        let rubs = |(_, tangent): &(f64, Vec<f64>)| self.acts_on_massless(tangent);
+        !self.is_static(row) && !self.rows[row].friction.as_ref().is_some_and(rubs)
     }
 
     /// M⁻¹ f on the dofs that are free and have a mass.

@@ -163,7 +163,7 @@ fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool],
     }
     let rows: Vec<usize> = (0..scene.rows.len())
         .filter(|&i| matches!(scene.rows[i].law, ContactLaw::Rigid | ContactLaw::Equality))
-        .filter(|&i| (correction == Correction::Stabilized || closed[i]) && !scene.is_static(i))
+        .filter(|&i| (correction == Correction::Stabilized || closed[i]) && scene.has_mass(i))
         .collect();
     let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
     let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
@@ -260,6 +260,8 @@ impl Stage<'_> {
 
     fn tangential(&self, i: usize, by_way: bool) -> Option<Form> {
         let (_, tangent) = self.scene.rows[i].friction.as_ref()?;
+        // (Where there is no mass the velocity is differenced afterwards.)
+        let by_way = by_way || !self.scene.has_mass(i);
         let stage = self.place.stage;
         let x = if self.target.forecast.is_some() {
             self.target.values.clone()
