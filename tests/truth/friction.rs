@@ -49,6 +49,7 @@ fn runs_with_friction_are_those_of_the_truth() {
         mixed: false,
         rubs: true,
         bodies: Bodies::Linear,
+        changes: &[1.0],
         seeds: 6,
     };
     let swept = sweep.run();

@@ -96,7 +96,16 @@ fn table(laws: &[ContactLaw], rubs: bool) -> String {
     let mut lines: Vec<[String; 2]> = Vec::new();
     let mut worst = 0.0_f64;
     for &law in laws {
-        let swept = Sweep { corrections: &CORRECTIONS, law, mixed: true, rubs, bodies: Bodies::Linear, seeds: 3 }.run();
+        let swept = Sweep {
+            corrections: &CORRECTIONS,
+            law,
+            mixed: true,
+            rubs,
+            bodies: Bodies::Linear,
+            changes: &[1.0],
+            seeds: 3,
+        }
+        .run();
         worst = worst.max(swept.worst);
         for (i, line) in swept.table.lines().enumerate() {
             let (flags, name) = line.split_once(' ').expect("flags and a name");

@@ -3,6 +3,7 @@
 //! and friction that goes with it. What is refused is listed here too: a new scheme or correction falls out of the
 //! tables, and fails, until it is written down what it goes with.
 
+mod changes;
 mod friction;
 mod laws;
 mod massless;

@@ -78,6 +78,7 @@ fn runs_with_dofs_without_mass_are_those_of_the_truth() {
         mixed: false,
         rubs: false,
         bodies: Bodies::Massless,
+        changes: &[1.0],
         seeds: 8,
     };
     let swept = sweep.run();
@@ -97,6 +98,7 @@ fn runs_with_friction_there_are_those_of_the_truth() {
         mixed: false,
         rubs: true,
         bodies: Bodies::Massless,
+        changes: &[1.0],
         seeds: 8,
     };
     let swept = sweep.run();

@@ -16,6 +16,7 @@ fn runs_by_newtons_method_are_those_of_the_truth() {
             mixed: false,
             rubs,
             bodies: Bodies::Hardening,
+            changes: &[1.0],
             seeds: 3,
         };
         let swept = sweep.run();

@@ -51,6 +51,7 @@ fn runs_are_those_of_the_truth() {
         mixed: false,
         rubs: false,
         bodies: Bodies::Linear,
+        changes: &[1.0],
         seeds: 6,
     };
     let swept = sweep.run();

@@ -48,8 +48,9 @@ pub struct Contacts {
 
 /// A run.
 #[derive(Debug)]
-pub struct Truth<'s> {
-    scene: &'s Scene,
+pub struct Truth {
+    /// With the present step size.
+    scene: Scene,
     tableau: Tableau,
     correction: Correction,
     /// The states that are known, the newest first.
@@ -57,6 +58,10 @@ pub struct Truth<'s> {
     contacts: Contacts,
     /// Displacement of the last step over its size, of dofs without mass.
     slopes: Vec<f64>,
+    /// The size of the step that has made the newest state.
+    made_with: f64,
+    /// Time until the present step size, and steps taken since.
+    since: f64,
     steps: u32,
 }
 
@@ -72,14 +77,22 @@ struct Place<'p> {
     made: usize,
     closed_at_start: &'p [bool],
     slopes: &'p [f64],
+    made_with: f64,
 }
 
-impl<'s> Truth<'s> {
-    pub fn new(scene: &'s Scene, scheme: &dyn TimeIntegrator, correction: Correction) -> Self {
+impl Truth {
+    pub fn new(scene: &Scene, scheme: &dyn TimeIntegrator, correction: Correction) -> Self {
         let tableau = scheme.tableau();
         let (past, contacts) = start::begin(scene, &tableau, correction);
         let slopes = past[0].v.clone();
-        Self { scene, tableau, correction, past, contacts, slopes, steps: 0 }
+        let (scene, made_with) = (scene.clone(), scene.h);
+        Self { scene, tableau, correction, past, contacts, slopes, made_with, since: 0.0, steps: 0 }
+    }
+
+    /// Changes the size of later steps, of schemes that read no past and store all at the time of the state.
+    pub fn set_step_size(&mut self, h: f64) {
+        self.since += f64::from(self.steps) * self.scene.h;
+        (self.scene.h, self.steps) = (h, 0);
     }
 
     /// The newest state.
@@ -109,12 +122,13 @@ impl<'s> Truth<'s> {
             let place = Place {
                 stage,
                 reads: &reads,
-                t: f64::from(self.steps) * self.scene.h,
+                t: self.since + f64::from(self.steps) * self.scene.h,
                 is_first: s == 0,
                 is_last: s + 1 == stages,
                 made: s + 1,
                 closed_at_start: &closed_at_start,
                 slopes: &slopes,
+                made_with: self.made_with,
             };
             if !place.is_first {
                 // A contact that opens within the step keeps the last force that was reported of it.
@@ -128,6 +142,7 @@ impl<'s> Truth<'s> {
         self.past.drain(1..stages);
         let ways = self.past[0].u.iter().zip(&self.past[1].u);
         self.slopes = ways.map(|(now, before)| (now - before) / self.scene.h).collect();
+        self.made_with = self.scene.h;
         self.past.truncate(depth);
         self.steps += 1;
     }
@@ -136,7 +151,7 @@ impl<'s> Truth<'s> {
         let was_closed = self.contacts.closed.clone();
         let stuck: Vec<bool> =
             self.contacts.slides.iter().zip(&was_closed).map(|(slides, closed)| *closed && !slides).collect();
-        let solved = stage::solve(self.scene, place, &self.past, &self.contacts, self.correction);
+        let solved = stage::solve(&self.scene, place, &self.past, &self.contacts, self.correction);
         self.past.insert(0, solved.motion);
         self.contacts.raw.clone_from(&solved.raw);
         self.contacts.forces = solved.raw;
@@ -149,7 +164,7 @@ impl<'s> Truth<'s> {
         }
         self.contacts.closed = solved.closed;
         correct::correct(
-            self.scene,
+            &self.scene,
             self.correction,
             place,
             correct::Before { was_closed: &was_closed, stuck: &stuck, reported, matrix: &solved.matrix },

@@ -80,6 +80,11 @@ pub fn compare(
     let mut compared = Compared { phases: [1.0, 0.0], ..Compared::default() };
     for step in 0..steps {
         let (before, gaps) = (truth.contacts().closed.clone(), truth.contacts().gaps.clone());
+        let h = scene.h * scene.changes[step % scene.changes.len()];
+        if h.to_bits() != run.step_size().to_bits() {
+            truth.set_step_size(h);
+            twin.set_step_size(h);
+        }
         truth.step();
         twin.step();
         let values = of_truth(&truth);
@@ -87,6 +92,7 @@ pub fn compare(
         if scales.deviation(&of_truth(&twin), &values).size > SENSITIVE {
             break;
         }
+        run.set_step_size(h)?;
         run.step()?;
         pairs.push((of_crate(scene, run.state()), values));
         compared.count(scene, &truth, &before, &gaps);
@@ -102,7 +108,7 @@ pub fn compare(
 }
 
 impl Compared {
-    fn count(&mut self, scene: &Scene, truth: &Truth<'_>, before: &[bool], gaps: &[f64]) {
+    fn count(&mut self, scene: &Scene, truth: &Truth, before: &[bool], gaps: &[f64]) {
         let contacts = truth.contacts();
         self.closed += usize::from(contacts.closed.iter().any(|closed| *closed));
         for (i, (was, is)) in before.iter().zip(&contacts.closed).enumerate() {
@@ -132,7 +138,7 @@ fn of_crate(scene: &Scene, state: &State<f64>) -> Values {
     [u, v, a, forces, contacts.raw_forces().to_vec()]
 }
 
-fn of_truth(truth: &Truth<'_>) -> Values {
+fn of_truth(truth: &Truth) -> Values {
     let (motion, contacts) = (truth.motion(), truth.contacts());
     let raw = contacts.raw[..contacts.closed.len()].to_vec();
     [motion.u.clone(), motion.v.clone(), motion.a.clone(), contacts.forces.clone(), raw]

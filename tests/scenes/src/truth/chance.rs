@@ -95,6 +95,7 @@ impl Setting {
             u: vec![0.0; n],
             v: vec![0.0; n],
             h,
+            changes: vec![1.0],
             start_up: StartUp::Trapezoidal,
             drive: None,
         };

@@ -52,6 +52,8 @@ pub struct Scene {
     pub u: Vec<f64>,
     pub v: Vec<f64>,
     pub h: f64,
+    /// What the sizes of steps are of h, over and over.
+    pub changes: Vec<f64>,
     pub start_up: StartUp,
     /// A dof with a motion of its own.
     pub drive: Option<(usize, Offset)>,

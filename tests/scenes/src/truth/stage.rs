@@ -352,10 +352,11 @@ impl Stage<'_> {
         let (scene, h, t) = (self.scene, self.scene.h, self.t_new);
         let [u, mut v, mut a] = [0, 1, 2].map(|field| self.new[field].at(z));
         for dof in scene.massless() {
-            // The parabola through the displacements now, where the step starts, and a step before that.
+            // The parabola through the displacements now, where the step starts, and where that before it did.
             let since = self.place.stage.end * h;
             let newest = (u[dof] - self.past[self.place.made - 1].u[dof]) / since;
-            (v[dof], a[dof]) = (newest + since / (since + h) * (newest - self.place.slopes[dof]), 0.0);
+            let curve = since / (since + self.place.made_with);
+            (v[dof], a[dof]) = (newest + curve * (newest - self.place.slopes[dof]), 0.0);
         }
         let (mut closed, mut slides) = (Vec::new(), Vec::new());
         for (i, row) in scene.rows.iter().enumerate() {
