@@ -34,8 +34,8 @@ pub(crate) struct Tally {
     kinds: BTreeMap<&'static str, Count>,
     /// By the name of the error: before the first step, and later, with the words of the first.
     refused: BTreeMap<String, ([u64; 2], u64, String)>,
-    /// Scenes in single precision on which nothing acts from outside; those whose momentum changes by more than 3 %, and
-    /// by how much at most if they are run in double precision.
+    /// Scenes in single precision on which nothing acts from outside; those whose momentum changes by more than 3 %,
+    /// and by how much at most if they are run in double precision.
     single: u64,
     drifting: u64,
     in_double: f64,

@@ -36,8 +36,8 @@ impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
     }
 }
 
-/// The share of a velocity, ε^⅔, that rounding may make of it: bodies that touch without force come apart, and together,
-/// by the sign of the last bit.
+/// The share of a velocity, ε^⅔, that rounding may make of it: bodies that touch without force come apart, and
+/// together, by the sign of the last bit.
 pub(crate) fn share_of_rounding<T: Real>() -> T {
     T::of(T::epsilon().value().powf(2.0 / 3.0))
 }

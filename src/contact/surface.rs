@@ -46,8 +46,8 @@ pub(crate) use vicinity::Vicinity;
 
 use shape::{RIM, Rim};
 
-/// Share of a facet, or an edge, by which what is found inside comes out in a step: a tenth of what bodies fly in a step
-/// that are as slow as impacts are, a thousandth of the speed of waves. Faster would throw it.
+/// Share of a facet, or an edge, by which what is found inside comes out in a step: a tenth of what bodies fly in a
+/// step that are as slow as impacts are, a thousandth of the speed of waves. Faster would throw it.
 pub(crate) const RECOVERY: f64 = 1e-4;
 
 /// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.

@@ -125,7 +125,8 @@ fn slip_direction<T: Real>(
         } else {
             low = gamma;
         }
-        // d f/d γ = −(S + γ)⁻¹ f. (As shares of |f|: where S is nearly singular |f|² may be beyond the numbers of `f32`.)
+        // d f/d γ = −(S + γ)⁻¹ f. (As shares of |f|: where S is nearly singular |f|² may be beyond the numbers of
+        // `f32`.)
         let (share, unit) = (radius / length, f.map(|f| f / length));
         let slope = solve_two(schur, gamma, unit);
         let step = (T::one() - share) / (change(slope) - share * (unit[0] * slope[0] + unit[1] * slope[1]));

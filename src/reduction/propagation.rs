@@ -209,8 +209,8 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
     ///
     /// [`Error::Parameter`] for a step size that is not positive and finite, and for one with ω_r h > π, of untapered
     /// bodies π/4 (the product is given); [`Error::Empty`] without a body; [`Error::Incompatible`] for
-    /// [`Boundary::CraigBampton`], whose contact dofs have mass, for rows on other dofs, under other laws, with friction
-    /// or bonds, and for a solver that does not take them; [`Error::Dimension`] and [`Error::NotFinite`] for
+    /// [`Boundary::CraigBampton`], whose contact dofs have mass, for rows on other dofs, under other laws, with
+    /// friction or bonds, and for a solver that does not take them; [`Error::Dimension`] and [`Error::NotFinite`] for
     /// displacements, velocities and loads; contact errors as of a [`step`](ModalPropagation::step).
     pub fn build(self) -> Result<ModalPropagation<'a, T>> {
         step_size::<T>(self.h)?;

@@ -61,8 +61,8 @@ fn is_trapezoidal<T: Real>(stage: &CompiledStage<T>) -> bool {
 }
 
 impl<T: Real> ExcessForces<T> {
-    /// For a linear system, its dofs without mass, and so many contacts. None where there are no such dofs, or stiffness
-    /// alone does not hold them, and for schemes whose forces are not those of the state.
+    /// For a linear system, its dofs without mass, and so many contacts. None where there are no such dofs, or
+    /// stiffness alone does not hold them, and for schemes whose forces are not those of the state.
     pub(super) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,

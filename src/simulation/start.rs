@@ -265,8 +265,8 @@ impl<T: Real> Start<'_, T> {
     }
 }
 
-/// What of the forces on dofs without mass contact has not balanced either goes on to the dofs with mass, and accelerates
-/// them: it comes from inside of the bodies.
+/// What of the forces on dofs without mass contact has not balanced either goes on to the dofs with mass, and
+/// accelerates them: it comes from inside of the bodies.
 fn pass_on_rest<T: Real>(
     system: &mut dyn System<T>,
     (massless, unbalanced): (&[usize], &[T]),

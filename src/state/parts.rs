@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> Checkpoint<T> {
-    /// The checkpoint of a part of the body: its dof i is dof `dofs[i]` of this one. Contacts stay as they are: what may
-    /// touch is known to every part. See [`joined`](Self::joined) for the way back.
+    /// The checkpoint of a part of the body: its dof i is dof `dofs[i]` of this one. Contacts stay as they are: what
+    /// may touch is known to every part. See [`joined`](Self::joined) for the way back.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

@@ -81,9 +81,9 @@ fn the_order_of_facets_does_not_matter() {
 }
 
 /// Scenes that once were wrong, by their names and seeds: a row left to a corner that slid off, facets of another body
-/// taken for the own flank, friction of nearly the same rows that grew from pass to pass; what a search found deep inside
-/// was thrown out at once (of `Mortar`, and of nodes), edges were taken to be in each other beyond their ends, and the
-/// past was thrown by rows with friction that are nearly the same.
+/// taken for the own flank, friction of nearly the same rows that grew from pass to pass; what a search found deep
+/// inside was thrown out at once (of `Mortar`, and of nodes), edges were taken to be in each other beyond their ends,
+/// and the past was thrown by rows with friction that are nearly the same.
 #[test]
 fn what_was_found_is_found_no_more() {
     const FOUND: [(&str, u64); 13] = [

@@ -315,8 +315,8 @@ fn the_rounding_of_a_slip_does_not_excuse_a_gap() {
     }
 }
 
-/// In single precision, with rows that depend on one another beside friction without bound: Newton's method may end with
-/// rows that pull by what is rounding.
+/// In single precision, with rows that depend on one another beside friction without bound: Newton's method may end
+/// with rows that pull by what is rounding.
 #[test]
 fn no_row_pulls_by_rounding() {
     let w = [

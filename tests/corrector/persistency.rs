@@ -401,9 +401,9 @@ fn a_touching_row_is_not_held_back_by_an_impact_elsewhere() {
 
 #[test]
 fn a_touching_row_is_not_held_back_in_acceleration_either() {
-    // A body of two faces is pulled along by a load, and another one with it, which touches its back without pressure. A
-    // third one catches up with it on a grid point: the two that meet have one velocity, but the load pulls its body off
-    // at once, and the one behind it goes on alone. All numbers are exact in binary.
+    // A body of two faces is pulled along by a load, and another one with it, which touches its back without pressure.
+    // A third one catches up with it on a grid point: the two that meet have one velocity, but the load pulls its body
+    // off at once, and the one behind it goes on alone. All numbers are exact in binary.
     let (h, load) = (1.0 / 8.0, 1.0);
     let mut run = Simulation::builder(free(&[1.0; 3]).load(move |_, f| f[1..].fill(load)), Newmark::trapezoidal(), h)
         .velocity(vec![1.0, 0.0, 0.0])

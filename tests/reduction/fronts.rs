@@ -27,8 +27,8 @@ fn the_force_overshoots_as_the_front_in_closed_form() {
     }
 }
 
-/// A sine that nothing damps for T out of the 1.2 T that the error is a mean over; the transient that comes on top of it
-/// is gone after some periods.
+/// A sine that nothing damps for T out of the 1.2 T that the error is a mean over; the transient that comes on top of
+/// it is gone after some periods.
 #[test]
 fn untapered_modes_ring_by_the_residue() {
     let [frequency, amplitude] = ringing();

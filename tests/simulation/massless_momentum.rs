@@ -23,8 +23,8 @@ fn drift(run: &mut Run, dofs: &[usize], steps: usize) -> (f64, usize) {
     (most, closed)
 }
 
-/// A point (dofs 0 along the gap and 1 along the surface) on a body: its node (2 and 3), on a spring along the surface to
-/// a mass (4). Along the surface the node has no mass.
+/// A point (dofs 0 along the gap and 1 along the surface) on a body: its node (2 and 3), on a spring along the surface
+/// to a mass (4). Along the surface the node has no mass.
 fn point_on_a_body() -> LinearSystem<'static, f64> {
     let k = (0..5).map(|dof| (dof, dof, 0.0)).chain(spring(3, 4, 50.0));
     LinearSystem::lumped(vec![1.0, 1.0, 3.0, 0.0, 2.0], matrix(5, k)).unwrap()

@@ -18,8 +18,8 @@ fn scenes_by_chance_hold_what_must_hold() {
     assert!(built > 1500 && closed > 10_000 && compared > 40_000, "{built} {closed} {compared}");
 }
 
-/// Scenes whose results depended on units, on the order of rows, or on a common velocity, whose energy grew, and such as
-/// could not go on from a state that the host does not admit though the run itself did.
+/// Scenes whose results depended on units, on the order of rows, or on a common velocity, whose energy grew, and such
+/// as could not go on from a state that the host does not admit though the run itself did.
 #[test]
 fn scenes_that_have_failed_hold() {
     let by_units = [40_062_161, 50_043_714, 50_122_859, 50_123_697, 90_017_504, 91_237_725];

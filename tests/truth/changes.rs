@@ -1,5 +1,6 @@
-//! Steps whose size changes over and over, of schemes that read no past and store all at the time of the state: on rigid
-//! contact, with friction and without, and with dofs without mass, whose velocities are differenced over two steps.
+//! Steps whose size changes over and over, of schemes that read no past and store all at the time of the state: on
+//! rigid contact, with friction and without, and with dofs without mass, whose velocities are differenced over two
+//! steps.
 
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;

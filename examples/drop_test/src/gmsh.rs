@@ -65,8 +65,8 @@ pub fn read(path: &Path, unit: f64) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Refuses what is no Gmsh file of format 4.1, with the way to make it one, and numbers in the head of the file that the
-/// parser takes for granted.
+/// Refuses what is no Gmsh file of format 4.1, with the way to make it one, and numbers in the head of the file that
+/// the parser takes for granted.
 fn check_format(bytes: &[u8]) -> std::result::Result<(), String> {
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
     if lines.next().is_none_or(|line| line.trim() != "$MeshFormat") {

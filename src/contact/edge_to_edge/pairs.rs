@@ -129,8 +129,8 @@ impl Pair<'_> {
         let is_near = |crossing: &Crossing| {
             let (misses, gap) = (self.misses_normal(crossing, at), self.clear(crossing));
             let touches = gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
-            // What is in already must be in the bodies, and meet; what comes must come from outside. (Beyond an end what
-            // presses has lines in each other by the opening of its gap, and no more.)
+            // What is in already must be in the bodies, and meet; what comes must come from outside. (Beyond an end
+            // what presses has lines in each other by the opening of its gap, and no more.)
             let on_edges = crossing.excess().into_iter().all(|x| x <= ROUNDING);
             let meets = || on_edges || gap + self.by_shares(crossing).0 >= -SHALLOW * shorter;
             let inside = || misses <= ROUNDING && gap >= -deepest && meets() && self.is_inside(crossing, at);

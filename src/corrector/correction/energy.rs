@@ -90,9 +90,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(if factor.is_finite() { factor } else { T::one() })
     }
 
-    /// Whether a contact that took `energy` at impact does not give it back, for it opens by rounding alone: bodies that
-    /// stay together without force do so by the sign of the last bit. Measured by the speed that was taken, which is
-    /// relative. (The force of the impact itself is none that holds them together, and with damping not zero.) What
+    /// Whether a contact that took `energy` at impact does not give it back, for it opens by rounding alone: bodies
+    /// that stay together without force do so by the sign of the last bit. Measured by the speed that was taken, which
+    /// is relative. (The force of the impact itself is none that holds them together, and with damping not zero.) What
     /// opens beside a row that presses and is a multiple of its own is one contact with it, to which the energy passes.
     pub(in crate::corrector) fn withholds(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
@@ -108,8 +108,8 @@ impl<T: Real> Correction<'_, T> {
         Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
     }
 
-    /// Whether a closed row holds its bodies by more than rounding: its force moves the gap within a step, or the impulse
-    /// of its velocity jump the gap rate, by more than these are known to. (Of rates that is a share of ε^⅔.)
+    /// Whether a closed row holds its bodies by more than rounding: its force moves the gap within a step, or the
+    /// impulse of its velocity jump the gap rate, by more than these are known to. (Of rates that is a share of ε^⅔.)
     pub(in crate::corrector) fn holds(&mut self, row: usize, impulse: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let h = T::of(self.h);

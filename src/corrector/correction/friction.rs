@@ -172,8 +172,8 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Finds the multipliers that project one field of past state k onto the engaged contacts, whose gaps are those at
-    /// its place, or `straight`, as the rows that hold now see them. Says the square of the way of the past, in the norm
-    /// of the mass.
+    /// its place, or `straight`, as the rows that hold now see them. Says the square of the way of the past, in the
+    /// norm of the mass.
     fn solve_past(&mut self, (k, field): (usize, usize), engaged: &[usize], straight: bool) -> Result<T> {
         let Self { past, constraints, buffers, projection, solver, g, contacts, t, new, .. } = self;
         let Buffers { rubbing, gaps, straight: seen, slips, past_slips, .. } = &mut **buffers;

@@ -1,5 +1,5 @@
-//! W = G A⁻¹ Gᵀ from responses to dofs, a tile of places at a time: what the rows of a tile read of all columns stays in
-//! a cache, for rows that are neighbors act on the same dofs.
+//! W = G A⁻¹ Gᵀ from responses to dofs, a tile of places at a time: what the rows of a tile read of all columns stays
+//! in a cache, for rows that are neighbors act on the same dofs.
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;

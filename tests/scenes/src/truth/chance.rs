@@ -28,7 +28,7 @@ impl Kind {
 pub enum Bodies {
     /// Masses and springs.
     Linear,
-    /// Springs harden; nothing is damped.
+    /// Springs harden.
     Hardening,
     /// Some dofs have no mass.
     Massless,
@@ -71,7 +71,7 @@ impl Setting {
                 mass[dof].fill(0.0);
             }
         }
-        let damping = (seed % 2 == 1 && kind != Kind::Flight && self.bodies != Bodies::Hardening).then(|| {
+        let damping = (seed % 2 == 1 && kind != Kind::Flight).then(|| {
             let (alpha, beta) = (random.within(0.0, 0.3), random.within(0.0005, 0.003));
             // (What is damped without a mass, and touches from the start, begins out of balance.)
             let beta = if self.bodies == Bodies::Massless && kind == Kind::Rest { 0.0 } else { beta };

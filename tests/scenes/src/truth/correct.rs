@@ -311,8 +311,8 @@ impl Step<'_> {
         }
     }
 
-    /// Gives back at release what the corrections took: impulses from the same velocities, and one factor for those that
-    /// act on each other, by which they give the sum.
+    /// Gives back at release what the corrections took: impulses from the same velocities, and one factor for those
+    /// that act on each other, by which they give the sum.
     fn release(&mut self) {
         let (mut given, mut energies) = (Vec::new(), Vec::new());
         for i in self.released() {
