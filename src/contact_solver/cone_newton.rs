@@ -5,7 +5,6 @@ use super::sweeps::Sweeps;
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
-use std::ops::Range;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), begun from sweeps over
 /// the blocks, and from more of them where it does not end. On redundant rows neither may end: then the problem is
@@ -44,6 +43,18 @@ const LEAST_SHARE: f64 = 1e-13;
 
 /// Sweeps that go on alone in the end.
 const LAST_SWEEPS: usize = 20_000;
+
+/// Iterations in which what is pulled by rounding is open.
+const LETS_GO: usize = 3;
+
+/// What becomes in an iteration of a block that is pulled, and may not be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pulled {
+    /// Its conditions decide.
+    AsItIs,
+    /// It is open.
+    LetsGo,
+}
 
 /// What a block is in an iteration.
 #[derive(Clone, Copy, Debug)]
@@ -120,7 +131,7 @@ impl<T: Real> ConeNewton<T> {
         let mut solved = false;
         for _ in 0..ITERATIONS {
             *spent += 1;
-            let sound = self.iterate(problem, &mut tried);
+            let sound = self.iterate(problem, Pulled::AsItIs, &mut tried);
             solved = sound && acceptance.accepts(problem, &tried);
             if solved || !sound {
                 break;
@@ -128,33 +139,56 @@ impl<T: Real> ConeNewton<T> {
         }
         if solved {
             multipliers.copy_from_slice(&tried);
-            // What is held without a force may be pulled by rounding: it is open then, if that does as well. (All that
-            // are pulled, or else those of them for which it does.)
-            let pulled = |multipliers: &[T], rows: &Range<usize>, set: AdmissibleSet| {
-                !set.is_bilateral() && multipliers[rows.start] < T::zero()
-            };
-            for (rows, set) in problem.blocks() {
-                if pulled(&tried, &rows, set) {
-                    tried[rows].fill(T::zero());
-                }
-            }
-            if acceptance.accepts(problem, &tried) {
-                multipliers.copy_from_slice(&tried);
-            } else {
-                for (rows, set) in problem.blocks() {
-                    if pulled(multipliers, &rows, set) {
-                        let kept = std::array::from_fn(|k| multipliers[(rows.start + k).min(rows.end - 1)]);
-                        multipliers[rows.clone()].fill(T::zero());
-                        if !acceptance.accepts(problem, multipliers) {
-                            let kept: [T; 3] = kept;
-                            multipliers[rows.clone()].copy_from_slice(&kept[..rows.len()]);
-                        }
-                    }
-                }
-            }
+            self.let_go(problem, acceptance, &mut tried, multipliers);
         }
         self.tried = tried;
         solved
+    }
+
+    /// What is held without a force may be pulled by rounding: it is open then, if that does as well. All that are
+    /// pulled, with the others as they are, or with these solved for once more; or else those of them for which it does.
+    fn let_go(
+        &mut self,
+        problem: &ContactProblem<'_, T>,
+        acceptance: &BlockAcceptance<T>,
+        tried: &mut [T],
+        multipliers: &mut [T],
+    ) {
+        let pulls = |multipliers: &[T]| problem.blocks().any(|(rows, set)| is_pulled(rows.start, set, multipliers));
+        if !pulls(multipliers) {
+            return;
+        }
+        for (rows, set) in problem.blocks() {
+            if is_pulled(rows.start, set, multipliers) {
+                tried[rows].fill(T::zero());
+            }
+        }
+        if acceptance.accepts(problem, tried) {
+            multipliers.copy_from_slice(tried);
+            return;
+        }
+        tried.copy_from_slice(multipliers);
+        for _ in 0..LETS_GO {
+            if !self.iterate(problem, Pulled::LetsGo, tried) {
+                break;
+            }
+            if !pulls(tried) {
+                if acceptance.accepts(problem, tried) {
+                    multipliers.copy_from_slice(tried);
+                    return;
+                }
+                break;
+            }
+        }
+        for (rows, set) in problem.blocks() {
+            if is_pulled(rows.start, set, multipliers) {
+                let kept: [T; 3] = std::array::from_fn(|k| multipliers[(rows.start + k).min(rows.end - 1)]);
+                multipliers[rows.clone()].fill(T::zero());
+                if !acceptance.accepts(problem, multipliers) {
+                    multipliers[rows.clone()].copy_from_slice(&kept[..rows.len()]);
+                }
+            }
+        }
     }
 
     /// Proximal steps: λ' solves the problem with W + D and q − D λ, D a share of the diagonal of W that shrinks.
@@ -204,14 +238,17 @@ impl<T: Real> ConeNewton<T> {
     }
 
     /// One iteration; says whether its equations could be solved.
-    fn iterate(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> bool {
+    fn iterate(&mut self, problem: &ContactProblem<'_, T>, pulled: Pulled, multipliers: &mut [T]) -> bool {
         let Self { factor, statuses, rows, matrix, right, y, .. } = self;
         y.clear();
         y.extend((0..problem.size()).map(|row| problem.gap(row, multipliers)));
         rows.clear();
         statuses.clear();
         for (block, set) in problem.blocks() {
-            let status = status(problem, block.start, set, multipliers, y);
+            let status = match pulled == Pulled::LetsGo && is_pulled(block.start, set, multipliers) {
+                true => Status::Open,
+                false => status(problem, block.start, set, multipliers, y),
+            };
             statuses.push(status);
             if !matches!(status, Status::Open) {
                 rows.extend(block);
@@ -272,6 +309,11 @@ impl<T: Real> ConeNewton<T> {
         }
         T::all_finite(multipliers)
     }
+}
+
+/// Whether the force of a block that only presses pulls.
+fn is_pulled<T: Real>(first: usize, set: AdmissibleSet, multipliers: &[T]) -> bool {
+    !set.is_bilateral() && multipliers[first] < T::zero()
 }
 
 /// What the rows of a block are at these multipliers and y.
