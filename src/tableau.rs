@@ -65,8 +65,9 @@ impl Tableau {
     ///
     /// # Errors
     ///
-    /// [`Error::Tableau`] names the stage and what is wrong: no stage, a coefficient that is not finite, an
-    /// acceleration row without the unknown, or a last stage that does not end at the end of the step.
+    /// [`Error::Tableau`] names the stage and what is wrong: no stage, a coefficient that is not finite, or from which
+    /// one follows that is not, an acceleration row without the unknown, contact imposed before the stage's state, a
+    /// forecast of contact that reads the unknown, or a last stage that does not end at the end of the step.
     pub fn check(&self, integrator: &str) -> Result<()> {
         let refuse = |stage, reason| Err(Error::Tableau { integrator: integrator.to_owned(), stage, reason });
         for (s, stage) in self.stages.iter().enumerate() {
@@ -85,6 +86,11 @@ impl Tableau {
             }
             if stage.recovery.a.z == 0.0 || stage.balance.a.z == 0.0 {
                 return refuse(s, "the acceleration rows must contain the unknown");
+            }
+            // What steps are made of: rows over the increment of the unknown, and where contact is imposed.
+            let increment = stage.increment();
+            if !increment.rows().iter().all(Row::is_finite) || !increment.contact_row().is_finite() {
+                return refuse(s, "a coefficient that follows from its rows is not finite");
             }
         }
         match self.stages.last() {

@@ -90,16 +90,18 @@ fn keys(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Option<V
     let n = pattern.nrows();
     let scattered: Vec<u64> = (0..n).map(scattered).collect();
     let mut keys = vec![0_u64; n];
-    // The sum of h(i) j − h(j) i over all entries (i, j): entries on both sides of the diagonal cancel.
+    // The sum of h(i) g(j) − h(j) g(i) over all entries (i, j): entries on both sides of the diagonal cancel. (Both are
+    // scattered: with j itself for g(j) others cancel too, as (0, 1) and (0, 2) with (3, 0).)
     let mut asymmetry = 0_u64;
+    let other = |i: usize| scattered[i].rotate_left(32);
     for j in 0..n {
-        let (mut hashes, mut rows) = (0_u64, 0_u64);
+        let (mut hashes, mut others) = (0_u64, 0_u64);
         for &i in pattern.row_idx_of_col_raw(j) {
             hashes = hashes.wrapping_add(scattered[i]);
-            rows = rows.wrapping_add(i as u64);
+            others = others.wrapping_add(other(i));
         }
         keys[j] = hashes;
-        let balance = hashes.wrapping_mul(j as u64).wrapping_sub(scattered[j].wrapping_mul(rows));
+        let balance = hashes.wrapping_mul(other(j)).wrapping_sub(scattered[j].wrapping_mul(others));
         asymmetry = asymmetry.wrapping_add(balance);
     }
     for &dof in last {

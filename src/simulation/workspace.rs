@@ -154,12 +154,12 @@ impl<T: Real> Workspace<T> {
         }
         let buffers = &mut self.correction.buffers;
         if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
-            // (Forces that are not linear may act on them later.)
-            let damps = is_damped(system, &massless).map(|damps| {
-                let may_damp = system.linearity() == Linearity::Nonlinear && !massless.is_empty();
-                [f64::from(u8::from(damps || may_damp))]
-            });
-            let [damps] = together.max(damps)?;
+            let damps = match system.linearity() {
+                Linearity::Linear => is_damped(system, &massless),
+                // (Forces that are not linear may act on them later.)
+                Linearity::Nonlinear => Ok(!massless.is_empty()),
+            };
+            let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
             buffers.damps_massless = damps > 0.0;
         }
         self.contact.rows.massless.clone_from(&massless);

@@ -323,3 +323,26 @@ fn an_order_that_was_kept_gives_the_same_factor() {
         }
     }
 }
+
+/// Whatever stands on one side of the diagonal alone: refused where the matrix is factorized, by any order.
+#[test]
+fn patterns_that_are_not_symmetric_are_orders_all_the_same() {
+    let n = 4;
+    let places: Vec<(usize, usize)> = (0..n * n).map(|e| (e / n, e % n)).filter(|(i, j)| i != j).collect();
+    for chosen in 0..1_usize << places.len() {
+        let beside = places.iter().enumerate().filter(|(k, _)| chosen >> k & 1 == 1).map(|(_, &place)| place);
+        let beside: Vec<(usize, usize)> = beside.collect();
+        let is_symmetric = beside.iter().all(|&(i, j)| beside.contains(&(j, i)));
+        let a: Matrix = matrix(n, (0..n).map(|i| (i, i, 8.0)).chain(beside.iter().map(|&(i, j)| (i, j, 1.0))));
+        for ordering in [Ordering::Automatic, Ordering::MinimumDegree, Ordering::NestedDissection] {
+            for last in [&[][..], &[1], &[0, 3]] {
+                let mut factor = LinearSolver::<f64>::analyze(&Cholesky::ordered(ordering.clone()), a.symbolic(), last);
+                let factorized = factor.as_mut().unwrap().factorize(a.as_ref());
+                match is_symmetric {
+                    true => factorized.unwrap(),
+                    false => assert!(matches!(factorized, Err(Error::Asymmetric { .. })), "{beside:?}"),
+                }
+            }
+        }
+    }
+}

@@ -3,7 +3,7 @@
 
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapOffset};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::tableau::{Rows, Stage, Tableau, U, V, Z};
+use contact_dynamics::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 use contact_dynamics::{
     CentralDifference, Cholesky, ChungLee, Composite, Diagonal, Error, Gssss, LinearRows, LinearSolver, LinearSystem,
     Newmark, PersistencyCorrection, Result, Simulation, SimulationBuilder, TimeIntegrator, mass,
@@ -257,6 +257,17 @@ fn malformed_and_unsuitable_schemes_are_refused() {
     refused!(refuse(vec![Stage::new(Rows { v: f64::NAN * Z, ..rows })]), Error::Tableau { .. }, "not finite");
     refused!(refuse(vec![Stage::new(Rows { a: V[0], ..rows })]), Error::Tableau { .. }, "unknown");
     refused!(refuse(vec![Stage::new(rows).ending_at(0.5)]), Error::Tableau { .. }, "end of the step");
+    // What follows from them is beyond all numbers: differences over the unknown, and ½ lead² a.
+    let tiny = Rows { a: 1e-300 * Z - U[0], v: 1e300 * Z, ..rows };
+    refused!(refuse(vec![Stage::new(tiny)]), Error::Tableau { .. }, "follows from its rows");
+    let at = |contact| refuse(vec![Stage::new(rows).with_contact(contact)]);
+    refused!(at(ContactLevel::Position { lead: f64::MAX }), Error::Tableau { .. }, "follows from its rows");
+    // Contact before the state, and forecasts of what is not known.
+    refused!(at(ContactLevel::Position { lead: -1.0 }), Error::Tableau { .. }, "before the stage's state");
+    let forecast = |forecast| ContactLevel::Velocity { lead: 0.0, forecast, forecast_at: 1.0 };
+    at(forecast(U[0] + V[0])).unwrap();
+    refused!(at(forecast(f64::NAN * U[0])), Error::Tableau { .. }, "not finite");
+    refused!(at(forecast(Z)), Error::Tableau { .. }, "known before");
     // Displacement without the unknown: a multiplier cannot close a gap.
     let explicit = Stage::new(Rows { u: U[0] + V[0], v: V[0] + Z, a: Z });
     let position = Simulation::builder(system(), Tabulated("broken", Tableau::single(explicit)), 0.01)
