@@ -6,7 +6,7 @@ use contact_dynamics_scenes::combinations::Correction;
 use contact_dynamics_scenes::truth::Bodies;
 
 /// Columns as in `rigid.rs`.
-const TABLE: &str = "\
+pub(crate) const TABLE: &str = "\
 +++........ composite
 +++..+..... Newmark(0.25, 0.5)
 +++..u..... Newmark(0.3025, 0.6)

@@ -1,6 +1,8 @@
 //! Contact problems of a few contacts, solved by trying everything: each contact in each of its modes.
 
+use super::Scene;
 use super::dense::{Matrix, dot, solve, zeros};
+use contact_dynamics::ContactLaw;
 
 /// What is asked of one contact.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +29,19 @@ pub struct Problem {
     pub q: Vec<f64>,
     /// What of y is rounding.
     pub noise: Vec<f64>,
+}
+
+impl Problem {
+    /// That of the gaps of some rows at displacements u, without friction; `responses` are what multipliers make of u.
+    pub fn of_gaps(scene: &Scene, rows: &[usize], responses: &[Vec<f64>], t: f64, u: &[f64]) -> Self {
+        let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
+        Self {
+            contacts: rows.iter().map(|&i| Contact { held: held(i), friction: None }).collect(),
+            w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
+            q: rows.iter().map(|&i| scene.gap(i, t, u)).collect(),
+            noise: rows.iter().map(|&i| scene.rounding(i, t, u)).collect(),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -165,14 +165,8 @@ fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool],
         .filter(|&i| matches!(scene.rows[i].law, ContactLaw::Rigid | ContactLaw::Equality))
         .filter(|&i| (correction == Correction::Stabilized || closed[i]) && scene.has_mass(i))
         .collect();
-    let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
     let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
-    let problem = Problem {
-        contacts: rows.iter().map(|&i| Contact { held: held(i), friction: None }).collect(),
-        w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
-        q: rows.iter().map(|&i| scene.gap(i, t, &u)).collect(),
-        noise: rows.iter().map(|&i| scene.rounding(i, t, &u)).collect(),
-    };
+    let problem = Problem::of_gaps(scene, &rows, &responses, t, &u);
     let mut shift = vec![0.0; scene.dofs()];
     problem.solve().iter().zip(&responses).for_each(|(mu, response)| add(&mut shift, *mu, response));
     shift

@@ -104,14 +104,7 @@ pub fn settle(scene: &Scene, u: &mut [f64], t_load: f64, t: f64) -> Vec<(usize, 
     let free = follow(&scene.force(t_load, u, &vec![0.0; u.len()]));
     add(u, 1.0, &free);
     let responses: Vec<Vec<f64>> = rows.iter().map(|&i| follow(&scene.rows[i].g)).collect();
-    let held = |i: usize| scene.rows[i].law == ContactLaw::Equality;
-    let problem = Problem {
-        contacts: rows.iter().map(|&i| Contact { held: held(i), friction: None }).collect(),
-        w: rows.iter().map(|&i| responses.iter().map(|x| dot(&scene.rows[i].g, x)).collect()).collect(),
-        q: rows.iter().map(|&i| scene.gap(i, t, u)).collect(),
-        noise: rows.iter().map(|&i| scene.rounding(i, t, u)).collect(),
-    };
-    let forces = problem.solve();
+    let forces = Problem::of_gaps(scene, &rows, &responses, t, u).solve();
     forces.iter().zip(&responses).for_each(|(force, response)| add(u, *force, response));
     rows.into_iter().zip(forces).collect()
 }
