@@ -131,7 +131,9 @@ impl AdmissibleSet {
     /// (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
         if let Some(friction) = self.friction() {
-            return cone_residual((T::of(friction), self.is_bilateral()), y, multipliers, compliance);
+            let [normal, tangential] =
+                cone_residuals((T::of(friction), self.is_bilateral()), y, multipliers, compliance);
+            return normal.max(tangential);
         }
         let rows = y.iter().zip(multipliers).zip(compliance);
         let misses = rows.map(|((&y, &multiplier), &compliance)| match self {
@@ -144,10 +146,15 @@ impl AdmissibleSet {
     }
 }
 
-/// [`AdmissibleSet::residual`] of a cone.
-fn cone_residual<T: Real>((friction, is_bilateral): (T, bool), y: &[T], multipliers: &[T], compliance: &[T]) -> T {
+/// [`AdmissibleSet::residual`] of a cone, by its normal and its tangential rows.
+fn cone_residuals<T: Real>(
+    (friction, is_bilateral): (T, bool),
+    y: &[T],
+    multipliers: &[T],
+    compliance: &[T],
+) -> [T; 2] {
     if y.iter().chain(multipliers).any(|x| !x.is_finite()) {
-        return T::nan();
+        return [T::nan(); 2];
     }
     let tangential = compliance[1..].iter().fold(T::zero(), |most, &w| most.max(w));
     let mut miss = [T::zero(); 2];
@@ -161,7 +168,7 @@ fn cone_residual<T: Real>((friction, is_bilateral): (T, bool), y: &[T], multipli
         *miss = tangential * multipliers[k + 1] - share * aim[k];
     }
     let normal = if is_bilateral { y[0] } else { y[0].min(compliance[0] * multipliers[0]) };
-    normal.abs().max(norm(&miss))
+    [normal.abs(), norm(&miss)]
 }
 
 /// The length of a tangential vector.
@@ -315,17 +322,24 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     /// [`AdmissibleSet::residual`].
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
         let worst = |worst: (usize, T), (row, miss): (usize, T)| if miss > worst.1 { (row, miss) } else { worst };
-        let misses = self.blocks().map(|(rows, set)| (rows.start, self.block_miss(rows, set, multipliers)));
+        let misses = self.blocks().map(|(rows, set)| {
+            let [first, tangential] = self.block_misses(rows.clone(), set, multipliers);
+            (rows.start, first.max(tangential))
+        });
         misses.fold((0, T::zero()), worst)
     }
 
-    /// By how much the rows of a block miss the conditions of its set.
-    pub(super) fn block_miss(&self, rows: Range<usize>, set: AdmissibleSet, multipliers: &[T]) -> T {
+    /// By how much the rows of a block miss the conditions of its set: the first, and the tangential ones.
+    pub(super) fn block_misses(&self, rows: Range<usize>, set: AdmissibleSet, multipliers: &[T]) -> [T; 2] {
         let (mut y, mut compliance) = ([T::zero(); 3], [T::zero(); 3]);
         for (k, row) in rows.clone().enumerate() {
             (y[k], compliance[k]) = (self.gap(row, multipliers), self.delassus(row, row));
         }
-        set.residual(&y[..rows.len()], &multipliers[rows.clone()], &compliance[..rows.len()])
+        let (y, multipliers, compliance) = (&y[..rows.len()], &multipliers[rows.clone()], &compliance[..rows.len()]);
+        match set.friction() {
+            Some(friction) => cone_residuals((T::of(friction), set.is_bilateral()), y, multipliers, compliance),
+            None => [set.residual(y, multipliers, compliance), T::zero()],
+        }
     }
 
     /// By how much row i misses the conditions of its set, in a problem whose sets have one row each.

@@ -329,11 +329,7 @@ impl<T: Real> Operator<T> {
                 }
             }
         }
-        let Delassus { rows: assembled, values, diagonal, .. } = delassus;
-        diagonal.clear();
-        diagonal.extend((0..size).map(|k| values[k * size + k]));
-        assembled.clear();
-        assembled.extend_from_slice(rows);
+        delassus.end(rows);
         Ok(())
     }
 

@@ -14,6 +14,8 @@ pub(super) struct Delassus<T> {
     pub(super) values: Vec<T>,
     /// The diagonal without them.
     pub(super) diagonal: Vec<T>,
+    /// The roots of that.
+    roots: Vec<T>,
     /// Its number, 0 if what is here belongs to no rows.
     pub(super) version: u64,
     /// Places of the rows that have joined.
@@ -41,6 +43,7 @@ impl<T: Real> Delassus<T> {
             rows: Vec::with_capacity(rows),
             values: Vec::with_capacity(rows * rows),
             diagonal: Vec::with_capacity(rows),
+            roots: Vec::with_capacity(rows),
             version: 0,
             joined: Vec::with_capacity(rows),
             runs: Vec::with_capacity(rows),
@@ -93,6 +96,36 @@ impl<T: Real> Delassus<T> {
             }
         }
         Ok(())
+    }
+
+    /// All that has joined is filled; couplings of it that no sum can see become zero.
+    ///
+    /// What a force does far away in a step decays by orders of magnitude from node to node, down to numbers without
+    /// digits, and to zero in one unit and not in another: where W begins and ends is not to depend on that.
+    pub(super) fn end(&mut self, rows: &[usize]) {
+        let Self { rows: assembled, values, diagonal, roots, joined, .. } = self;
+        let size = rows.len();
+        diagonal.clear();
+        diagonal.extend((0..size).map(|k| values[k * size + k]));
+        roots.clear();
+        roots.extend(diagonal.iter().map(|own| own.max(T::zero()).sqrt()));
+        let share = T::epsilon() * T::epsilon();
+        let forget = |entry: &mut T, [one, other]: [T; 2]| {
+            if entry.abs() <= share * one * other {
+                *entry = T::zero();
+            }
+        };
+        for &k in &*joined {
+            let row = &mut values[k * size..(k + 1) * size];
+            row.iter_mut().zip(&*roots).for_each(|(entry, &root)| forget(entry, [root, roots[k]]));
+        }
+        // (Where all have joined these were all entries.)
+        for &k in joined.iter().filter(|_| joined.len() < size) {
+            let column = values[k..].iter_mut().step_by(size);
+            column.zip(&*roots).for_each(|(entry, &root)| forget(entry, [root, roots[k]]));
+        }
+        assembled.clear();
+        assembled.extend_from_slice(rows);
     }
 
     /// Finds which rows stay, in the order that they had, and which have joined; says whether any stay.
@@ -175,5 +208,37 @@ mod tests {
         // Of rows that stay nothing is to be filled.
         w.rearrange(&all[1..]).unwrap();
         assert!(w.joined.is_empty());
+    }
+
+    /// Couplings that decay from row to row are zero where they are lost beside the diagonal, in any unit and however
+    /// the rows have come together.
+    #[test]
+    fn what_no_sum_can_see_is_zero() {
+        let n = 30;
+        for unit in [1.0, 1e-200, 2.0_f64.powi(60)] {
+            let own = |i: usize| unit * 4.0_f64.powi(i as i32 - 15);
+            let coupling = |i: usize, j: usize| (own(i) * own(j)).sqrt() * 0.01_f64.powi(i.abs_diff(j) as i32);
+            let fill = |w: &mut Delassus<f64>, rows: &[usize]| {
+                for &k in &w.joined {
+                    for (i, &row) in rows.iter().enumerate() {
+                        w.values[i * rows.len() + k] = coupling(row, rows[k]);
+                        w.values[k * rows.len() + i] = coupling(rows[k], row);
+                    }
+                }
+                w.end(rows);
+            };
+            let all: Vec<usize> = (0..n).collect();
+            let few: Vec<usize> = (0..n).filter(|i| i % 3 > 0).collect();
+            let mut w = Delassus::foreseen(0);
+            for rows in [&all, &few, &all] {
+                w.rearrange(rows).unwrap();
+                fill(&mut w, rows);
+            }
+            for (e, value) in w.values.iter().enumerate() {
+                let (i, j) = (e / n, e % n);
+                let expected = if i.abs_diff(j) < 16 { coupling(i, j) } else { 0.0 };
+                assert_eq!(value.to_bits(), expected.to_bits(), "{unit:e}, {i} {j}");
+            }
+        }
     }
 }
