@@ -14,6 +14,7 @@ struct Count {
     closed: u64,
     compared: u64,
     ended: u64,
+    by_rounding: u64,
     findings: u64,
 }
 
@@ -25,6 +26,7 @@ impl AddAssign for Count {
         self.closed += other.closed;
         self.compared += other.compared;
         self.ended += other.ended;
+        self.by_rounding += other.by_rounding;
         self.findings += other.findings;
     }
 }
@@ -52,6 +54,7 @@ impl Tally {
             closed: verdict.closed as u64,
             compared: verdict.compared as u64,
             ended: u64::from(verdict.built && verdict.refused.is_some()),
+            by_rounding: u64::from(verdict.by_rounding),
             findings: u64::from(verdict.finding.is_some()),
         };
         if recipe.precision == Precision::Single && recipe.conserves_momentum() && verdict.built {
@@ -102,12 +105,16 @@ impl Tally {
 
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "| scenes of | drawn | run | ended early | steps | in contact | compared | failed |")?;
-        writeln!(f, "| --- | --- | --- | --- | --- | --- | --- | --- |")?;
+        writeln!(
+            f,
+            "| scenes of | drawn | run | ended early | steps | in contact | compared | rounding decides | failed |"
+        )?;
+        writeln!(f, "| --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
         let mut all = Count::default();
         let line = |f: &mut fmt::Formatter<'_>, name: &str, c: &Count| {
-            let Count { scenes, built, steps, closed, compared, ended, findings } = c;
-            writeln!(f, "| {name} | {scenes} | {built} | {ended} | {steps} | {closed} | {compared} | {findings} |")
+            let Count { scenes, built, steps, closed, compared, ended, by_rounding, findings } = c;
+            write!(f, "| {name} | {scenes} | {built} | {ended} | {steps} | {closed} | {compared} ")?;
+            writeln!(f, "| {by_rounding} | {findings} |")
         };
         for kind in KINDS {
             let count = self.kinds.get(kind).copied().unwrap_or_default();

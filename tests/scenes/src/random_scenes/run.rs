@@ -36,6 +36,8 @@ pub struct Verdict {
     pub closed: usize,
     /// Steps in which both runs were compared.
     pub compared: usize,
+    /// Roundings of the data changed results so far that both runs were compared no longer.
+    pub by_rounding: bool,
     /// Largest energy over that at the start, where nothing brings energy in.
     pub gain: f64,
     /// Largest change of momentum over Σ m (|v| + |u|/h + h |a|), where nothing acts from outside.
