@@ -202,3 +202,25 @@ impl<T: Real> Acceptance<'_, T> {
         ContactFailure::NotConverged { iterations, row, residual }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guess_is_admissible_and_forgotten_where_nothing_is_to_be_pressed() {
+        let sets = [AdmissibleSet::NonNegative, AdmissibleSet::NonNegative, AdmissibleSet::Free];
+        let w = [2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0];
+        for (q, guess, begun) in [
+            ([0.0, 0.5, 0.0], [1e300, 3.0, -7.0], [0.0; 3]),
+            ([-0.1, 0.5, 0.0], [-3.0, 3.0, -7.0], [0.0, 3.0, -7.0]),
+            ([0.0, 0.5, 0.1], [1.0, f64::NAN, 0.0], [1.0, 0.0, 0.0]),
+        ] {
+            let problem = ContactProblem::new(&w, &q, &sets, &[0.0; 3]).unwrap();
+            let mut multipliers = guess;
+            Settings::default().begin(&problem, &mut multipliers).unwrap();
+            let same = multipliers.iter().zip(begun).all(|(x, y)| x.to_bits() == f64::to_bits(y));
+            assert!(same, "{q:?} {guess:?}: {multipliers:?}");
+        }
+    }
+}

@@ -171,3 +171,22 @@ fn solve_two<T: Real>(s: [[T; 2]; 2], gamma: T, c: [T; 2]) -> [T; 2] {
     let determinant = a * e - b * d;
     [(b * c[1] - e * c[0]) / determinant, (d * c[0] - a * c[1]) / determinant]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::norm;
+
+    #[test]
+    fn lengths_are_those_of_any_numbers() {
+        for (x, y, length) in [(3.0, 4.0, 5.0), (-4.0, 3.0, 5.0), (0.0, -2.0, 2.0), (0.0, 0.0, 0.0)] {
+            for unit in [1.0, 2.0_f64.powi(600), 2.0_f64.powi(-600)] {
+                assert!((norm([x * unit, y * unit]) - length * unit).abs() <= 1e-15 * length * unit, "{x} {y} {unit}");
+            }
+        }
+        // The square of neither their quotient nor of them is a number.
+        for (large, small) in [(1e200_f64, 1e-200), (-1e300, 1e-5)] {
+            assert!([norm([large, small]), norm([small, large])].iter().all(|x| (x / large.abs() - 1.0).abs() < 1e-15));
+        }
+        assert!(norm([f64::INFINITY, 1.0]) > f64::MAX && norm([f64::NAN, 1.0]).is_nan());
+    }
+}

@@ -138,3 +138,30 @@ impl<T: Real> History<T> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Motion;
+    use crate::{Bdf2, Error, LinearSystem, Simulation};
+    use faer::sparse::{SparseColMat, Triplet};
+
+    #[test]
+    fn pasts_that_do_not_fit_are_refused() {
+        let k = SparseColMat::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 1.0), Triplet::new(1, 1, 1.0)]).unwrap();
+        let system = LinearSystem::lumped(vec![1.0; 2], k).unwrap();
+        let run = Simulation::builder(system, Bdf2, 0.1).build().unwrap();
+        let history = run.history().clone();
+        let slots = history.slots.len();
+        history.check(2, slots, 0).unwrap();
+        assert!(history.check(2, slots + 1, 0).is_err() && history.check(2, slots, 1).is_err());
+        for slot in 0..slots {
+            for field in 0..3 {
+                let mut short = history.clone();
+                let Motion { u, v, a, .. } = &mut short.slots[slot];
+                [u, v, a][field].truncate(1);
+                let error = short.check(2, slots, 0).unwrap_err();
+                assert!(matches!(error, Error::Dimension { expected: 2, found: 1, .. }), "{error}");
+            }
+        }
+    }
+}

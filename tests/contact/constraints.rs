@@ -507,6 +507,7 @@ fn depths_of_springs_and_of_the_start_are_as_they_are() {
     run.run_until(1.55, &mut ()).unwrap();
     let state = run.state();
     assert!(state.contacts().gaps()[0] < -0.5 && state.contacts().gaps()[0] == state.displacement()[0]);
+    assert!((state.contacts().raw_forces()[0] + state.contacts().gaps()[0]).abs() < 1e-12, "{:?}", state.contacts());
 
     let inside = LateFloor { from: 0.0, law: ContactLaw::Rigid, recovery: Some(1e-3), found: false };
     let builder = Simulation::builder(free(1), Composite, 0.1).displacement(vec![-0.5]);

@@ -4,6 +4,7 @@ mod bathe_forms;
 mod explicit_contact;
 mod momentum;
 mod order;
+mod ranges;
 mod schemes_page;
 mod spectral;
 mod stiff_soft;

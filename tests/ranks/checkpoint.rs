@@ -1,8 +1,9 @@
 //! A run that is saved over some ranks goes on over others, or in one piece.
 
 use crate::bodies::{Blocks, Seen, difference, linear, linear_part, record};
-use contact_dynamics::{Bathe, Checkpoint, Composite, Error, Simulation, TimeIntegrator};
+use contact_dynamics::{Bathe, Checkpoint, Composite, Error, LinearSystem, Newmark, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::ranks::{SolidPart, on_ranks};
+use contact_dynamics_scenes::sparse::{matrix, springs};
 
 const H: f64 = 2e-3;
 const STEPS: usize = 30;
@@ -107,4 +108,11 @@ fn parts_that_do_not_fit_are_refused() {
     wrong.1.push(3);
     assert!(matches!(join(&[wrong]), Err(Error::Dimension { .. })));
     assert!(matches!(whole.part(&[dofs]), Err(Error::MissingDof { .. })));
+    // Velocities of dofs without mass are differenced, and lists of those are not divided.
+    let k = matrix(2, springs(2, 1.0));
+    let without = LinearSystem::lumped(vec![1.0, 0.0], k).unwrap();
+    let massless = Simulation::builder(without, Newmark::trapezoidal(), H).build().unwrap().checkpoint();
+    for error in [massless.part(&[0]).unwrap_err(), Checkpoint::joined(&[(massless, vec![0, 1])], 2).unwrap_err()] {
+        assert!(error.to_string().contains("without mass"), "{error}");
+    }
 }

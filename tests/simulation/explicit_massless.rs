@@ -242,6 +242,20 @@ fn hosts_without_stiffness_give_it_by_their_force() {
     assert!(with.iter().zip(&without).all(|(x, y)| (x - y).abs() < 1e-9 * size));
 }
 
+/// Where coordinates are counted from far away a step of one is lost in them.
+#[test]
+fn a_stiffness_by_the_force_is_found_anywhere() {
+    let start = |x: f64| {
+        let system = LinearSystem::lumped(vec![1.0, 1.0, 0.0], matrix(3, springs(3, 4.0))).unwrap();
+        let builder = Simulation::builder(Bare::force_alone(system, 3), CdLagrange, 0.1);
+        let mut run = builder.displacement(vec![x; 3]).velocity(vec![0.0, 0.1, 0.0]).build().unwrap();
+        run.step().unwrap();
+        [run.state().velocity()[0], run.state().velocity()[1]]
+    };
+    // (Steps of 0.01 are lost there too: what is left is the motion of the first half of the step.)
+    assert!(start(0.0).iter().zip(start(1e17)).all(|(x, y)| y.is_finite() && (x - y).abs() < 0.01));
+}
+
 #[test]
 fn a_continued_run_goes_on_bit_for_bit() {
     let bars = Bars::paper(30);

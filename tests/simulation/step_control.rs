@@ -212,6 +212,32 @@ fn giving_up_tells_the_story_and_leaves_no_trace() {
     }
 }
 
+/// Steps that begin a multistep scheme are taken by another one; a run that gives up in one of them has to take them
+/// still.
+#[test]
+fn giving_up_at_the_beginning_leaves_no_trace() {
+    for make in asking_at_the_end() {
+        for taken in 0..3 {
+            let go = |rule: Rule| {
+                let shared = Arc::new(Mutex::new(rule));
+                let system = host(oscillator(300.0), 0.0, Arc::clone(&shared));
+                let control = StepControl::halving(H / 4.0).unwrap();
+                let builder = Simulation::builder(system, make(), H).displacement(vec![1.0]).step_control(control);
+                (builder.build().unwrap(), shared)
+            };
+            let start = (f64::from(taken) + 0.05) * H;
+            let (mut run, shared) = go(Rule { window: [start, 1.0], limit: H / 100.0, recoverable: true });
+            let (mut undisturbed, _) = go(NEVER);
+            (0..taken).for_each(|_| run.step().unwrap());
+            assert!(matches!(run.step(), Err(Error::StepRefused { .. })), "{}", make().name());
+            *shared.lock().unwrap() = NEVER;
+            (taken..10).for_each(|_| run.step().unwrap());
+            (0..10).for_each(|_| undisturbed.step().unwrap());
+            assert_eq!(seen(&run).0, seen(&undisturbed).0, "{}, {taken}", make().name());
+        }
+    }
+}
+
 #[test]
 fn growth_that_fails_again_and_again_is_tried_ever_more_seldom() {
     let rule = Rule { window: [0.02, 1.0], limit: H / 2.0, recoverable: true };
