@@ -1,10 +1,9 @@
 //! Exact propagation against closed forms: free and loaded motion, an oscillator in contact, bars.
 
 use contact_dynamics::contact::GapOffset;
-use contact_dynamics::contact_solver::GaussSeidel;
 use contact_dynamics::reduction::{Boundary, ModalPropagation, ReducedBody, Reduction};
 use contact_dynamics::reference::single_oscillator;
-use contact_dynamics::{ActiveSet, ContactSolver, Error, LinearRows};
+use contact_dynamics::{Error, LinearRows};
 use contact_dynamics_scenes::propagated::{bounces, wall};
 use contact_dynamics_scenes::sparse::{diagonal, matrix, springs};
 use std::f64::consts::PI;
@@ -230,32 +229,6 @@ fn three_dofs_of_a_body_are_held_at_once() {
         pulled = run.forces().iter().fold(pulled, |most, force| most.max(force.abs()));
     }
     assert!(pulled > 0.1, "{pulled}");
-}
-
-/// The start is static: W is another there than in the steps, and what a solver keeps of it must not be used in these.
-#[test]
-fn steps_do_not_use_the_operator_of_the_start() {
-    let body = chain(30, 1.0, true, 8, 0.01);
-    let dofs = body.frequencies().len();
-    let mut forces = Vec::new();
-    for solver in [Box::new(ActiveSet::default()) as Box<dyn ContactSolver<f64>>, Box::new(GaussSeidel::default())] {
-        let start: Vec<f64> = (0..dofs).map(|k| if k == 0 { -1.0 } else { 0.0 }).chain([0.0]).collect();
-        let run = ModalPropagation::builder(&[&body], 2.0)
-            .displacement(start)
-            .constraint(LinearRows::new().unilateral(&[(dofs, 1.0)], 0.05))
-            .contact_solver(solver)
-            .build();
-        let mut run = run.unwrap();
-        let mut own = vec![run.forces()[0]];
-        for _ in 0..10 {
-            run.step().unwrap();
-            own.push(run.forces()[0]);
-        }
-        forces.push(own);
-    }
-    assert!(forces[0][0] > 1e-3 && forces[0][1] > 1e-3, "{forces:?}");
-    let most = forces[0].iter().fold(0.0_f64, |most, force| most.max(*force));
-    assert!(forces[0].iter().zip(&forces[1]).all(|(x, y)| (x - y).abs() < 1e-9 * most), "{forces:?}");
 }
 
 /// Two equality rows that part from each other after a while, and a load that becomes infinite.
