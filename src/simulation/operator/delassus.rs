@@ -216,8 +216,8 @@ mod tests {
     fn what_no_sum_can_see_is_zero() {
         let n = 30;
         for unit in [1.0, 1e-200, 2.0_f64.powi(60)] {
-            let own = |i: usize| unit * 4.0_f64.powi(i as i32 - 15);
-            let coupling = |i: usize, j: usize| (own(i) * own(j)).sqrt() * 0.01_f64.powi(i.abs_diff(j) as i32);
+            let own = |i: usize| unit * 4.0_f64.powf(i as f64 - 15.0);
+            let coupling = |i: usize, j: usize| own(i).sqrt() * own(j).sqrt() * 0.01_f64.powf(i.abs_diff(j) as f64);
             let fill = |w: &mut Delassus<f64>, rows: &[usize]| {
                 for &k in &w.joined {
                     for (i, &row) in rows.iter().enumerate() {
