@@ -198,9 +198,22 @@ impl<T: Real> Stiffening<T> {
         for &dof in system.prescribed() {
             self.way[dof] = T::zero();
         }
-        if largest(&self.way) <= T::epsilon().sqrt() * largest(&new.u) {
+        let [far, near] = [largest(&self.way), largest(&new.u)];
+        if far <= T::epsilon().sqrt() * near {
             return None;
         }
+        let mut square = self.mean(step)?;
+        if !square.is_finite() {
+            // (The forces there, or what work they do, are beyond all numbers: as far as displacements are, then.)
+            self.way.iter_mut().for_each(|way| *way *= near / far);
+            square = self.mean(step)?;
+        }
+        square.is_finite().then_some(square)
+    }
+
+    /// The same of a way; none if the host refuses it.
+    fn mean(&mut self, step: &mut Taken<'_, '_, T>) -> Option<f64> {
+        let Taken { system, new, .. } = step;
         let [there, here] = &mut self.force;
         self.sums.copy_from_slice(&new.u);
         T::axpy(T::one(), &self.way, &mut self.sums);
@@ -218,8 +231,7 @@ impl<T: Real> Stiffening<T> {
         system.mass().add_product(T::one(), &self.way, &mut self.sums);
         let mass: T = self.way.iter().zip(&self.sums).map(|(&y, &product)| y * product).sum();
         self.sums.fill(T::zero());
-        let square = stiffness.value() / mass.value();
-        square.is_finite().then_some(square)
+        Some(stiffness.value() / mass.value())
     }
 
     fn refusal(&self, step: &mut Taken<'_, '_, T>, square: f64, row: Option<usize>) -> Error {

@@ -299,6 +299,21 @@ fn springs_that_harden_do_not_grow_without_a_word() {
     }
 }
 
+/// A first step that is far too long is refused however far it goes: also where the forces half a step squared further
+/// on, or the work that they do, are beyond all numbers.
+#[test]
+fn steps_that_go_astray_at_once_are_refused() {
+    for power in [3, 10, 20, 29, 40, 60, 72] {
+        let system = Hardening::new(2, 1.0, 1.0);
+        let speed = 10.0_f64.powi(power);
+        let builder = Simulation::builder(system, CentralDifference, 0.1).velocity(vec![0.0, speed]);
+        let mut run = builder.build().unwrap();
+        let error = run.step().unwrap_err();
+        assert!(matches!(error, Error::Stiffened { contact: None, .. }), "1e{power}: {error}");
+        assert!(run.time() == 0.0 && run.state().velocity() == [0.0, speed]);
+    }
+}
+
 /// A host that tells nothing of its stiffness: a frequency one percent beyond that of the step is refused while it has
 /// grown by no more than a few steps do, one as much below it runs on.
 #[test]
