@@ -239,3 +239,18 @@ fn blocks_gain_no_energy_and_stay_out_of_each_other() {
         }
     }
 }
+
+/// Cells have a volume, or are flat, in any unit of length.
+#[test]
+fn flat_cells_are_refused_in_any_unit() {
+    for unit in [1.0, 1e-14, 1e14] {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|point| point.map(|x| unit * x));
+        assert_eq!(Surface::of_cells(&square, [[0, 1, 2, 3]]).unwrap().facets().len(), 4, "{unit:e}");
+        let flat = square.map(|[x, y]| [x, x + 1e-14 * y]);
+        assert!(matches!(Surface::of_cells(&flat, [[0, 1, 2, 3]]), Err(Error::Incompatible { .. })), "{unit:e}");
+        let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|point| point.map(|x| unit * x));
+        assert_eq!(Surface::of_cells(&corner, [[0, 1, 2, 3]]).unwrap().facets().len(), 4, "{unit:e}");
+        let flat = corner.map(|[x, y, z]| [x, y, x + 1e-14 * z]);
+        assert!(matches!(Surface::of_cells(&flat, [[0, 1, 2, 3]]), Err(Error::Incompatible { .. })), "{unit:e}");
+    }
+}

@@ -14,6 +14,7 @@ use contact_dynamics::{
 use contact_dynamics_scenes::hosts::Hooked;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::schemes::Tabulated;
+use contact_dynamics_scenes::sparse::diagonal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -474,4 +475,21 @@ fn a_solver_that_leaves_no_number_is_told_from_one_that_does_not_converge() {
     }
     let error = failed(0.25);
     assert!(matches!(error, Error::Contact { iterations: 3, residual: 0.25, .. }), "{error}");
+}
+
+/// What a step cannot find names the dof for which there is no number.
+#[test]
+fn the_dof_without_a_number_is_named() {
+    for dof in 0..3 {
+        let mut mass = vec![1.0; 3];
+        mass[dof] = 1e-10;
+        // (At rest until the step begins.)
+        let load = move |t: f64, f: &mut [f64]| f[dof] = if t > 0.0 { 1e306 } else { 0.0 };
+        let system = LinearSystem::lumped(mass, diagonal(&[0.0; 3])).unwrap().load(load);
+        let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build().unwrap();
+        match run.step() {
+            Err(Error::StepNotFinite { dof: named, .. }) => assert_eq!(named, dof),
+            other => panic!("{other:?}"),
+        }
+    }
 }

@@ -321,10 +321,13 @@ fn frequencies_just_beyond_the_step_are_told_from_those_just_below() {
     for n in [1, 8] {
         // (A chain that is held at one end: ω = 2 √k cos(π/(2 n + 1)), √k of one mass.)
         let highest = 2.0 * (std::f64::consts::PI / (2.0 * n as f64 + 1.0)).cos();
-        for (beyond, h) in [0.99, 0.9998, 1.01].into_iter().flat_map(|beyond| [1e-3, 0.1, 10.0].map(|h| (beyond, h))) {
+        // (In any unit of time and of length.)
+        let units = [(1e-3, 1.0), (0.1, 1.0), (10.0, 1.0), (0.1, 1e-12), (0.1, 1e12)];
+        for (beyond, (h, speed)) in [0.99, 0.9998, 1.01].into_iter().flat_map(|beyond| units.map(|unit| (beyond, unit)))
+        {
             let k = (2.0 * beyond / (h * highest)).powi(2);
             let mut velocity = vec![0.0; n];
-            velocity[0] = 1.0;
+            velocity[0] = speed;
             let mut run = Simulation::builder(Hardening::new(n, k, 0.0), CentralDifference, h)
                 .velocity(velocity)
                 .build()
