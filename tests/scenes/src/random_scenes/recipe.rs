@@ -188,7 +188,16 @@ impl Recipe {
     }
 
     pub(super) fn has_mass(&self) -> bool {
-        self.mass.iter().any(|&m| m > 0.0) || self.elements.iter().any(|element| element.shared_mass > 0.0)
+        self.masses().next().is_some()
+    }
+
+    /// Of the dofs that have some: those of points, and what elements give to each (the least that moves with it).
+    pub(super) fn masses(&self) -> impl Iterator<Item = f64> {
+        let mut masses = self.mass.clone();
+        for element in self.elements.iter().filter(|element| element.shared_mass > 0.0) {
+            element.dofs.iter().for_each(|&dof| masses[dof] += element.shared_mass);
+        }
+        masses.into_iter().filter(|m| *m > 0.0)
     }
 
     /// What it is made of, in a line.

@@ -98,7 +98,7 @@ impl Scales {
             *scale = list.iter().fold(*scale, |most, x| most.max(x.abs()));
         }
         let h = recipe.h;
-        let lightest = recipe.mass.iter().filter(|m| **m > 0.0).fold(f64::INFINITY, |least, m| m.min(least));
+        let lightest = recipe.masses().fold(f64::INFINITY, f64::min);
         let [u, v, a, forces, raw] = self.0;
         let forces = forces.max(raw);
         let a = a.max(forces / lightest).max(v / h);
@@ -113,10 +113,9 @@ impl Scales {
     fn known(&self, recipe: &Recipe, h: f64, eps: f64) -> [f64; 2] {
         /// Roundings of an entry of W, or of a gap.
         const ROUNDINGS: f64 = 16.0;
-        let massive = || recipe.mass.iter().copied().filter(|m| *m > 0.0);
         let [u, _, a, forces, _] = self.0;
-        let heaviest = massive().fold(0.0, f64::max);
-        let ratio = massive().fold(1.0_f64, |most, m| most.max(heaviest / m));
+        let heaviest = recipe.masses().fold(0.0, f64::max);
+        let ratio = recipe.masses().fold(1.0_f64, |most, m| most.max(heaviest / m));
         let share = |of_gaps: f64, scale: f64| if scale > 0.0 { of_gaps / scale } else { 0.0 };
         let gaps = u / (h * h);
         [share(gaps, a), share(heaviest * gaps, forces)].map(|share| ROUNDINGS * eps * ratio.max(share))
