@@ -1,5 +1,6 @@
 //! Schemes and steps that cannot work are refused when a simulation is built, with the step that works.
 
+use crate::stiffening::Hardening;
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::faer::{Mat, Side};
 use contact_dynamics::tableau::{A, Rows, U, V, Z};
@@ -250,41 +251,11 @@ fn hosts_without_stiffness_are_judged_by_their_force_or_their_own_number() {
     }
 }
 
-/// A spring k (u + u³/d²), which gives its force alone.
-struct Hardens {
-    mass: [f64; 1],
-    pattern: SymbolicSparseColMat<usize>,
-    unit: f64,
-}
-
-impl System<f64> for Hardens {
-    fn dofs(&self) -> usize {
-        1
-    }
-    fn linearity(&self) -> Linearity {
-        Linearity::Nonlinear
-    }
-    fn mass(&self) -> Mass<'_, f64> {
-        Mass::Lumped(&self.mass)
-    }
-    fn force(&mut self, _: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
-        out[0] = -u[0] * (1.0 + (u[0] / self.unit).powi(2));
-        Ok(())
-    }
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.pattern.as_ref()
-    }
-    fn tangent(&mut self, _: f64, _: &[f64], _: &[f64], _: TangentWeights<f64>, _: &mut [f64]) -> Result<()> {
-        unreachable!("there is none")
-    }
-}
-
 /// What a force alone says of the frequency is the same in any unit of length.
 #[test]
 fn forces_that_are_not_linear_are_asked_near_the_state() {
     let refused = |unit: f64, h: f64| {
-        let pattern = SymbolicSparseColMat::new_checked(1, 1, vec![0; 2], None, Vec::new());
-        let system = Hardens { mass: [1.0], pattern, unit };
+        let system = Hardening::new(1, 1.0, unit.powi(-2));
         Simulation::builder(system, CentralDifference, h).displacement(vec![0.01 * unit]).build().is_err()
     };
     for unit in [1.0, 1e-9, 1e9] {

@@ -172,7 +172,7 @@ fn meshes_and_contacts_are_judged_together() {
 }
 
 /// Unit masses with f = −k₁ d − k₃ d³ between neighbors, the first on the ground; there is no tangent.
-struct Hardening {
+pub(crate) struct Hardening {
     mass: Vec<f64>,
     pattern: SymbolicSparseColMat<usize>,
     k1: f64,
@@ -183,7 +183,7 @@ struct Hardening {
 }
 
 impl Hardening {
-    fn new(n: usize, k1: f64, k3: f64) -> Self {
+    pub(crate) fn new(n: usize, k1: f64, k3: f64) -> Self {
         let pattern = SymbolicSparseColMat::new_checked(n, n, vec![0; n + 1], None, Vec::new());
         Self { mass: vec![1.0; n], pattern, k1, k3, frequency: None, u: vec![0.0; n], evaluations: 0 }
     }
@@ -299,8 +299,8 @@ fn springs_that_harden_do_not_grow_without_a_word() {
     }
 }
 
-/// A first step that is far too long is refused however far it goes: also where the forces half a step squared further
-/// on, or the work that they do, are beyond all numbers.
+/// A first step that is far too long is refused however far it goes: also where the forces at u + ½ h² a, or the work
+/// that they do, are beyond all numbers.
 #[test]
 fn steps_that_go_astray_at_once_are_refused() {
     for power in [3, 10, 20, 29, 40, 60, 72] {
