@@ -275,3 +275,24 @@ impl<T: Real> AppliedSet<T> {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row that is held without a force, but for rounding, does not pull.
+    #[test]
+    fn multipliers_of_rounding_do_not_pull() {
+        let mut kept = 0;
+        for ulps in -6..=6 {
+            let mut product = |x: &[f64], y: &mut [f64]| (y[0], y[1]) = (2.0 * x[0] + x[1], x[0] + 2.0 * x[1]);
+            let (offset, sets) = ([-2.0, f64::from(ulps) * f64::EPSILON - 1.0], [AdmissibleSet::NonNegative; 2]);
+            let mut problem = AppliedProblem::new(&mut product, &[2.0; 2], &offset, &sets, &[1e-14; 2]).unwrap();
+            let mut multipliers = [1.0; 2];
+            AppliedSet::default().solve(&mut problem, &mut multipliers).unwrap();
+            assert!(multipliers[1] >= 0.0 && (multipliers[0] - 1.0).abs() < 1e-14, "{ulps}: {multipliers:?}");
+            kept += usize::from(multipliers[1] > 0.0);
+        }
+        assert!((1..13).contains(&kept), "{kept}");
+    }
+}

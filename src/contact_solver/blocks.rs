@@ -40,9 +40,12 @@ impl<T: Real> BlockAcceptance<T> {
 
     /// The rule for a problem, whose rest is known to be sound.
     pub(super) fn of(problem: &ContactProblem<'_, T>, tolerance: T) -> Self {
+        /// What in single precision, of which little would be left, may be rounding at most.
+        const SHARE: f64 = 3e-3;
         let scale = T::largest(problem.offset);
         let accepted = (tolerance * scale).max(nothing());
-        Self { accepted, largest: T::epsilon().powf(T::of(0.4)) * T::of(32.0) * scale }
+        let share = (T::epsilon().powf(T::of(0.4)) * T::of(32.0)).min(T::of(SHARE));
+        Self { accepted, largest: share * scale }
     }
 
     /// Whether every block is solved.

@@ -20,6 +20,7 @@ pub(super) struct ConeNewton<T> {
     right: Vec<T>,
     y: Vec<T>,
     tried: Vec<T>,
+    found: Vec<T>,
     /// A proximal problem: its W, offset and center.
     shifted: Vec<T>,
     offset: Vec<T>,
@@ -105,19 +106,19 @@ impl<T: Real> ConeNewton<T> {
 
     /// Memory for so many rows, if there have never been as many.
     fn make_room(&mut self, size: usize) {
-        let Self { factor, statuses, rows, matrix, right, y, tried, .. } = self;
+        let Self { factor, statuses, rows, matrix, right, y, tried, found, .. } = self;
         if matrix.capacity() < size * size {
             factor.reserve_general(size);
             matrix.reserve(size * size - matrix.len());
         }
         statuses.reserve(size.saturating_sub(statuses.len()));
         rows.reserve(size.saturating_sub(rows.len()));
-        for values in [right, y, tried] {
+        for values in [right, y, tried, found] {
             values.reserve(size.saturating_sub(values.len()));
         }
     }
 
-    /// Newton iterations; says whether they have ended. If not, the multipliers are left as they were.
+    /// Newton iterations; says whether they have ended, and nothing pulls. If not, the multipliers are left as they were.
     fn newton(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -125,7 +126,7 @@ impl<T: Real> ConeNewton<T> {
         spent: &mut usize,
         multipliers: &mut [T],
     ) -> bool {
-        let mut tried = std::mem::take(&mut self.tried);
+        let [mut tried, mut found] = [&mut self.tried, &mut self.found].map(std::mem::take);
         tried.clear();
         tried.extend_from_slice(multipliers);
         let mut solved = false;
@@ -138,10 +139,15 @@ impl<T: Real> ConeNewton<T> {
             }
         }
         if solved {
-            multipliers.copy_from_slice(&tried);
-            self.let_go(problem, acceptance, &mut tried, multipliers);
+            found.clear();
+            found.extend_from_slice(&tried);
+            self.let_go(problem, acceptance, &mut tried, &mut found);
+            solved = !pulls(problem, &found);
         }
-        self.tried = tried;
+        if solved {
+            multipliers.copy_from_slice(&found);
+        }
+        (self.tried, self.found) = (tried, found);
         solved
     }
 
@@ -314,6 +320,16 @@ impl<T: Real> ConeNewton<T> {
 /// Whether the force of a block that only presses pulls.
 fn is_pulled<T: Real>(first: usize, set: AdmissibleSet, multipliers: &[T]) -> bool {
     !set.is_bilateral() && multipliers[first] < T::zero()
+}
+
+/// Whether a contact pulls by more than the rounding of the largest multiplier, rows measured by √W_ii.
+fn pulls<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
+    /// Roundings by which a contact may pull.
+    const ROUNDINGS: f64 = 16.0;
+    let measured = |row: usize| multipliers[row] * problem.delassus(row, row).max(T::zero()).sqrt();
+    let largest = (0..problem.size()).map(|row| measured(row).abs()).fold(T::zero(), T::max);
+    let least = T::of(-ROUNDINGS) * T::epsilon() * largest;
+    problem.blocks().any(|(rows, set)| !set.is_bilateral() && measured(rows.start) < least)
 }
 
 /// What the rows of a block are at these multipliers and y.

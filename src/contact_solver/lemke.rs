@@ -532,3 +532,21 @@ impl<T: Real> ContactSolver<T> for Lemke<T> {
         Err(failure(problem, pivots, multipliers))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A contact that rounding pulls has no force, and no friction of either sign.
+    #[test]
+    fn what_is_left_of_cones_is_nothing() {
+        let (w, offset) = ([1.0, 0.0, 0.0, 1.0], [1.0, 0.0]);
+        let sets = [AdmissibleSet::Cone2 { friction: 0.5 }];
+        let problem = ContactProblem::of(&w, &offset, &sets, &offset, 0);
+        for (before, after) in [([-1e-17, 1e-17], [0.0; 2]), ([-1e-17, -1e-17], [0.0; 2]), ([2.0, -1.5], [2.0, -1.0])] {
+            let mut multipliers: [f64; 2] = before;
+            Lemke::tidy(&problem, &mut multipliers);
+            assert!(multipliers == after, "{before:?}: {multipliers:?}");
+        }
+    }
+}

@@ -162,3 +162,27 @@ fn spread<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multipli
         [] => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a sweep says that it has changed is what it has changed, and NaN if that is.
+    #[test]
+    fn a_sweep_says_its_largest_change() {
+        let (w, tolerance) = ([2.0, 1.0, 1.0, 4.0], [1e-14; 2]);
+        let sets = [AdmissibleSet::NonNegative; 2];
+        for (offset, most) in [([-2.0, -5.0], 4.0), ([-8.0, -5.0], 8.0), ([1.0, 2.0], 0.0)] {
+            let problem = ContactProblem::of(&w, &offset, &sets, &tolerance, 0);
+            let (mut sweeps, mut multipliers) = (Sweeps::default(), [0.0; 2]);
+            sweeps.begin(&problem, &multipliers);
+            // (The second row is solved with the multiplier of the first one: 1 or 4.)
+            let change: f64 = sweeps.sweep(&problem, 1.0, &mut multipliers);
+            assert!((change - most).abs() < 1e-15, "{offset:?}: {change}");
+        }
+        let problem = ContactProblem::of(&w, &[f64::NAN, -5.0], &sets, &tolerance, 0);
+        let (mut sweeps, mut multipliers) = (Sweeps::default(), [0.0; 2]);
+        sweeps.begin(&problem, &multipliers);
+        assert!(!(sweeps.sweep(&problem, 1.0, &mut multipliers) <= 1.0));
+    }
+}

@@ -221,8 +221,25 @@ impl<T: Real> Rubbing<T> {
                 break;
             }
         }
+        self.keep_in_cones(positions, presses);
         self.measure(positions, group);
         Ok(())
+    }
+
+    /// Takes back friction beyond its cone that was accepted as rounding, which beside much heavier bodies is far more
+    /// than that of the forces at the contact itself.
+    fn keep_in_cones(&mut self, positions: &[usize], presses: T) {
+        for &position in positions {
+            let block = self.blocks[self.owners[position]];
+            let is_found = block.place == position && block.direction.is_none() && block.known.is_none();
+            let Some(friction) = block.set.friction().filter(|_| is_found) else { continue };
+            let bound = T::of(friction) * (presses * self.totals[position]).max(T::zero());
+            let tangential = &mut self.totals[position + 1..=position + block.tangents];
+            let size = tangential.iter().fold(T::zero(), |size, &f| size.hypot(f));
+            if size > (T::one() + T::epsilon().sqrt()) * bound {
+                tangential.iter_mut().for_each(|f| *f *= bound / size);
+            }
+        }
     }
 
     /// Solves where the equations with the friction of what slides have no solution, since some of it would be pulled:

@@ -92,3 +92,35 @@ pub(super) fn respond<T: Real>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_solver::Cholesky;
+    use faer::sparse::{SparseColMat, Triplet};
+
+    /// A side of a block of springs is eliminated last, its whole surface is not: it would be a dense triangle.
+    #[test]
+    fn a_whole_surface_is_no_interface_to_condense_to() {
+        const SIDE: usize = 12;
+        let place = |node: usize| [node / (SIDE * SIDE), node / SIDE % SIDE, node % SIDE];
+        let mut entries = Vec::new();
+        for node in 0..SIDE * SIDE * SIDE {
+            entries.push(Triplet::new(node, node, 6.0));
+            for (axis, stride) in [SIDE * SIDE, SIDE, 1].into_iter().enumerate() {
+                if place(node)[axis] + 1 < SIDE {
+                    entries.push(Triplet::new(node, node + stride, -1.0));
+                    entries.push(Triplet::new(node + stride, node, -1.0));
+                }
+            }
+        }
+        let dofs = SIDE * SIDE * SIDE;
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(dofs, dofs, &entries).unwrap();
+        let solver: &dyn LinearSolver<f64> = &Cholesky::default();
+        let path = |interface: &[usize], varies| analyze(solver, matrix.symbolic(), interface, varies).unwrap().1;
+        let is_outside = |node: &usize| place(*node).iter().any(|&at| at == 0 || at == SIDE - 1);
+        let [side, surface]: [Vec<usize>; 2] = [(0..SIDE * SIDE).collect(), (0..dofs).filter(is_outside).collect()];
+        assert_eq!(path(&side, false), ContactPath::Condensed);
+        assert_eq!([path(&surface, false), path(&surface, true)], [ContactPath::Full; 2]);
+    }
+}

@@ -150,3 +150,23 @@ impl<T: Real> CurvedRowsWork<T> {
         if self.apart { self.version } else { constraints.version() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forces that do not settle as well as gaps are accepted after many linearizations, not before.
+    #[test]
+    fn forces_may_miss_more_once_rows_are_tired() {
+        let miss = |force| Miss { gap: 1e-9, force };
+        let settled = |force, passes| miss(force).is_settled::<f64>(passes, [miss(2.0 * force), miss(force)], true);
+        for passes in [1, 2, LONG] {
+            assert!(settled(0.5 * NEAR, passes) && !settled(0.5 * TIRED, passes), "{passes}");
+        }
+        for passes in [SLOW + 1, FOLLOWED] {
+            assert!(settled(0.5 * TIRED, passes) && !settled(2.0 * TIRED, passes), "{passes}");
+        }
+        // Unless they still fall by more than a quarter from pass to pass.
+        assert!(!miss(0.5 * TIRED).is_settled::<f64>(SLOW + 1, [miss(0.1), miss(0.2)], true));
+    }
+}

@@ -104,3 +104,23 @@ fn has_diagonal_damping<T: Real>(system: &mut dyn System<T>) -> Result<bool> {
     };
     Ok((0..pattern.ncols()).all(on_diagonal))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::LinearSystem;
+    use faer::sparse::{SparseColMat, Triplet};
+
+    /// A scheme whose matrix is that of the mass alone is given no more, whether the system is damped or not.
+    #[test]
+    fn what_a_scheme_does_not_read_is_not_in_its_pattern() {
+        let entries = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)].map(|(i, j, x)| Triplet::new(i, j, x));
+        let k = SparseColMat::try_new_from_triplets(2, 2, &entries).unwrap();
+        let system = LinearSystem::<f64>::lumped(vec![1.0, 2.0], k).unwrap();
+        let mut damped = system.rayleigh(0.0, 0.1).unwrap();
+        for (weights, expected) in [([0.0, 0.0, 1.0], false), ([0.0, 0.5, 1.0], true), ([0.3, 0.0, 1.0], true)] {
+            let (tangent, _) = pattern(&mut damped, weights).unwrap();
+            assert_eq!(tangent == Tangent::Present, expected, "{weights:?}");
+        }
+    }
+}

@@ -1,8 +1,9 @@
 //! Weighted gaps: patch tests, derivatives, momentum, impacts, what is covered in part, what is refused.
 
 use super::two_bodies::check_impact;
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
+use contact_dynamics::contact::{Candidates, ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
 use contact_dynamics::{Composite, Error, Real, Simulation, StepControl, verify};
+use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
@@ -625,4 +626,20 @@ fn normals_point_to_where_gaps_open() {
             }
         }
     }
+}
+
+/// Where nothing has moved nothing has changed: what was formed of the rows is kept.
+#[test]
+fn a_second_search_at_the_same_place_changes_nothing() {
+    let stack = Stack::new(plates(3, 4), 0.01, |x| x);
+    let mut contact = mortar(&stack, true);
+    let mut u = vec![0.0; stack.solid.dofs()];
+    let v = vec![0.0; u.len()];
+    contact.search_on(0.0, &u, &v, 0.0).unwrap();
+    assert_eq!(contact.search_on(0.0, &u, &v, 0.0).unwrap(), Candidates::Unchanged);
+    for (node, place) in stack.solid.nodes.iter().enumerate().filter(|(_, place)| place[1] > 1.005) {
+        u[2 * node + 1] = 0.01 * place[0];
+    }
+    assert_eq!(contact.search_on(0.0, &u, &v, 0.0).unwrap(), Candidates::Changed);
+    assert_eq!(contact.search_on(0.0, &u, &v, 0.0).unwrap(), Candidates::Unchanged);
 }

@@ -416,6 +416,26 @@ mod facets {
         }
     }
 
+    /// A triangle ends where it ends: a node that goes down beside it has not gone through.
+    #[test]
+    fn ways_beside_a_triangle_do_not_go_through_it() {
+        for (place, meets) in [([0.2, 0.3], true), ([0.45, 0.45], true), ([0.8, 0.8], false), ([0.6, 0.6], false)] {
+            let [x, y] = place;
+            let nodes = [[x, y, 0.2], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+            let dofs: Vec<[usize; 3]> = (0..4).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+            let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], [[1, 2, 3]]).unwrap();
+            let mut contact = contact.reach(0.1).unwrap();
+            let own: Vec<usize> = contact.dofs().to_vec();
+            let still = vec![0.0; own.len()];
+            let end: Vec<f64> = own.iter().map(|&dof| if dof == 2 { -1.2 } else { 0.0 }).collect();
+            // (Nothing promises that it moves: it has no row.)
+            contact.search(0.0, &still, &still, 1.0).unwrap();
+            assert!(Contacts::of(&contact).is_empty());
+            let looked = contact.inspect(&Stride::new([0.0, 1.0], [&still, &end], &end, [&[], &[]]));
+            assert_eq!(matches!(looked, Err(Error::PassedThrough { .. })), meets, "{place:?}: {looked:?}");
+        }
+    }
+
     #[test]
     fn no_node_passes_through_facets() {
         sweep("square", [1.0, 1.0], false);

@@ -1,7 +1,7 @@
 //! Ties: constant tractions and linear displacements pass exactly, surfaces that do not fit turn freely, what is
 //! refused.
 
-use contact_dynamics::contact::{ContactConstraint, Surface, Tie};
+use contact_dynamics::contact::{Candidates, ContactConstraint, Surface, Tie};
 use contact_dynamics::{EnergyMomentum, Error, Newmark, Real, Simulation, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -72,6 +72,40 @@ fn linear_displacements_and_constant_tractions_pass() {
             }
         }
     }
+}
+
+/// Rows that turn have changed where what is tied has moved, and only there.
+#[test]
+fn rows_at_the_same_place_are_the_same() {
+    let bodies = [3, 4].map(|cells| Solid::rectangle([1.0; 2], [cells, 2], MATERIAL));
+    let stack = Stack::new(bodies, 0.02, |x| x);
+    let mut tie = tied(&stack, true).reach(0.05).unwrap();
+    let turned = |angle: f64| -> Vec<f64> {
+        let (sin, cos) = angle.sin_cos();
+        stack.solid.nodes.iter().flat_map(|&[x, y]| [cos * x - sin * y - x, sin * x + cos * y - y]).collect()
+    };
+    for angle in [0.0, 0.1, 1.0] {
+        let u = turned(angle);
+        let moved = tie.follow_on(0.0, &u).unwrap();
+        assert!(angle == 0.0 || moved == Candidates::Changed, "{angle}");
+        assert_eq!(tie.follow_on(0.0, &u).unwrap(), Candidates::Unchanged, "{angle}");
+    }
+}
+
+/// A side that rises from another one is tied up to its reach, and no further.
+#[test]
+fn what_is_beyond_the_reach_is_not_tied() {
+    let coordinates = [[0.0, 0.0], [1.0, 0.4], [1.5, 0.0], [-0.5, 0.0]];
+    let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
+    let covered = |reach: f64| {
+        let tie = Tie::new(&coordinates, &dofs, [[0, 1]], [[2, 3]]).unwrap().reach(reach).unwrap();
+        (0..tie.nodes().len()).map(|place| tie.area(place)).sum::<f64>()
+    };
+    // (Points of integration are in or out.)
+    let length = 1.0_f64.hypot(0.4);
+    assert!((covered(10.0) / length - 1.0).abs() < 1e-12);
+    let half = covered(0.2) / length;
+    assert!(half > 0.25 && half < 0.75, "{half}");
 }
 
 #[test]

@@ -146,6 +146,35 @@ fn two_bodies_rub_without_losing_momentum() {
     assert!((works.friction / -0.8 - 1.0).abs() < 0.05, "{works:?}");
 }
 
+/// A run whose contacts are found after its start has the work of their friction in its books.
+#[test]
+fn friction_of_contacts_that_are_found_later_is_booked() {
+    let lower = Solid::rectangle([4.0, 0.5], [12, 2], MATERIAL);
+    let split = lower.nodes.len();
+    let upper = Solid::rectangle([1.0, 0.5], [5, 2], MATERIAL).moved([0.5, 0.5 + 8e-4]);
+    let (solid, contact, bottom) = stacked(lower, upper, 0.4);
+    let speed = |dof: usize| if dof % 2 == 0 { 0.2 } else { -0.05 };
+    let mut system = solid.system::<f64>();
+    for &node in &bottom {
+        system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();
+    }
+    let mut run = Simulation::builder(system, GeneralizedAlpha::chung_hulbert(0.8).unwrap(), 1e-3)
+        .velocity((0..solid.dofs()).map(|dof| if dof >= 2 * split { speed(dof) } else { 0.0 }).collect())
+        .constraint(contact.reach(1e-4).unwrap())
+        .energy_balance()
+        .build()
+        .unwrap();
+    assert!(run.state().contacts().ids().is_empty());
+    let along: Vec<_> = (0..solid.dofs()).map(|dof| f64::from(dof % 2 == 0)).collect();
+    let (start, pushed) = (run.energy().total(), run.momentum(&along).unwrap());
+    run.run_until(0.1, &mut ()).unwrap();
+    // What it loses along the other one friction takes, by the mean velocity; the rest is in waves.
+    let slowed = (run.momentum(&along).unwrap() - pushed).abs();
+    let work = -run.energy().works.unwrap().friction;
+    assert!(slowed > 0.05 * pushed && work > 0.01 * start, "{slowed:e} of {pushed:e}, {work:e} of {start:e}");
+    assert!(work > 0.5 * 0.2 * slowed && work < 1.1 * 0.2 * slowed, "{work:e} for {:e}", 0.2 * slowed);
+}
+
 /// Two bodies that turn together do not slip on each other.
 #[test]
 fn turning_together_is_no_slip() {

@@ -106,3 +106,28 @@ fn correction_against_a_moving_stop_books_the_change_of_kinetic_energy() {
     let booked = corrected.works.unwrap().corrections;
     assert!(change.abs() > 1e-3 && (booked - change).abs() < 1e-13, "{booked} for {change}");
 }
+
+#[test]
+fn the_work_of_contact_is_booked_from_the_first_step_of_a_multistep_scheme() {
+    use contact_dynamics::contact::GapOffset;
+    use contact_dynamics::{Bdf2, LinearRows};
+    // A floor that rises with v = 1 + ½ j t² under a mass that a load of 1 presses on it: λ = 1 + j t.
+    let (jerk, h) = (5.0, 0.1);
+    let floor = GapOffset::moving(move |t| [-t - jerk * t.powi(3) / 6.0, -1.0 - 0.5 * jerk * t * t, -jerk * t]);
+    let system = LinearSystem::lumped(vec![1.0], matrix(1, [(0, 0, 0.0)])).unwrap().load(|_, f| f[0] = -1.0);
+    let mut run = Simulation::builder(system, Bdf2, h)
+        .velocity(vec![1.0])
+        .constraint(LinearRows::new().unilateral(&[(0, 1.0)], floor))
+        .energy_balance()
+        .build()
+        .unwrap();
+    let mut before = 0.0;
+    for step in 0..3 {
+        run.step().unwrap();
+        let work = |t: f64| t + 0.5 * jerk * t * t + jerk * t.powi(3) / 6.0 + jerk * jerk * t.powi(4) / 8.0;
+        let (t, total) = (run.time(), run.energy().works.unwrap().contact);
+        let exact = work(t) - work(t - h);
+        assert!(((total - before) / exact - 1.0).abs() < 0.03, "step {step}: {} for {exact}", total - before);
+        before = total;
+    }
+}

@@ -3,11 +3,13 @@
 use contact_dynamics::analysis::massless_factor;
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::corrector::ContactStabilized;
+use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::tableau::A;
 use contact_dynamics::{
-    Bathe, Bdf2, Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, MoreauJean, Newmark, Newton,
-    NodesOnObstacle, PersistencyCorrection, Simulation, SimulationBuilder, TimeIntegrator,
+    Bathe, Bdf2, Composite, Corrector, DampingForce, Error, GeneralizedAlpha, LinearRows, LinearSystem, Mass,
+    MoreauJean, Newmark, Newton, NodesOnObstacle, PersistencyCorrection, Result, Simulation, SimulationBuilder, System,
+    TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -15,6 +17,56 @@ use contact_dynamics_scenes::measure::{figures, record_run};
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, springs};
+
+/// A mass (dof 0) on a dashpot of force w³ whose other end (dof 1) has none, and another one to the ground.
+struct Dashpots {
+    mass: [f64; 2],
+    pattern: SymbolicSparseColMat<usize>,
+}
+
+impl System<f64> for Dashpots {
+    fn dofs(&self) -> usize {
+        2
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, _: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        self.evaluate(u, v, out)?;
+        out.iter_mut().for_each(|force| *force = -*force);
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, _: &[f64], v: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        let slope = weights.damping * 3.0 * (v[0] - v[1]).powi(2);
+        out.copy_from_slice(&[slope, -slope, -slope, slope + weights.damping]);
+        Ok(())
+    }
+    fn damping_force(&mut self) -> Option<&mut dyn DampingForce<f64>> {
+        Some(self)
+    }
+}
+
+impl DampingForce<f64> for Dashpots {
+    fn evaluate(&mut self, _: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
+        let force = (v[0] - v[1]).powi(3);
+        out.copy_from_slice(&[force, v[1] - force]);
+        Ok(())
+    }
+}
+
+/// The end without mass begins with the velocity v at which both dashpots have one force: (1 − v)³ = v, by as many
+/// iterations as that takes.
+#[test]
+fn dofs_on_nonlinear_dampers_begin_with_the_velocity_of_their_balance() {
+    let pattern = SymbolicSparseColMat::new_checked(2, 2, vec![0, 2, 4], None, vec![0, 1, 0, 1]);
+    let system = Dashpots { mass: [1.0, 0.0], pattern };
+    let run = Simulation::builder(system, Newmark::trapezoidal(), 0.01).velocity(vec![1.0, 0.0]).build().unwrap();
+    let v = run.state().velocity();
+    assert!((v[0] - 1.0).abs() < 1e-15 && ((1.0 - v[1]).powi(3) - v[1]).abs() < 1e-14, "{v:?}");
+}
 
 const STIFFNESS: f64 = 400.0;
 const SPEED: f64 = 2.0;
