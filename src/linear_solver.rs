@@ -15,6 +15,7 @@ mod shared;
 mod tridiagonal;
 
 pub use by_body::ByBody;
+pub(crate) use by_body::components;
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::{ConjugateGradients, Preconditioner};
 pub use diagonal::Diagonal;

@@ -137,7 +137,7 @@ fn root(above: &mut [usize], mut dof: usize) -> usize {
 }
 
 /// The component of each dof, and the dofs of each component, both ascending. The pattern need not be symmetric.
-fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<usize>, Vec<Vec<usize>>) {
+pub(crate) fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<usize>, Vec<Vec<usize>>) {
     let n = pattern.ncols();
     // A forest: every dof points toward the smallest one of its tree.
     let mut above: Vec<usize> = (0..n).collect();

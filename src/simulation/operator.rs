@@ -273,6 +273,9 @@ impl<T: Real> Operator<T> {
 
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
     /// `versions` counts those given so far.
+    ///
+    /// Of a power law that just touches the compliance is beyond all numbers. More than ε⁻⁴ of W of the row is no more
+    /// than that: what such a spring does is lost beside everything else, whatever the unit.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,
@@ -287,9 +290,12 @@ impl<T: Real> Operator<T> {
             self.assemble(g, rows, is_known)?;
         }
         let Delassus { values, diagonal, version, .. } = &mut self.delassus;
+        let square = T::epsilon() * T::epsilon();
+        let most = (square * square).recip();
         for (k, &own) in diagonal.iter().enumerate() {
             let entry = &mut values[k * rows.len() + k];
-            let value = own + compliance(k);
+            let most = if own > T::zero() { most * own } else { T::infinity() };
+            let value = own + compliance(k).min(most);
             changed |= *entry != value;
             *entry = value;
         }

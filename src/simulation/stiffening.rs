@@ -8,6 +8,7 @@ use crate::contact::ContactJacobian;
 use crate::contact_id::ContactId;
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
+use crate::linear_solver::components;
 use crate::mass::Mass;
 use crate::real::Real;
 use crate::state::{Clock, Motion};
@@ -32,7 +33,11 @@ const LEAP: f64 = 4.0;
 /// * Systems that stiffen: the quotient of ½ h² a between u and u + ½ h² a, where accelerations have grown and turned
 ///   their sign, as those of motions beyond the limit do in every step, or have become several times as large. (Of such
 ///   a motion u + ½ h² a is the next state, so that for a nonlinear force it is the mean stiffness over the step that
-///   counts: a spring of the third power grows without bound exactly beyond it.)
+///   counts: a spring of the third power grows without bound exactly beyond it.) Body by body, as far as the pattern of
+///   the tangent tells them apart: beside one that falls, or that a large force moves, a light one would not be seen.
+///   Of one body among several growth is looked at where what the step has changed, Δaᵀ M Δa over Δaᵀ M Δu, is nearly
+///   as stiff as the limit, and no contact of the body has closed or opened: what swings through its rest, or is hit,
+///   costs nothing.
 ///
 /// Nothing is remembered from step to step but which springs have been found admissible.
 #[derive(Debug)]
@@ -42,12 +47,59 @@ pub(super) struct Stiffening<T> {
     may_stiffen: bool,
     /// Rows that press by springs without coupling in the step, and their stiffness.
     springs: Vec<(usize, f64)>,
+    /// The body of each dof; none where there is one only.
+    body: Vec<usize>,
+    bodies: Vec<Body<T>>,
     /// One entry a dof, zero between steps.
     sums: Vec<T>,
     way: Vec<T>,
     force: [Vec<T>; 2],
     /// Springs that were found admissible together, with a step size.
     cleared: (Vec<(ContactId, f64)>, f64),
+}
+
+/// What is summed of a body, in the norm of a lumped mass.
+#[derive(Clone, Copy, Debug)]
+struct Body<T> {
+    /// Squares of the accelerations at the start of the step and at its end, and their product.
+    accelerations: [T; 3],
+    /// Square of the change of the accelerations, and its product with that of the displacements.
+    changes: [T; 2],
+    /// Whether its quotient is asked for.
+    is_asked: bool,
+    /// The largest way and the largest displacement.
+    far: T,
+    near: T,
+    /// Numerator and denominator of the quotient.
+    stiffness: T,
+    mass: T,
+}
+
+impl<T: Real> Body<T> {
+    fn nothing() -> Self {
+        let zero = T::zero();
+        let (accelerations, changes) = ([zero; 3], [zero; 2]);
+        Self { accelerations, changes, is_asked: false, far: zero, near: zero, stiffness: zero, mass: zero }
+    }
+
+    /// Whether accelerations have turned their sign and grown, or leapt.
+    fn grows(&self) -> bool {
+        let [before, now, both] = self.accelerations;
+        let turns = both < T::zero() && T::of(4.0) * both * both > before * now;
+        turns && now > T::of(GROWTH * GROWTH) * before || now > T::of(LEAP * LEAP) * before
+    }
+
+    /// Whether what has changed in the step may be as stiff as `most`, the square of a frequency.
+    fn may_be_stiff(&self, most: f64) -> bool {
+        /// Share of the limit from which on it is looked at. (Where u grows by far more than twice in a step, and a
+        /// scheme gives accelerations of the step before, it is the square of the frequency over that growth: 1/h².)
+        const SHARE: f64 = 0.1;
+        self.changes[0] > T::of(SHARE * most) * self.changes[1].abs()
+    }
+
+    fn square(&self) -> f64 {
+        self.stiffness.value() / self.mass.value()
+    }
 }
 
 /// A step that has been taken, but not accepted.
@@ -72,10 +124,13 @@ impl<T: Real> Stiffening<T> {
         }
         let critical = stability::critical(scheme)?;
         let dofs = || vec![T::zero(); system.dofs()];
+        let (body, bodies) = bodies(system);
         Some(Self {
             critical,
             may_stiffen,
             springs: Vec::new(),
+            body,
+            bodies: vec![Body::nothing(); bodies],
             sums: dofs(),
             way: dofs(),
             force: [dofs(), dofs()],
@@ -108,13 +163,60 @@ impl<T: Real> Stiffening<T> {
         {
             return Err(self.refusal(&mut step, frequency * frequency, None));
         }
-        if grows(&*step.system, step.start, step.new)
-            && let Some(square) = self.quotient(&mut step)
-            && square > most * (1.0 + 1e-3_f64.max(32.0 * T::epsilon().value().sqrt()))
+        let beyond = most * (1.0 + 1e-3_f64.max(32.0 * T::epsilon().value().sqrt()));
+        if self.grows(&step, most)
+            && let Some(square) = self.quotient(&mut step, beyond)
+            && square > beyond
         {
             return Err(self.refusal(&mut step, square, None));
         }
         Ok(())
+    }
+
+    fn body_of(&self, dof: usize) -> usize {
+        self.body.get(dof).copied().unwrap_or(0)
+    }
+
+    /// Finds the bodies whose accelerations have grown; says whether there are any.
+    fn grows(&mut self, step: &Taken<'_, '_, T>, most: f64) -> bool {
+        let mass = match step.system.mass() {
+            Mass::Lumped(mass) => mass,
+            Mass::Consistent(_) => &[],
+        };
+        let (start, new) = (step.start, step.new);
+        self.bodies.fill(Body::nothing());
+        for (dof, (&x, &y)) in start.a.iter().zip(&new.a).enumerate() {
+            let m = mass.get(dof).copied().unwrap_or(T::one());
+            let of = self.body_of(dof);
+            let Body { accelerations: [before, now, both], changes: [square, product], .. } = &mut self.bodies[of];
+            *before += m * x * x;
+            *now += m * y * y;
+            *both += m * x * y;
+            if !self.body.is_empty() {
+                *square += m * (y - x) * (y - x);
+                *product += m * (y - x) * (new.u[dof] - start.u[dof]);
+            }
+        }
+        let mut all = Body::<T>::nothing();
+        for body in &self.bodies {
+            all.accelerations.iter_mut().zip(body.accelerations).for_each(|(sum, own)| *sum += own);
+        }
+        let all_grow = all.grows();
+        for body in &mut self.bodies {
+            body.is_asked = all_grow || body.grows() && body.may_be_stiff(most);
+        }
+        if !all_grow {
+            let ContactWork { rows, trial, closed_at_start, .. } = step.contact;
+            let forces = rows.curved.forces(step.g);
+            let flags = trial.closed.iter().zip(closed_at_start).enumerate();
+            for (row, _) in flags.filter(|(_, (now, before))| now != before) {
+                for (dof, _) in forces.row(row) {
+                    let of = self.body_of(dof);
+                    self.bodies[of].is_asked = false;
+                }
+            }
+        }
+        self.bodies.iter().any(|body| body.is_asked)
     }
 
     fn list_springs(&mut self, step: &Taken<'_, '_, T>) {
@@ -188,31 +290,64 @@ impl<T: Real> Stiffening<T> {
         Ok(())
     }
 
-    /// The Rayleigh quotient of ½ h² a, if it is large enough beside u to have digits.
-    fn quotient(&mut self, step: &mut Taken<'_, '_, T>) -> Option<f64> {
+    /// The largest Rayleigh quotient of ½ h² a of the bodies that are asked, of those in which it is large enough beside
+    /// u to have digits.
+    fn quotient(&mut self, step: &mut Taken<'_, '_, T>, beyond: f64) -> Option<f64> {
         let Taken { system, new, clock, .. } = step;
-        let largest = |x: &[T]| x.iter().fold(T::zero(), |most, x| most.max(x.abs()));
         let half = T::of(0.5 * clock.h * clock.h);
         self.way.copy_from_slice(&new.a);
-        self.way.iter_mut().for_each(|way| *way *= half);
         for &dof in system.prescribed() {
             self.way[dof] = T::zero();
         }
-        let [far, near] = [largest(&self.way), largest(&new.u)];
-        if far <= T::epsilon().sqrt() * near {
+        for dof in 0..self.way.len() {
+            let of = self.body_of(dof);
+            self.way[dof] *= half;
+            let Body { far, near, .. } = &mut self.bodies[of];
+            (*far, *near) = (far.max(self.way[dof].abs()), near.max(new.u[dof].abs()));
+        }
+        for body in &mut self.bodies {
+            body.is_asked &= body.far > T::epsilon().sqrt() * body.near;
+        }
+        let asked = self.bodies.iter().filter(|body| body.is_asked).count();
+        if asked == 0 {
             return None;
         }
-        let mut square = self.mean(step)?;
-        if !square.is_finite() {
+        self.keep_ways();
+        self.means(step)?;
+        if self.bodies.iter().any(|body| body.is_asked && !body.square().is_finite()) {
             // (The forces there, or what work they do, are beyond all numbers: as far as displacements are, then.)
-            self.way.iter_mut().for_each(|way| *way *= near / far);
-            square = self.mean(step)?;
+            for dof in 0..self.way.len() {
+                let Body { far, near, .. } = self.bodies[self.body_of(dof)];
+                if far > near {
+                    self.way[dof] *= near / far;
+                }
+            }
+            self.means(step)?;
         }
-        square.is_finite().then_some(square)
+        let squares = self.bodies.iter().enumerate().filter(|(_, body)| body.is_asked);
+        let squares = squares.map(|(k, body)| (k, body.square())).filter(|(_, square)| square.is_finite());
+        let (largest, square) = squares.max_by(|x, y| x.1.total_cmp(&y.1))?;
+        if asked == 1 || square <= beyond {
+            return Some(square);
+        }
+        // (Alone: what bodies did to each other, of which the pattern does not tell, would be no quotient.)
+        self.bodies.iter_mut().enumerate().for_each(|(k, body)| body.is_asked = k == largest);
+        self.keep_ways();
+        self.means(step)?;
+        Some(self.bodies[largest].square()).filter(|square| square.is_finite())
     }
 
-    /// The same of a way; none if the host refuses it.
-    fn mean(&mut self, step: &mut Taken<'_, '_, T>) -> Option<f64> {
+    /// Ways of bodies that are not asked are zero.
+    fn keep_ways(&mut self) {
+        for dof in 0..self.way.len() {
+            if !self.bodies[self.body_of(dof)].is_asked {
+                self.way[dof] = T::zero();
+            }
+        }
+    }
+
+    /// Finds the quotients of the ways of bodies, NaN where there is none; nothing if the host refuses them.
+    fn means(&mut self, step: &mut Taken<'_, '_, T>) -> Option<()> {
         let Taken { system, new, .. } = step;
         let [there, here] = &mut self.force;
         self.sums.copy_from_slice(&new.u);
@@ -222,16 +357,30 @@ impl<T: Real> Stiffening<T> {
         let known = known.and(system.force(new.t, &new.u, &new.v, here));
         self.sums.fill(T::zero());
         known.ok()?;
-        let mut stiffness: T = self.way.iter().zip(&*there).zip(&*here).map(|((&y, &f), &f0)| y * (f0 - f)).sum();
+        system.mass().add_product(T::one(), &self.way, &mut self.sums);
+        for body in &mut self.bodies {
+            (body.stiffness, body.mass) = (T::zero(), T::zero());
+        }
+        for dof in 0..self.way.len() {
+            let (way, of) = (self.way[dof], self.body_of(dof));
+            let body = &mut self.bodies[of];
+            body.stiffness += way * (self.force[1][dof] - self.force[0][dof]);
+            body.mass += way * self.sums[dof];
+        }
+        self.sums.fill(T::zero());
         let forces = step.contact.rows.curved.forces(step.g);
         for &(row, k) in &self.springs {
-            let product = forces.product(row, &self.way);
-            stiffness += T::of(k) * product * product;
+            for (dof, _) in forces.row(row) {
+                let of = self.body_of(dof);
+                // (Of each body once: that of its first dof in the row.)
+                let own = || forces.row(row).filter(|&(dof, _)| self.body_of(dof) == of);
+                if own().next().is_some_and(|(first, _)| first == dof) {
+                    let product: T = own().map(|(dof, weight)| weight * self.way[dof]).sum();
+                    self.bodies[of].stiffness += T::of(k) * product * product;
+                }
+            }
         }
-        system.mass().add_product(T::one(), &self.way, &mut self.sums);
-        let mass: T = self.way.iter().zip(&self.sums).map(|(&y, &product)| y * product).sum();
-        self.sums.fill(T::zero());
-        Some(stiffness.value() / mass.value())
+        Some(())
     }
 
     fn refusal(&self, step: &mut Taken<'_, '_, T>, square: f64, row: Option<usize>) -> Error {
@@ -259,19 +408,22 @@ fn highest<T: Real>(step: &mut Taken<'_, '_, T>, springs: &[(usize, f64)], enoug
     })
 }
 
-/// Whether accelerations have turned their sign and grown, or leapt, in the norm of a lumped mass.
-fn grows<T: Real>(system: &dyn System<T>, start: &Motion<T>, new: &Motion<T>) -> bool {
-    let mass = match system.mass() {
-        Mass::Lumped(mass) => mass,
-        Mass::Consistent(_) => &[],
-    };
-    let [mut before, mut now, mut both] = [T::zero(); 3];
-    for (dof, (&x, &y)) in start.a.iter().zip(&new.a).enumerate() {
-        let m = mass.get(dof).copied().unwrap_or(T::one());
-        before += m * x * x;
-        now += m * y * y;
-        both += m * x * y;
+/// The body of each dof, and how many there are. A pattern without entries says nothing, and a mass that couples what
+/// the pattern does not makes them one.
+fn bodies<T: Real>(system: &dyn System<T>) -> (Vec<usize>, usize) {
+    let pattern = system.pattern();
+    if pattern.row_idx().is_empty() {
+        return (Vec::new(), 1);
     }
-    let turns = both < T::zero() && T::of(4.0) * both * both > before * now;
-    turns && now > T::of(GROWTH * GROWTH) * before || now > T::of(LEAP * LEAP) * before
+    let (body, list) = components(pattern);
+    let is_coupled = match system.mass() {
+        Mass::Lumped(_) => false,
+        Mass::Consistent(mass) => {
+            (0..mass.ncols()).any(|column| mass.row_idx_of_col_raw(column).iter().any(|&row| body[row] != body[column]))
+        }
+    };
+    match is_coupled {
+        true => (Vec::new(), 1),
+        false => (body, list.len()),
+    }
 }

@@ -30,7 +30,7 @@ fn scenes_that_have_failed_hold() {
     let by_order = by_order.into_iter().chain([80_649_817, 91_268_618, 92_799_461, 96_569_854, 96_862_299]);
     let by_friction = [93_518_671, 95_441_833, 97_020_357, 97_083_399, 97_653_618, 100_387_625];
     let by_velocity = [70_113_558, 80_083_120, 80_155_686, 90_202_306];
-    let by_energy = [10_004_401, 50_162_224, 70_122_330, 80_083_433, 80_204_920, 90_151_631, 97_407_527];
+    let by_energy = [10_004_401, 50_162_224, 70_122_330, 80_083_433, 80_204_920, 90_151_631, 97_407_527, 103_452_536];
     let not_resumed = [50_041_867, 60_027_999];
     for seed in by_units.chain(by_order).chain(by_velocity).chain(by_energy).chain(not_resumed).chain(by_friction) {
         let recipe = Recipe::of_seed(seed);

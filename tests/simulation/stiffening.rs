@@ -314,6 +314,87 @@ fn steps_that_go_astray_at_once_are_refused() {
     }
 }
 
+/// A heavy mass (dof 0) that a constant force moves, and a spring of the third power with a light mass (dof 1).
+struct Beside {
+    mass: [f64; 2],
+    push: f64,
+    pattern: SymbolicSparseColMat<usize>,
+    evaluations: u64,
+}
+
+impl Beside {
+    fn new(heavy: f64, push: f64) -> Self {
+        let pattern = SymbolicSparseColMat::new_checked(2, 2, vec![0, 1, 2], None, vec![0, 1]);
+        Self { mass: [heavy, 1.0], push, pattern, evaluations: 0 }
+    }
+
+    /// Of the light mass.
+    fn energy(u: &[f64], v: &[f64]) -> f64 {
+        0.5 * v[1] * v[1] + 0.25 * u[1].powi(4)
+    }
+}
+
+impl System<f64> for Beside {
+    fn dofs(&self) -> usize {
+        2
+    }
+    fn mass(&self) -> Mass<'_, f64> {
+        Mass::Lumped(&self.mass)
+    }
+    fn force(&mut self, _: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> Result<()> {
+        self.evaluations += 1;
+        out.copy_from_slice(&[self.push, -u[1].powi(3)]);
+        Ok(())
+    }
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.pattern.as_ref()
+    }
+    fn tangent(&mut self, _: f64, u: &[f64], _: &[f64], weights: TangentWeights<f64>, out: &mut [f64]) -> Result<()> {
+        out.copy_from_slice(&[0.0, weights.stiffness * 3.0 * u[1] * u[1]]);
+        Ok(())
+    }
+}
+
+/// What a large force does to one body hides nothing of another: the light spring is refused before it has gone far,
+/// and costs nothing while it is resolved.
+#[test]
+fn bodies_are_judged_one_by_one() {
+    let h = 0.1;
+    for (heavy, push) in [(1.0, 0.0), (1e6, 1e9), (1e12, 1e18)] {
+        for (listed, critical) in conditional() {
+            let name = listed.name();
+            let amplitude = 2.0 * critical / h;
+            let mut system = Beside::new(heavy, push);
+            let mut run = Simulation::builder(&mut system, (listed.make)(), h)
+                .velocity(vec![0.0, amplitude * amplitude / 2.0_f64.sqrt()])
+                .build()
+                .unwrap();
+            let start = Beside::energy(run.state().displacement(), run.state().velocity());
+            let mut most = 1.0_f64;
+            let refused = (0..20).find_map(|_| {
+                let error = run.step().err();
+                most = most.max(Beside::energy(run.state().displacement(), run.state().velocity()) / start);
+                error
+            });
+            assert!(matches!(refused, Some(Error::Stiffened { .. })), "{name}, {heavy:e}: {refused:?} {most:e}");
+            assert!(most < 1e4, "{name}, {heavy:e}: {most:e}");
+        }
+    }
+    // (Also where it swings through its rest, and its acceleration grows from next to nothing; and where it is hit.)
+    for wall in [10.0, 0.3] {
+        let evaluations = |checked: bool| {
+            let mut system = Beside::new(1e6, 1e9);
+            let builder = Simulation::builder(&mut system, CentralDifference, 0.02).velocity(vec![0.0, 1.0]);
+            let builder = builder.constraint(LinearRows::new().unilateral(&[(1, -1.0)], wall));
+            let builder = if checked { builder } else { builder.unchecked_stability() };
+            builder.build().unwrap().run_until(40.0, &mut ()).unwrap();
+            system.evaluations
+        };
+        let (checked, unchecked) = (evaluations(true), evaluations(false));
+        assert!(checked <= unchecked + 3, "{wall}: {checked} {unchecked}");
+    }
+}
+
 /// A host that tells nothing of its stiffness: a frequency one percent beyond that of the step is refused while it has
 /// grown by no more than a few steps do, one as much below it runs on.
 #[test]
