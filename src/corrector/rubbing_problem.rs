@@ -237,7 +237,9 @@ impl<T: Real> Rubbing<T> {
             let tangential = &mut self.totals[position + 1..=position + block.tangents];
             let size = tangential.iter().fold(T::zero(), |size, &f| size.hypot(f));
             if size > (T::one() + T::epsilon().sqrt()) * bound {
-                tangential.iter_mut().for_each(|f| *f *= bound / size);
+                for f in tangential {
+                    *f *= bound / size;
+                }
             }
         }
     }

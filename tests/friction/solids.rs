@@ -153,7 +153,7 @@ fn friction_of_contacts_that_are_found_later_is_booked() {
     let split = lower.nodes.len();
     let upper = Solid::rectangle([1.0, 0.5], [5, 2], MATERIAL).moved([0.5, 0.5 + 8e-4]);
     let (solid, contact, bottom) = stacked(lower, upper, 0.4);
-    let speed = |dof: usize| if dof % 2 == 0 { 0.2 } else { -0.05 };
+    let speed = |dof: usize| if dof.is_multiple_of(2) { 0.2 } else { -0.05 };
     let mut system = solid.system::<f64>();
     for &node in &bottom {
         system = system.fix(2 * node).unwrap().fix(2 * node + 1).unwrap();

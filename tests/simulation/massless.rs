@@ -33,7 +33,9 @@ impl System<f64> for Dashpots {
     }
     fn force(&mut self, _: f64, u: &[f64], v: &[f64], out: &mut [f64]) -> Result<()> {
         self.evaluate(u, v, out)?;
-        out.iter_mut().for_each(|force| *force = -*force);
+        for force in out {
+            *force = -*force;
+        }
         Ok(())
     }
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
