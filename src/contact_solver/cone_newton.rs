@@ -118,7 +118,8 @@ impl<T: Real> ConeNewton<T> {
         }
     }
 
-    /// Newton iterations; says whether they have ended, and nothing pulls. If not, the multipliers are left as they were.
+    /// Newton iterations; says whether they have ended, and nothing pulls. If not, the multipliers are left as they
+    /// were.
     fn newton(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -142,7 +143,7 @@ impl<T: Real> ConeNewton<T> {
             found.clear();
             found.extend_from_slice(&tried);
             self.let_go(problem, acceptance, &mut tried, &mut found);
-            solved = !pulls(problem, &found);
+            solved = !pulls_beyond_rounding(problem, &found);
         }
         if solved {
             multipliers.copy_from_slice(&found);
@@ -152,7 +153,8 @@ impl<T: Real> ConeNewton<T> {
     }
 
     /// What is held without a force may be pulled by rounding: it is open then, if that does as well. All that are
-    /// pulled, with the others as they are, or with these solved for once more; or else those of them for which it does.
+    /// pulled, with the others as they are, or with these solved for once more; or else those of them for which it
+    /// does.
     fn let_go(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -323,7 +325,7 @@ fn is_pulled<T: Real>(first: usize, set: AdmissibleSet, multipliers: &[T]) -> bo
 }
 
 /// Whether a contact pulls by more than the rounding of the largest multiplier, rows measured by √W_ii.
-fn pulls<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
+fn pulls_beyond_rounding<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
     /// Roundings by which a contact may pull.
     const ROUNDINGS: f64 = 16.0;
     let measured = |row: usize| multipliers[row] * problem.delassus(row, row).max(T::zero()).sqrt();

@@ -290,8 +290,8 @@ impl<T: Real> Stiffening<T> {
         Ok(())
     }
 
-    /// The largest Rayleigh quotient of ½ h² a of the bodies that are asked, of those in which it is large enough beside
-    /// u to have digits.
+    /// The largest Rayleigh quotient of ½ h² a of the bodies that are asked, of those in which it is large enough
+    /// beside u to have digits.
     fn quotient(&mut self, step: &mut Taken<'_, '_, T>, beyond: f64) -> Option<f64> {
         let Taken { system, new, clock, .. } = step;
         let half = T::of(0.5 * clock.h * clock.h);
