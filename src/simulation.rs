@@ -30,6 +30,7 @@ mod kept_depths;
 mod laws;
 mod linear_step;
 mod massless;
+mod massless_parts;
 mod massless_start;
 mod massless_step;
 mod mixing;

@@ -112,15 +112,24 @@ impl<T: Real> Columns<T> {
 
     /// The couplings to other dofs alone.
     pub(super) fn without(&self, dofs: &[usize]) -> Self {
-        let mut others = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
-        for j in 0..dofs.len() {
-            for (row, value) in self.column(j).filter(|(row, _)| dofs.binary_search(row).is_err()) {
-                others.rows.push(row);
-                others.values.push(value);
+        self.picked(0..dofs.len(), |row| dofs.binary_search(&row).is_err())
+    }
+
+    /// The columns of some of the `dofs` that these are of.
+    pub(super) fn of_part(&self, dofs: &[usize], part: &[usize]) -> Self {
+        self.picked(part.iter().filter_map(|dof| dofs.binary_search(dof).ok()), |_| true)
+    }
+
+    fn picked(&self, places: impl Iterator<Item = usize>, keeps: impl Fn(usize) -> bool) -> Self {
+        let mut picked = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
+        for j in places {
+            for (row, value) in self.column(j).filter(|&(row, _)| keeps(row)) {
+                picked.rows.push(row);
+                picked.values.push(value);
             }
-            others.pointers.push(others.rows.len());
+            picked.pointers.push(picked.rows.len());
         }
-        others
+        picked
     }
 
     /// K_bb, in the numbering of `dofs`.
@@ -334,13 +343,18 @@ impl<T: Real> MasslessBlock<T> {
 
 /// Whether damping forces depend on the velocities of some dofs.
 pub(super) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> Result<bool> {
+    Ok(damping_forces(system, dofs)?.is_some_and(|force| force.iter().any(|&force| force != T::zero())))
+}
+
+/// Damping forces on all dofs where some dofs move, each in its own way. None for systems without damping.
+pub(super) fn damping_forces<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> Result<Option<Vec<T>>> {
     let mut v = vec![T::zero(); system.dofs()];
     let (u, mut force) = (v.clone(), v.clone());
     for &dof in dofs {
         // (Scattered values, so that nothing cancels.)
         v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
     }
-    let Some(damping) = system.damping_force() else { return Ok(false) };
+    let Some(damping) = system.damping_force() else { return Ok(None) };
     damping.evaluate(&u, &v, &mut force)?;
-    Ok(force.iter().any(|&force| force != T::zero()))
+    Ok(Some(force))
 }

@@ -2,7 +2,8 @@
 //! the others, the load and contact.
 
 use super::constraints::Constraints;
-use super::massless::{Columns, Embedded, is_damped};
+use super::massless::{Columns, Embedded};
+use super::massless_parts::{by_damping, factorize, joined, parts};
 use super::operator::Operator;
 use super::responses::Unit;
 use crate::contact::{Candidates, ContactJacobian};
@@ -43,10 +44,21 @@ pub(super) enum Balanced {
     All,
 }
 
+/// What became of a balance.
+enum Balance<T> {
+    /// It held to rounding.
+    Kept,
+    /// What was moved, and what gaps may miss.
+    Found(StartAdjustment<T>, T),
+    /// Parts have no symmetric positive definite stiffness of their own.
+    Indefinite,
+}
+
 /// Brings dofs (those without mass, or all that are free) into static balance with the other dofs, the load and
 /// contact, by Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they
-/// were given. Those that are in balance to rounding are left alone, bit for bit, and so are massless ones that damping
-/// acts on: their displacements are initial values of their own. With it comes what gaps may miss, as far as it is
+/// were given. Those that are in balance to rounding are left alone, bit for bit. So are massless ones that damping
+/// acts on, for their displacements are initial values of their own, and those without a symmetric positive definite
+/// stiffness: whether the scheme can do with that, the step decides. With it comes what gaps may miss, as far as it is
 /// rounding of the ways that contact has taken back.
 pub(super) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
@@ -56,13 +68,43 @@ pub(super) fn balance_start<T: Real>(
     (dofs, balanced): (&[usize], Balanced),
     [h, ahead]: [f64; 2],
 ) -> Result<Option<(StartAdjustment<T>, T)>> {
-    let is_massless = balanced == Balanced::Massless;
-    if dofs.is_empty() || is_massless && is_damped(system, dofs)? {
-        return Ok(None);
+    let mut parts = match balanced {
+        Balanced::All => vec![dofs.to_vec()],
+        Balanced::Massless => {
+            let all = parts(system, dofs);
+            let [_, undamped] = by_damping(system, all)?;
+            undamped
+        }
+    };
+    let given = motion.u.clone();
+    while parts.iter().any(|part| !part.is_empty()) {
+        let rows = (&mut *constraints, &mut *g);
+        match balance(system, solver, rows, (motion, &given), (&mut parts, balanced), h)? {
+            Balance::Kept => return Ok(None),
+            Balance::Found(adjusted, missed) => return Ok(Some((adjusted, missed))),
+            Balance::Indefinite => {
+                motion.u.clone_from(&given);
+                constraints.search(motion, ahead, g)?;
+            }
+        }
     }
+    Ok(None)
+}
+
+/// Balances some parts of the dofs together, for contacts may couple them. Where it cannot, `parts` keeps those that
+/// are left to balance.
+fn balance<T: Real>(
+    system: &mut dyn System<T>,
+    solver: &mut dyn ContactSolver<T>,
+    (constraints, g): (&mut Constraints<'_, T>, &mut ContactJacobian<T>),
+    (motion, given): (&mut Motion<T>, &[T]),
+    (parts, balanced): (&mut Vec<Vec<usize>>, Balanced),
+    h: f64,
+) -> Result<Balance<T>> {
+    let is_massless = balanced == Balanced::Massless;
+    let dofs = &joined(parts)[..];
     let unit = if is_massless { Unit::Dof } else { Unit::Row };
     let t = motion.t;
-    let given = motion.u.clone();
     let largest = |x: &[T]| x.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
     let interface = constraints.interface().to_vec();
     let mut residual = vec![T::zero(); motion.u.len()];
@@ -71,17 +113,15 @@ pub(super) fn balance_start<T: Real>(
     for iteration in 0..ITERATIONS {
         system.force(t, &motion.u, &motion.v, &mut residual)?;
         let columns = Columns::of(system, dofs, motion)?;
-        let factor = match Embedded::factorized(&columns, dofs, &interface) {
-            Ok(factor) => factor,
-            // Without a symmetric positive definite stiffness of their own no balance is sought. Whether the scheme can
-            // do with that, the step decides.
-            Err(Error::Asymmetric { .. } | Error::Singular { .. }) if is_massless => {
-                motion.u = given;
-                constraints.search(motion, ahead, g)?;
-                return Ok(None);
-            }
-            Err(Error::Singular { dof, .. }) => return Err(Error::Singular { matrix: AT_REST, dof }),
-            Err(other) => return Err(other),
+        let factor = match balanced {
+            Balanced::Massless => match factorize(&columns, dofs, parts, &interface)? {
+                Some(factor) => factor,
+                None => return Ok(Balance::Indefinite),
+            },
+            Balanced::All => Embedded::factorized(&columns, dofs, &interface).map_err(|error| match error {
+                Error::Singular { dof, .. } => Error::Singular { matrix: AT_REST, dof },
+                other => other,
+            })?,
         };
         let mut operator = Operator::of_part(Box::new(factor), &interface, unit)?;
         operator.begin(&mut residual, &mut on_interface)?;
@@ -90,7 +130,7 @@ pub(super) fn balance_start<T: Real>(
             (&mut *constraints, &*g),
             &mut operator,
             motion.t,
-            [&motion.u, &given],
+            [&motion.u, given],
             dofs,
             [&mut on_interface, &mut forces],
         )?;
@@ -107,13 +147,13 @@ pub(super) fn balance_start<T: Real>(
             let (dof, value) = (worst, size.value());
             return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
         }
-        let scale = largest(&motion.u).max(largest(&given));
+        let scale = largest(&motion.u).max(largest(given));
         // (Gaps are met within their own rounding, which may be larger than that of displacements: they are computed
         // from coordinates.)
         let settled = size <= T::of(1e3) * T::epsilon() * scale + T::of(4.0) * sliver;
         if iteration == 0 {
             if settled {
-                return Ok(None);
+                return Ok(Balance::Kept);
             }
             first = size;
         }
@@ -125,7 +165,7 @@ pub(super) fn balance_start<T: Real>(
             let moves = |dof: usize| motion.u[dof] - given[dof];
             let &dof =
                 dofs.iter().max_by(|&&i, &&j| moves(i).abs().value().total_cmp(&moves(j).abs().value())).unwrap_or(&0);
-            let energies = [system.potential_energy(&given), system.potential_energy(&motion.u)];
+            let energies = [system.potential_energy(given), system.potential_energy(&motion.u)];
             system.external_load(t, &mut residual)?;
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
@@ -134,7 +174,7 @@ pub(super) fn balance_start<T: Real>(
                 // with small displacements of its own would count as rounding.
                 missed = missed.max(T::of(8.0) * g.largest_row() * (size + T::epsilon() * scale));
             }
-            return Ok(Some((StartAdjustment { energy, largest: moves(dof).abs(), dof }, missed)));
+            return Ok(Balance::Found(StartAdjustment { energy, largest: moves(dof).abs(), dof }, missed));
         }
     }
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: worst })
@@ -143,22 +183,41 @@ pub(super) fn balance_start<T: Real>(
 /// Gives dofs without mass that damping acts on the velocities that their balance asks for, f_b(t, u, v) = 0, by
 /// Newton's method: their displacements are initial values, their velocities are not. With others the damping force of
 /// the start would not be in balance, and accelerate those with mass as nothing inside of a body does. They are left as
-/// they were given where their part of C is not symmetric positive definite, or no balance is found.
-pub(super) fn balance_rates<T: Real>(system: &mut dyn System<T>, dofs: &[usize], motion: &mut Motion<T>) -> Result<()> {
-    if dofs.is_empty() || system.pattern().row_idx().is_empty() || !is_damped(system, dofs)? {
+/// they were given where their part of C is not symmetric positive definite, or no balance is found, and where one of
+/// their part is `held`.
+pub(super) fn balance_rates<T: Real>(
+    system: &mut dyn System<T>,
+    dofs: &[usize],
+    held: &[bool],
+    motion: &mut Motion<T>,
+) -> Result<()> {
+    if dofs.is_empty() || system.pattern().row_idx().is_empty() {
         return Ok(());
     }
+    let all = parts(system, dofs);
+    let [mut parts, _] = by_damping(system, all)?;
+    parts.retain(|part| !part.iter().any(|&dof| held[dof]));
     let given = motion.v.clone();
-    let mut residual = vec![T::zero(); given.len()];
+    while !parts.is_empty() && !settle_rates(system, &mut parts, motion)? {
+        motion.v.clone_from(&given);
+    }
+    Ok(())
+}
+
+/// The velocities of some parts. Where there are none, says so, and `parts` keeps those for which to seek them.
+fn settle_rates<T: Real>(
+    system: &mut dyn System<T>,
+    parts: &mut Vec<Vec<usize>>,
+    motion: &mut Motion<T>,
+) -> Result<bool> {
+    let dofs = &joined(parts)[..];
+    let mut residual = vec![T::zero(); motion.v.len()];
     let mut before = T::infinity();
     for _ in 0..ITERATIONS {
         system.force(motion.t, &motion.u, &motion.v, &mut residual)?;
         let columns = Columns::of_damping(system, dofs, motion)?;
-        match Embedded::factorized(&columns, dofs, &[]) {
-            Ok(mut factor) => factor.solve(&mut residual)?,
-            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => break,
-            Err(other) => return Err(other),
-        }
+        let Some(mut factor) = factorize(&columns, dofs, parts, &[])? else { return Ok(false) };
+        factor.solve(&mut residual)?;
         let mut size = T::zero();
         for &dof in dofs {
             motion.v[dof] += residual[dof];
@@ -172,17 +231,17 @@ pub(super) fn balance_rates<T: Real>(system: &mut dyn System<T>, dofs: &[usize],
         let largest = T::largest(&motion.v);
         let stays = size <= T::epsilon().powf(T::of(0.25)) * largest && size > T::of(0.5) * before;
         if size <= T::of(1e3) * T::epsilon() * largest || stays {
-            return Ok(());
+            return Ok(true);
         }
         before = size;
     }
-    motion.v = given;
-    Ok(())
+    parts.clear();
+    Ok(false)
 }
 
 /// Replaces forces on dofs without mass, which nothing balances, by those on the dofs with mass that they go on to, as
 /// these dofs would move to balance them: at rates by damping, or by stiffness. Says whether there are any beyond what
-/// rounding leaves of a balance; not where neither part is symmetric positive definite.
+/// rounding leaves of a balance. Those on parts of which neither is symmetric positive definite stay where they are.
 pub(super) fn pass_on<T: Real>(
     system: &mut dyn System<T>,
     dofs: &[usize],
@@ -192,20 +251,28 @@ pub(super) fn pass_on<T: Real>(
     if dofs.iter().all(|&dof| forces[dof] == T::zero()) || system.pattern().row_idx().is_empty() {
         return Ok(false);
     }
-    let prescribed = system.prescribed().to_vec();
-    for by_damping in [true, false] {
-        if by_damping && !is_damped(system, dofs)? {
-            continue;
-        }
-        let (columns, known) = match by_damping {
-            true => (Columns::of_damping(system, dofs, at)?, &at.v),
-            false => (Columns::of(system, dofs, at)?, &at.u),
-        };
-        let mut factor = match Embedded::factorized(&columns, dofs, &[]) {
-            Ok(factor) => factor,
-            Err(Error::Asymmetric { .. } | Error::Singular { .. }) => continue,
-            Err(other) => return Err(other),
-        };
+    let mut parts = parts(system, dofs);
+    parts.retain(|part| part.iter().any(|&dof| forces[dof] != T::zero()));
+    let [damped, mut undamped] = by_damping(system, parts)?;
+    let mut definite = damped.clone();
+    let by_rates = pass_on_by(system, Columns::of_damping, (&mut definite, at), &at.v, forces)?;
+    undamped.extend(damped.into_iter().filter(|part| definite.binary_search_by_key(&part[0], |part| part[0]).is_err()));
+    let by_ways = pass_on_by(system, Columns::of, (&mut undamped, at), &at.u, forces)?;
+    Ok(by_rates || by_ways)
+}
+
+/// By columns of C or of K, those parts of which these are symmetric positive definite; `parts` keeps them.
+fn pass_on_by<T: Real>(
+    system: &mut dyn System<T>,
+    columns: impl Fn(&mut dyn System<T>, &[usize], &Motion<T>) -> Result<Columns<T>>,
+    (parts, at): (&mut Vec<Vec<usize>>, &Motion<T>),
+    known: &[T],
+    forces: &mut [T],
+) -> Result<bool> {
+    while !parts.is_empty() {
+        let dofs = &joined(parts)[..];
+        let columns = columns(system, dofs, at)?;
+        let Some(mut factor) = factorize(&columns, dofs, parts, &[])? else { continue };
         let mut moved = forces.to_vec();
         factor.solve(&mut moved)?;
         let size = dofs.iter().fold(T::zero(), |size, &dof| size.max(moved[dof].abs()));
@@ -213,6 +280,7 @@ pub(super) fn pass_on<T: Real>(
             return Ok(false);
         }
         let others = columns.without(dofs);
+        let prescribed = system.prescribed();
         for (j, &dof) in dofs.iter().enumerate() {
             forces[dof] = T::zero();
             for (row, k) in others.column(j).filter(|(row, _)| prescribed.binary_search(row).is_err()) {

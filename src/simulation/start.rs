@@ -196,10 +196,13 @@ impl<T: Real> Start<'_, T> {
             }
         }
 
-        let acts = |row: usize| touching[row] || contacts.gap[row] <= T::zero();
-        if !(0..constraints.len()).any(|row| acts(row) && g.acts_on(row, massless)) {
-            balance_rates(&mut **system, massless, &mut motion)?;
+        let mut held = vec![false; dofs];
+        for row in (0..constraints.len()).filter(|&row| touching[row] || contacts.gap[row] <= T::zero()) {
+            for (dof, _) in g.row(row).filter(|(_, weight)| *weight != T::zero()) {
+                held[dof] = true;
+            }
         }
+        balance_rates(&mut **system, massless, &held, &mut motion)?;
 
         // Accelerations without contact: M a = f − M a_p on free dofs.
         let mut force = vec![T::zero(); dofs];

@@ -3,7 +3,7 @@
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapOffset, Plane};
 use contact_dynamics::mass::{Redistribution, redistribute};
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, MoreauJean, Newmark,
+    Bathe, CdLagrange, Composite, Error, InitialOverclosure, LinearRows, LinearSystem, Lu, MoreauJean, Newmark,
     NodesOnObstacle, Park, PersistencyCorrection, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -430,6 +430,88 @@ fn damped_dofs_between_soft_and_stiff_springs_begin_in_balance() {
             let scale = [dof - 1, dof].map(|i| stiff[i] * (0.01 * v[i].abs().max(v[i + 1].abs()) + 1e-3));
             let miss = (terms[1] - terms[0]).abs() / (scale[0] + scale[1]);
             assert!(miss < 1e-13, "{trial}, {dof}: {miss:e}");
+        }
+    }
+}
+
+/// A body of a few masses on springs from each to the next, some of them without mass.
+struct Chain {
+    stiffness: f64,
+    mass: &'static [f64],
+    /// A damper of so much from a dof to the ground.
+    damper: Option<(usize, f64)>,
+    u: &'static [f64],
+    v: &'static [f64],
+    /// A wall that touches a dof from below.
+    wall: Option<usize>,
+}
+
+/// u, v and a with which some bodies start that nothing couples.
+fn start_of(chains: &[&Chain]) -> Result<Vec<Vec<[f64; 3]>>, Error> {
+    let firsts: Vec<usize> =
+        (0..chains.len()).map(|i| chains[..i].iter().map(|chain| chain.mass.len()).sum()).collect();
+    let of = |pick: &dyn Fn(&Chain) -> &'static [f64]| chains.iter().flat_map(|chain| pick(chain)).copied().collect();
+    let (mass, u, v): (Vec<f64>, Vec<f64>, Vec<f64>) =
+        (of(&|chain| chain.mass), of(&|chain| chain.u), of(&|chain| chain.v));
+    let (mut k, mut c, mut walls) = (Vec::new(), Vec::new(), LinearRows::new());
+    for (chain, first) in chains.iter().zip(&firsts) {
+        k.extend((1..chain.mass.len()).flat_map(|i| spring(first + i - 1, first + i, chain.stiffness)));
+        c.extend(chain.damper.map(|(dof, c)| (first + dof, first + dof, c)));
+        if let Some(dof) = chain.wall {
+            walls = walls.unilateral(&[(first + dof, 1.0)], -chain.u[dof]);
+        }
+    }
+    let n = mass.len();
+    let system = LinearSystem::lumped(mass, matrix(n, k))?.damping(matrix(n, c))?;
+    let run = Simulation::builder(system, Newmark::trapezoidal(), 0.01)
+        .linear_solver(Lu)
+        .displacement(u)
+        .velocity(v)
+        .constraint(walls)
+        .build()?;
+    let (state, dofs) = (run.state(), chains.iter().map(|chain| chain.mass.len()));
+    let at = |dof: usize| [state.displacement()[dof], state.velocity()[dof], state.acceleration()[dof]];
+    Ok(firsts.iter().zip(dofs).map(|(first, len)| (*first..first + len).map(at).collect()).collect())
+}
+
+/// What holds of one body, that it is damped, unstable, or touches a wall, is not laid to another.
+#[test]
+fn each_body_starts_as_it_would_alone() {
+    let compare = |found: &[[f64; 3]], expected: &[[f64; 3]], what: &str| {
+        for (dof, (x, y)) in found.iter().zip(expected).enumerate() {
+            let miss = x.iter().zip(y).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+            assert!(miss < 1e-12, "{what}, dof {dof}: u, v, a are {x:?}, not {y:?}");
+        }
+    };
+    let chain = |mass, u, v| Chain { stiffness: 2.0, mass, damper: None, u, v, wall: None };
+    let (moves, rests): (&[f64], &[f64]) = (&[0.5, 0.25], &[0.0, 0.0]);
+    let stretched = chain(&[0.0, 1.0, 1.0], &[0.3, 0.0, 0.1], &[0.0, 0.2, 0.1]);
+    let damped = Chain { damper: Some((1, 0.5)), ..chain(&[1.0, 0.0], &[0.1, 0.0], moves) };
+    let held = Chain { damper: Some((1, 0.5)), wall: Some(1), ..chain(&[1.0, 0.0], &[-0.1, 0.05], rests) };
+    let lifted = Chain { damper: Some((1, 0.5)), wall: Some(1), ..chain(&[1.0, 0.0], &[0.1, 0.05], rests) };
+    let partly = Chain { damper: Some((2, 0.5)), ..chain(&[1.0, 0.0, 0.0], &[0.2, 0.0, 0.1], &[0.0, 0.0, 0.0]) };
+    let unstable = Chain { stiffness: -2.0, ..chain(&[1.0, 0.0], &[0.1, 0.3], rests) };
+    let all = [&stretched, &damped, &held, &lifted, &partly, &unstable];
+    let alone: Vec<Vec<[f64; 3]>> = all.iter().map(|chain| start_of(&[chain]).unwrap().remove(0)).collect();
+    // The end of the string goes to where its spring pulls no more; the damped foot creeps as its spring pulls it, and
+    // its mass is pulled by the damper; and so on.
+    let expected: [&[[f64; 3]]; 6] = [
+        &[[0.0, 0.0, 0.0], [0.0, 0.2, 0.2], [0.1, 0.1, -0.2]],
+        &[[0.1, 0.5, -0.2], [0.0, 0.4, 0.0]],
+        &[[-0.1, 0.0, 0.3], [0.05, 0.0, 0.0]],
+        &[[0.1, 0.0, -0.1], [0.05, 0.0, 0.0]],
+        &[[0.2, 0.0, 0.0], [0.0, 0.0, 0.0], [0.1, 0.0, 0.0]],
+        &[[0.1, 0.0, -0.4], [0.3, 0.0, 0.0]],
+    ];
+    for (body, (found, expected)) in alone.iter().zip(expected).enumerate() {
+        compare(found, expected, &format!("body {body}"));
+    }
+    for chains in (1_usize..64).filter(|chains| chains.count_ones() > 1) {
+        let present = |i: &usize| (chains >> i) & 1 == 1;
+        let members: Vec<usize> = (0..all.len()).filter(present).collect();
+        let together = start_of(&members.iter().map(|&i| all[i]).collect::<Vec<_>>()).unwrap();
+        for (&member, found) in members.iter().zip(&together) {
+            compare(found, &alone[member], &format!("body {member} of {members:?}"));
         }
     }
 }
