@@ -61,6 +61,10 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) start_tolerance: Vec<T>,
     /// Rows that may be pressed in this stage; at velocity level those whose gap is forecast to be closed.
     pub(super) enabled: Vec<bool>,
+    /// By how much gaps are open, beyond rounding, of rows that are closed and hold a rate or an increment: so far they
+    /// may go on. (What rests would rise, rounding by rounding, until in millions of steps it was taken to be open, and
+    /// fell.)
+    pub(super) hover: Vec<T>,
     /// Rows in the contact problem.
     pub(super) in_problem: Vec<bool>,
     /// Rows of [`Part::Massless`]; empty where dofs without mass are solved for with the others.
@@ -111,6 +115,7 @@ impl<T: Real> ContactRowsWork<T> {
             start_gap: Vec::new(),
             start_tolerance: Vec::new(),
             enabled: Vec::new(),
+            hover: Vec::new(),
             in_problem: Vec::new(),
             on_massless: Vec::new(),
             problem: Vec::new(),
@@ -135,8 +140,11 @@ impl<T: Real> ContactRowsWork<T> {
 
     /// Memory for so many rows, of so many weights.
     pub(super) fn make_room(&mut self, rows: usize, entries: usize) {
-        let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, start_gap, start_tolerance, .. } = self;
-        for values in [y, tolerance, weight, compliance, shift, balance_gap, start_gap, start_tolerance] {
+        let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, .. } = self;
+        for values in [y, tolerance, weight, compliance, shift, balance_gap] {
+            values.resize(rows, T::zero());
+        }
+        for values in [&mut self.start_gap, &mut self.start_tolerance, &mut self.hover] {
             values.resize(rows, T::zero());
         }
         rates.resize(rows, GapRates::default());
@@ -196,7 +204,7 @@ impl<T: Real> ContactRowsWork<T> {
         past: &[Motion<T>],
         h: f64,
     ) -> Result<()> {
-        let Self { measure, start_gap, start_tolerance, rates, curved, .. } = self;
+        let Self { measure, start_gap, start_tolerance, hover, rates, curved, .. } = self;
         curved.forget();
         measure.fill(Measure::AsScheme);
         let reads = constraints.laws().read_start || constraints.laws().predictive;
@@ -207,6 +215,7 @@ impl<T: Real> ContactRowsWork<T> {
             let approach = T::of(h) * (g.product(row, &start.v) + rates[row].rate).abs();
             let rounded = constraints.gap_rounding(row, g.magnitude(row, &start.u), start_gap[row]);
             start_tolerance[row] = rounded + sliver(approach);
+            hover[row] = (start_gap[row] - rounded).max(T::zero());
             measure[row] = Measure::Undecided;
         }
         Ok(())
@@ -244,19 +253,19 @@ impl<T: Real> ContactRowsWork<T> {
         if !constraints.laws().read_start {
             return Ok(());
         }
-        let Self { rates, y, tolerance, measure, start_gap, .. } = self;
+        let Self { rates, y, tolerance, measure, start_gap, hover, .. } = self;
         constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
         let (h, weight) = (T::of(h), stage.recovery.weights()[1]);
         for row in 0..constraints.len() {
             match measure[row] {
                 Measure::AsScheme | Measure::Nothing | Measure::Undecided => {}
-                Measure::Increment => y[row] -= start_gap[row],
+                Measure::Increment => y[row] -= start_gap[row] - hover[row],
                 Measure::Rate => {
                     let [part, size] = lacking.map_or([T::zero(); 2], |d| {
                         [weight * g.interface_product(row, d), weight * g.interface_magnitude(row, d)]
                     });
                     let own = rates[row].rate;
-                    y[row] = h * (g.product(row, &new.v) + part + own);
+                    y[row] = h * (g.product(row, &new.v) + part + own) + hover[row];
                     // Velocities that are differences of displacements have the rounding of those.
                     let known = if stage.recovery.subtracts(1) { g.magnitude(row, &new.u) } else { T::zero() };
                     tolerance[row] = rounding(known + h * (g.magnitude(row, &new.v) + size + own.abs()));
@@ -286,13 +295,13 @@ impl<T: Real> ContactRowsWork<T> {
         new: &Motion<T>,
         approach: f64,
     ) -> Result<()> {
-        let Self { rates, y, tolerance, target, .. } = self;
+        let Self { rates, y, tolerance, target, hover, .. } = self;
         let h = level.clock.h;
         let (t, values) = level.place(new, target);
         if level.is_velocity() {
             constraints.finite_rates(t, &new.u, &new.v, rates)?;
             for row in 0..constraints.len() {
-                y[row] = g.product(row, values) + T::of(h) * rates[row].rate;
+                y[row] = g.product(row, values) + T::of(h) * rates[row].rate + hover[row];
                 if !y[row].is_finite() {
                     let (contact, value) = (constraints.ids[row], y[row].value());
                     return Err(Error::ContactNotFinite { t, what: "the gap rate", contact, value });

@@ -60,7 +60,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     ) -> Result<()> {
         let Self { clock, constraints, g, .. } = self;
         let ContactWork { rows, interface, .. } = contact;
-        let ContactRowsWork { y, enabled, target, forecast, supports, rates, .. } = rows;
+        let ContactRowsWork { y, enabled, hover, target, forecast, supports, rates, .. } = rows;
         enabled.fill(true);
         let Some(aim) = &self.stage.contact else { return Ok(()) };
         let h = T::of(clock.h);
@@ -97,9 +97,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in 0..constraints.len() {
             // As at position level, a gap of 1e-10 of the way made in the step counts as touching.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
-            let touching = constraints.gap_rounding(row, g.magnitude(row, forecast), y[row]) + T::of(1e-10) * approach;
+            let rounded = constraints.gap_rounding(row, g.magnitude(row, forecast), y[row]);
             let law = constraints.law(row);
-            enabled[row] = y[row] <= touching || law.is_equality() || law.is_compliant();
+            let always = law.is_equality() || law.is_compliant();
+            enabled[row] = y[row] <= rounded + T::of(1e-10) * approach || always;
+            hover[row] = if enabled[row] && !always { (y[row] - rounded).max(T::zero()) } else { T::zero() };
         }
         Ok(())
     }

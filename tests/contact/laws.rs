@@ -291,6 +291,42 @@ fn velocity_level() -> [Box<dyn TimeIntegrator>; 2] {
     [Box::new(CdLagrange), Box::new(MoreauJean::new(0.5).unwrap())]
 }
 
+/// Where rates or increments of gaps are constrained, what rests would rise from rounding to rounding, and fall in the
+/// end: it goes down again.
+#[test]
+fn what_rests_does_not_rise_from_the_floor() {
+    let (g, h) = (10.0, 0.01);
+    type Make = fn() -> Box<dyn TimeIntegrator>;
+    let cases: [(Make, ContactLaw); 4] = [
+        (|| Box::new(CdLagrange), ContactLaw::Rigid),
+        (|| Box::new(MoreauJean::new(0.5).unwrap()), ContactLaw::Rigid),
+        (|| Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()), ContactLaw::RateCondition),
+        (|| Box::new(GeneralizedAlpha::chung_hulbert(0.8).unwrap()), ContactLaw::PersistencySwitch),
+    ];
+    for (make, law) in cases {
+        for unit in [1.0, 1e-6, 1e5] {
+            let name = format!("{}, {law:?}", make().name());
+            // In the fifth step the floor sinks by as much as still counts as touching, and far more than rounding.
+            let sunk = 3e-11 * g * h * h * unit;
+            let floor = GapOffset::moving(move |t| [if t > 4.5 * h { sunk } else { 0.0 }, 0.0, 0.0]);
+            let system = chain(&[2.0], &[0.0], 0.0).load(move |_, f| f[0] = -2.0 * g * unit);
+            let mut run = Simulation::builder(system, make(), h)
+                .constraint(LinearRows::new().row(law, &[(0, 1.0)], floor))
+                .correctors(Vec::new())
+                .build()
+                .unwrap();
+            for step in 0..80 {
+                run.step().unwrap();
+                let miss = run.state().contacts().forces()[0] / (2.0 * g * unit) - 1.0;
+                assert!(miss.abs() < 1e-7, "{name}: force off by {miss:e} in step {step}");
+            }
+            // (Rates that are held go a little farther.)
+            let left = run.state().displacement()[0] / sunk + 1.0;
+            assert!((-0.6..1e-3).contains(&left), "{name}: {left:e} of it are left");
+        }
+    }
+}
+
 #[test]
 fn restitution_is_relative_to_a_moving_wall() {
     for e in [0.0, 0.3, 1.0] {

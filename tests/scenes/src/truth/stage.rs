@@ -191,9 +191,15 @@ impl Stage<'_> {
         let spring = || Form::new(&row.g, &self.balance[0], row.offset.at(self.t_balance)[0]);
         let start_gap = scene.gap(i, start.t, &start.u);
         match row.law {
-            ContactLaw::Rigid | ContactLaw::Equality => Form { enabled: self.enables(i), ..rigid() },
+            ContactLaw::Equality => Form { enabled: self.enables(i), ..rigid() },
+            ContactLaw::Rigid => {
+                let mut form = Form { enabled: self.enables(i), ..rigid() };
+                form.known += self.hover(i);
+                form
+            }
             ContactLaw::Restitution { coefficient } => {
                 let mut form = Form { enabled: self.enables(i), ..rigid() };
+                form.known += self.hover(i);
                 let lead = self.place.stage.contact.lead();
                 let rate = scene.rate(i, start.t, &start.v) + lead * h * dot(&row.g, &start.a);
                 form.known += coefficient * h * rate;
@@ -204,14 +210,15 @@ impl Stage<'_> {
                 let free = form.at(&self.free);
                 let tolerance = scene.rounding(i, start.t, &start.u)
                     + 1e-10 * (h * scene.rate(i, start.t, &start.v).abs() + (free - start_gap).abs());
+                let above = (start_gap - scene.rounding(i, start.t, &start.u)).max(0.0);
                 match (row.law, start_gap <= tolerance) {
-                    (ContactLaw::RateCondition, true) => form.known -= start_gap,
+                    (ContactLaw::RateCondition, true) => form.known -= start_gap - above,
                     (ContactLaw::RateCondition, false) => form.enabled = false,
                     (_, true) => {
                         let mut way = self.new[1].clone();
                         way.weight.iter_mut().for_each(|w| *w *= h);
                         way.known.iter_mut().for_each(|v| *v *= h);
-                        form = Form::new(&row.g, &way, h * row.offset.at(self.t_new)[1]);
+                        form = Form::new(&row.g, &way, h * row.offset.at(self.t_new)[1] + above);
                     }
                     (_, false) => {}
                 }
@@ -237,6 +244,12 @@ impl Stage<'_> {
             }
             _ => spring(),
         }
+    }
+
+    /// How far a contact whose velocity is constrained, if it is closed, may go on nevertheless.
+    fn hover(&self, i: usize) -> f64 {
+        let Some((u, t)) = &self.target.forecast else { return 0.0 };
+        (self.scene.gap(i, *t, u) - self.scene.rounding(i, *t, u)).max(0.0)
     }
 
     /// Whether a contact may press: where velocities are constrained if its gap is forecast to be closed.
