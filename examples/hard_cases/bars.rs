@@ -5,7 +5,7 @@ use crate::table::Bound::AtMost;
 use crate::table::{Row, each, rows};
 use crate::tried::{ahead, clean, corrected, massless, presets, with};
 use contact_dynamics::contact_solver::{ActiveSet, ContactSolver, Pivoting};
-use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Result, Simulation};
+use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::collisions::{Collision, Swept};
 use contact_dynamics_scenes::combinations::{Combination, Correction, plain};
@@ -16,6 +16,7 @@ use contact_dynamics_scenes::sparse::block;
 /// ρ c A v₀ of the paper's bars, and v₀.
 const FORCE: f64 = 0.0125;
 const SPEED: f64 = 0.05;
+const WAVE_SPEED: f64 = 100.0;
 const H: f64 = 1e-3;
 
 pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
@@ -40,6 +41,11 @@ fn named<const N: usize>(swept: &[Swept], names: [&str; N]) -> [f64; N] {
     names.map(|name| swept.iter().find(|swept| swept.name == name).map_or(f64::NAN, |swept| swept.worst))
 }
 
+/// Whether all stages take the forces of springs from what is known.
+fn is_explicit(scheme: &dyn TimeIntegrator) -> bool {
+    scheme.tableau().stages.iter().all(|stage| stage.balance.u.z == 0.0)
+}
+
 /// The force over F₀ outside of the exact contact, by more than a hundredth of a second (of its fifth).
 fn outside(bars: &Bars, record: &Record) -> f64 {
     let (start, end) = (bars.impact_time() - 1e-9, bars.impact_time() + 0.21);
@@ -49,8 +55,12 @@ fn outside(bars: &Bars, record: &Record) -> f64 {
 
 fn paper(extent: &Extent) -> Vec<Row> {
     let mut all = Vec::new();
-    let meshes = [("H1, n = 20", 20, 0.15, 1.15), ("H1, n = 50", 50, 0.11, 1.15), ("H1, n = 100", 100, 0.10, 1.2)];
-    for (case, n, rms, max) in meshes.into_iter().take(extent.meshes) {
+    let meshes = [("H1, n = 20", 20, 1.15), ("H1, n = 50", 50, 1.15), ("H1, n = 100", 100, 1.2)];
+    for (case, n, max) in meshes.into_iter().take(extent.meshes) {
+        let bars = Bars::paper(n);
+        // The error is that of the fronts, each of which is smeared over a part of an element and over steps.
+        let smeared = 0.6 * bars.element_size(0) / WAVE_SPEED + 1.6 * H;
+        let rms = (smeared / (2.0 * 10.0 / WAVE_SPEED)).sqrt();
         let run = |row: &Combination| {
             let of = |&phase: &f64| {
                 let scene = Collision::paper(n, H).prepared(row, phase)?;
@@ -93,8 +103,14 @@ fn phases(extent: &Extent) -> Vec<Row> {
         }
         Ok(ratios)
     };
+    // (Explicit schemes take the forces of springs from the state before.)
+    let (explicit, implicit): (Vec<_>, Vec<_>) =
+        corrected().into_iter().partition(|row| row.integrator().is_ok_and(|scheme| is_explicit(&*scheme)));
     let asked = [("RMS error of the force, worst phase over best", AtMost(1.3))];
-    rows("H2", asked, &each(&corrected(), run))
+    let mut all = rows("H2", asked, &each(&implicit, run));
+    let asked = [("the same, explicit schemes", AtMost(1.35))];
+    all.extend(rows("H2", asked, &each(&explicit, run)));
+    all
 }
 
 /// Courant number 1 on a lumped mass: d'Alembert's solution at the nodes.
@@ -144,7 +160,7 @@ fn dissimilar(extent: &Extent) -> Vec<Row> {
     };
     let asked = [
         ("bars of E 49 and 100: error of the two plateaus of the force", AtMost(0.03)),
-        ("release, late by what over 2 h_e/c + h", AtMost(1.25)),
+        ("release, late by what over 2 h_e/c + h", AtMost(1.3)),
         ("error of the mean speeds over the approach", AtMost(0.01)),
     ];
     rows("H4", asked, &each(&[clean(), ahead()].concat(), run))
@@ -374,11 +390,7 @@ fn damped(extent: &Extent) -> Vec<Row> {
     let run = |row: &Combination| {
         let of = |&phase: &f64| {
             // Damping lowers the limit of explicit schemes.
-            let h = if row.integrator()?.tableau().stages.iter().all(|stage| stage.balance.u.z == 0.0) {
-                0.3 * H
-            } else {
-                H
-            };
+            let h = if is_explicit(&*row.integrator()?) { 0.3 * H } else { H };
             let bars = Bars::paper(50).delayed(phase, h);
             // ω = π c/L.
             let beta = 2.0 * 0.02 / (10.0 * std::f64::consts::PI);

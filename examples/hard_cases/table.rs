@@ -59,7 +59,7 @@ pub(crate) struct Row {
     worst: (f64, String),
     held: usize,
     tried: usize,
-    /// Runs that broke off.
+    /// Runs that broke off, and combinations with a figure that is not as asked.
     failures: Vec<String>,
 }
 
@@ -99,7 +99,12 @@ pub(crate) fn rows<const N: usize>(case: &'static str, asked: [(&str, Bound); N]
                 Err(reason) => failures.push(format!("{case}, {name}: {reason}")),
                 Ok(figures) => {
                     let of = figures.iter().map(|figures| figures[k]);
-                    held += usize::from(!figures.is_empty() && of.clone().all(|x| bound.holds(x)));
+                    let missed: Vec<String> = of.clone().filter(|x| !bound.holds(*x)).map(digits).collect();
+                    if figures.is_empty() || !missed.is_empty() {
+                        failures.push(format!("{case}, {name}: {what}: {} is not {bound}", missed.join(", ")));
+                    } else {
+                        held += 1;
+                    }
                     for x in of {
                         if worst.0.is_nan() || bound.badness(x) > bound.badness(worst.0) {
                             worst = (x, name.clone());
@@ -113,13 +118,14 @@ pub(crate) fn rows<const N: usize>(case: &'static str, asked: [(&str, Bound); N]
     asked.into_iter().enumerate().map(line).collect()
 }
 
-/// Runs combinations on all cores; those that a scheme, a system or a law refuses claim nothing and are left out.
+/// Runs combinations on all cores; those that a scheme, a system or a law refuses claim nothing and are left out,
+/// and so are steps beyond the limit of a scheme.
 pub(crate) fn each<const N: usize>(
     combinations: &[Combination],
     run: impl Fn(&Combination) -> Result<Vec<[f64; N]>> + Sync,
 ) -> Vec<Outcome<N>> {
     let one = |combination: &Combination| match run(combination) {
-        Err(Error::Incompatible { .. }) => None,
+        Err(Error::Incompatible { .. } | Error::BeyondStability { .. }) => None,
         figures => {
             let name = combination.names().into_iter().filter(|name| name != "–" && name != "lumped");
             let figures = figures.map_err(|error| error.to_string());
