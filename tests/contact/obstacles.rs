@@ -111,7 +111,23 @@ fn curvature_is_the_acceleration_along_the_surface() {
     check(&Plane::new([0.0; 3], [1.0, 2.0, 3.0]).unwrap());
 }
 
-/// A particle that slides in a bowl is a pendulum.
+/// Of a body as large, and as far away, as one likes.
+#[test]
+fn curvature_has_the_unit_of_an_inverse_length() {
+    let (x, w, side) = ([0.4, -0.7, 0.5], [0.3, 0.9, -0.4], Side::Inside);
+    let of = |unit: f64| {
+        let scaled = |x: [f64; 3]| x.map(|x| x * unit);
+        let (center, radius) = (scaled([0.1, 0.2, 0.3]), 0.5 * unit);
+        let sphere = Sphere::new(center, radius, side).unwrap().curvature(scaled(x), w);
+        [sphere, Cylinder::new(center, [1.0, 0.5, 2.0], radius, side).unwrap().curvature(scaled(x), w)]
+    };
+    for unit in [1e-200, 1e-3, 1e200] {
+        for (found, expected) in of(unit).into_iter().zip(of(1.0)) {
+            assert!((found * unit / expected - 1.0).abs() < 1e-13, "{unit:e}: {found:e} {expected:e}");
+        }
+    }
+}
+
 /// What `distance` says is the distance from the closest of many points of a body, and its normal points away from it.
 fn check_distance<const D: usize>(body: &dyn Obstacle<f64, D>, holds: impl Fn([f64; D]) -> f64, seed: f64) {
     let numbers = noise(200 * D, seed);
@@ -189,6 +205,7 @@ fn a_particle_slides_over_a_cuboid_and_a_capsule_and_falls_off() {
     assert!((y + 1.0 - (2.0 / 3.0 + 1.0 / 30.0)).abs() < 5e-3 && (energy - 0.5).abs() < 1e-3, "{y} {energy}");
 }
 
+/// A particle that slides in a bowl is a pendulum.
 #[test]
 fn a_particle_in_a_bowl_swings_like_a_pendulum() {
     let (radius, g, angle) = (2.0_f64, 10.0, 1.0_f64);

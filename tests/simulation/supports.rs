@@ -274,6 +274,12 @@ fn a_driven_dof_is_a_moving_obstacle() {
                 }
                 let (x, y) = (as_dof.state().contacts().forces()[0], as_gap.state().contacts().forces()[0]);
                 assert!((x - y).abs() < 1e-6 * (1.0 + y.abs()), "{}, {kind:?}, step {step}: {x} {y}", scheme().name());
+                // What drives the slide moves its mass, strains it, and holds against the contact.
+                let (state, off) = (as_dof.state(), if kind == Kind::Lumped { 0.0 } else { 2.0 });
+                let (u, a) = (&state.displacement()[n + 1..], &state.acceleration()[n + 1..]);
+                let expected = 5.0 * a[0] + off * a[1] + 70.0 * (u[0] - u[1]) - x;
+                let found: f64 = as_dof.reactions().unwrap()[0];
+                assert!((found - expected).abs() < 1e-9 * (1.0 + x.abs()), "{kind:?}, {step}: {found} {expected}");
             }
             assert!(as_gap.statistics().contact_solves > 5, "the impact is part of the run");
         }
