@@ -14,7 +14,6 @@ pub(super) struct ExactStep {
 /// (`kept` is `rate + damping · value`, but with strong damping not in digits.)
 #[derive(Clone, Copy, Debug)]
 struct Impulse {
-    damping: f64,
     stiffness: f64,
     /// What is left of a displacement.
     kept: f64,
@@ -32,7 +31,7 @@ impl Impulse {
     /// By their series about zero: derivatives of the response to an impulse follow from the equation of motion.
     fn series(damping: f64, stiffness: f64) -> Self {
         let (mut last, mut derivative) = (0.0, 1.0);
-        let mut sums = Self { damping, stiffness, kept: 0.0, rate: 0.0, value: 0.0, once: 0.0, twice: 0.0 };
+        let mut sums = Self { stiffness, kept: 0.0, rate: 0.0, value: 0.0, once: 0.0, twice: 0.0 };
         // 1/n! for the n-th derivative.
         let mut share = 1.0;
         for n in 1..TERMS {
@@ -54,7 +53,6 @@ impl Impulse {
         let after = |[value, rate]: [f64; 2]| self.kept * value + self.value * rate;
         let elastic = self.stiffness * self.value * self.value;
         Self {
-            damping: 2.0 * self.damping,
             stiffness: 4.0 * self.stiffness,
             kept: self.kept * self.kept - elastic,
             rate: self.rate * self.rate - elastic,

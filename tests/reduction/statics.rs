@@ -154,6 +154,26 @@ fn a_constant_load_has_its_static_response_and_its_reactions() {
     assert_close(&body.recover_displacement(&rest).unwrap(), &exact, 2e-2);
 }
 
+/// What the modes leave of a load is softened as what they leave of contact forces is: s times it comes on top.
+#[test]
+fn what_modes_leave_of_a_load_is_softened() {
+    let plate = Plate::new();
+    let n = plate.stiffness.nrows();
+    let load: Vec<f64> = (0..n).map(|dof| [0.1, -0.5][dof % 2]).collect();
+    let exact = plate.solve(&load);
+    let rest = |softening: f64| {
+        let reduction = plate.reduction(Boundary::Tapered).softening(softening).constant_load(&load);
+        let body = reduction.modes(3).unwrap();
+        body.recover_displacement(&solve(&body, body.constant_load().unwrap())).unwrap()
+    };
+    let [one, two] = [1.0, 2.0].map(rest);
+    let left: Vec<f64> = one.iter().zip(&two).map(|(one, two)| two - one).collect();
+    let size = |x: &[f64]| x.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    assert!(load.iter().zip(&left).map(|(load, left)| load * left).sum::<f64>() > 0.0, "the load does work on it");
+    let miss: Vec<f64> = (0..n).map(|dof| one[dof] - exact[dof] - left[dof]).collect();
+    assert!(size(&left) > 1e-3 * size(&exact) && size(&miss) < 1e-9 * size(&left), "{}", size(&miss) / size(&left));
+}
+
 /// Two opposite forces on a free bar, which has no K⁻¹.
 #[test]
 fn free_bodies_have_the_flexibility_of_self_balanced_loads() {

@@ -171,6 +171,33 @@ fn meshes_and_contacts_are_judged_together() {
     }
 }
 
+/// That a contact that presses is admissible with a step says nothing of a longer one.
+#[test]
+fn longer_steps_are_judged_anew() {
+    // ω² = 2.618 without the contact, 3 with it; at most 3.618 by the sum of both.
+    let system = || {
+        let k = matrix(2, [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 2.0)]);
+        LinearSystem::lumped(vec![1.0; 2], k).unwrap().load(|_, f| f[0] = -1.0)
+    };
+    let [short, long] = [3.3_f64, 2.8].map(|square| 2.0 / square.sqrt());
+    let mut run = Simulation::builder(system(), CentralDifference, short)
+        .displacement(vec![-2.0 / 3.0, -1.0 / 3.0])
+        .constraint(LinearRows::new().row(ContactLaw::Penalty { stiffness: 1.0 }, &[(0, 1.0)], 0.0))
+        .build()
+        .unwrap();
+    (0..10).for_each(|_| run.step().unwrap());
+    run.set_step_size(long).unwrap();
+    match run.step() {
+        Err(Error::Stiffened { frequency, largest, .. }) => {
+            assert!((frequency - 3.0_f64.sqrt()).abs() < 1e-3, "{frequency}");
+            assert!((largest * frequency - 2.0).abs() < 1e-6, "{largest}");
+        }
+        other => panic!("{other:?}"),
+    }
+    run.set_step_size(short).unwrap();
+    (0..10).for_each(|_| run.step().unwrap());
+}
+
 /// Unit masses with f = −k₁ d − k₃ d³ between neighbors, the first on the ground; there is no tangent.
 pub(crate) struct Hardening {
     mass: Vec<f64>,
