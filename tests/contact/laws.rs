@@ -295,8 +295,8 @@ fn velocity_level() -> [Box<dyn TimeIntegrator>; 2] {
 /// end: it goes down again.
 #[test]
 fn what_rests_does_not_rise_from_the_floor() {
-    let (g, h) = (10.0, 0.01);
     type Make = fn() -> Box<dyn TimeIntegrator>;
+    let (g, h) = (10.0, 0.01);
     let cases: [(Make, ContactLaw); 4] = [
         (|| Box::new(CdLagrange), ContactLaw::Rigid),
         (|| Box::new(MoreauJean::new(0.5).unwrap()), ContactLaw::Rigid),

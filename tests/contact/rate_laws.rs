@@ -99,8 +99,8 @@ fn the_rate_condition_conserves_the_energy_of_an_impact() {
                 let approach = record.v.iter().fold(0.1_f64, |a, v| a.max(v[0] - v[1]));
                 assert!(depth > 0.2 * H * 0.1 && depth <= (1.0 + 1e-9) * H * approach, "{case}: {depth:e} {approach}");
                 deepest = deepest.max(depth);
-                // Whoever is pressed keeps the gap, but for what counts as touching: 1e-10 of the ways of a step, before
-                // and after.
+                // Whoever is pressed keeps the gap, but for what counts as touching: 1e-10 of the ways of a step,
+                // before and after.
                 for i in (1..record.t.len()).filter(|&i| record.raw[i] > 0.0) {
                     let kept = (record.gap[i] - record.gap[i - 1]).abs();
                     assert!(kept < 4e-10 * H * 0.1, "{case}, step {i}: {kept:e}");
