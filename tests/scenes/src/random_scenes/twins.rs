@@ -173,6 +173,7 @@ fn exact<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
         (Err(_), false) => return None,
         (Err(error), true) => return find(what, 0, format!("the second is refused: {error}")),
     };
+    let [beyond, lost] = [T::max_value().value().sqrt() * 1e-3, (T::min_positive_value() / T::epsilon()).value()];
     for (step, trace) in first.iter().enumerate() {
         if step > 0
             && let Err(error) = run.advance()
@@ -182,13 +183,22 @@ fn exact<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
             if resumed && matches!(error, Error::BeyondStability { .. }) {
                 return None;
             }
+            // (What is beyond the numbers whose squares there are in one of the units is not there in all of them.)
+            if matches!(recipe.twin, Twin::PowersOfTwo(_)) && trace.leaves([0.0, beyond]) {
+                return None;
+            }
             return find(what, step, format!("the second is refused: {error}"));
         }
         let of_second = Trace::of(&other, &run.run);
-        // (What is beyond the numbers whose squares there are in one of the units is not there in all of them, and on
-        // what has died out to numbers without digits contacts close by chance.)
-        let [beyond, lost] = [T::max_value().value().sqrt() * 1e-3, (T::min_positive_value() / T::epsilon()).value()];
+        // (Nor are numbers without digits, on which contacts close by chance, or energies without.)
         if matches!(recipe.twin, Twin::PowersOfTwo(_)) && [trace, &of_second].iter().any(|x| x.leaves([lost, beyond])) {
+            return None;
+        }
+        let speed = trace.lists[1].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        if let Twin::PowersOfTwo([length, mass, time]) = recipe.twin
+            && speed > 0.0
+            && speed * speed < lost * 2.0_f64.powi((2 * length + mass - 2 * time).abs())
+        {
             return None;
         }
         if !trace.is_same(&of_second, T::min_positive_value().value().sqrt() * 1e14) {
