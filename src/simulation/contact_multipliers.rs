@@ -1,7 +1,7 @@
 //! The contact problem of a stage: which rows take part, and their multipliers.
 
 use super::applied_rows::AppliedRows;
-use super::contact_rows::ContactRowsWork;
+use super::contact_rows::{ContactRowsWork, Part};
 use super::contact_step::{ContactStep, ContactWork};
 use super::interface::InterfaceWork;
 use super::operator::Operator;
@@ -22,8 +22,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, clock, constraints, g, part, .. } = self;
         let ContactWork { trial, rows, .. } = contact;
         let mut needed = false;
-        for row in constraints.tangents().all() {
-            if rows.weight[row] > T::zero() {
+        let tangents = constraints.tangents();
+        for row in tangents.all() {
+            // (Friction that is found after the static balance is not known in it.)
+            if rows.weight[row] > T::zero() || *part == Part::Massless && rows.on_massless[tangents.owner(row)] {
                 trial.lambda_raw[row] = T::zero();
             }
         }

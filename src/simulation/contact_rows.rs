@@ -358,14 +358,21 @@ impl<T: Real> KnownForces<T> {
         let (Self { delassus, offset }, size) = (self, problem.size());
         delassus.clear();
         offset.clear();
+        // (Nothing here answers to a force that a static balance has found: a number as large as the others', then.)
+        let largest = (0..size).fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
+        let own = |i: usize| match problem.delassus(i, i) {
+            none if none == T::zero() => largest,
+            own => own,
+        };
         for i in 0..size {
             let known = force(i);
             let entry = |j: usize| match (i == j, known.is_some() || force(j).is_some()) {
                 (false, true) => T::zero(),
+                (true, _) if known.is_some() => own(i),
                 _ => problem.delassus(i, j),
             };
             delassus.extend((0..size).map(entry));
-            offset.push(known.map_or(problem.offset[i], |force| -problem.delassus(i, i) * force));
+            offset.push(known.map_or(problem.offset[i], |force| -own(i) * force));
         }
         ContactProblem::of(delassus, offset, problem.sets, problem.tolerance, 0)
     }

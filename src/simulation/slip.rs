@@ -5,10 +5,10 @@
 //! do not contain the unknown, dofs have no mass, or corrections take contact forces out of the accelerations, it is
 //! the way made in the stage. It is measured along the rows along which friction acts.
 
-use super::contact_rows::ContactRowsWork;
+use super::contact_rows::{ContactRowsWork, Part};
 use super::contact_step::{ContactStep, ContactWork};
 use super::program::CompiledStage;
-use crate::contact::GapRates;
+use crate::contact::{ContactJacobian, GapRates, Tangents};
 use crate::corrector::rounding;
 use crate::error::Result;
 use crate::real::Real;
@@ -38,21 +38,46 @@ fn source<T: Real>(stage: &CompiledStage<T>, by_way: bool) -> (Source<T>, T) {
     }
 }
 
+/// Whether the slip of a contact is that of dofs without mass. (Where these are solved for with the others, it is that
+/// of a contact on such dofs.)
+fn is_static<T: Real>(
+    part: Part,
+    (tangents, g): (&Tangents, &ContactJacobian<T>),
+    massless: &[usize],
+    row: usize,
+) -> bool {
+    match part {
+        Part::All => tangents.act_on(g, row, massless),
+        Part::Massless | Part::Massive => tangents.of(row).any(|k| g.acts_on(k, massless)),
+    }
+}
+
 impl<T: Real> ContactStep<'_, '_, T> {
     /// Sets the weights of d in the slips: those of contacts that the problem is about.
     pub(super) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
         let tangents = self.constraints.tangents();
         for row in tangents.contacts() {
-            let is_massless = tangents.act_on(self.g, row, &rows.massless);
-            let (_, weight) = source(self.stage, is_massless || rows.slides_by_way);
+            let is_static = is_static(self.part, (tangents, &*self.g), &rows.massless, row);
+            let (_, weight) = source(self.stage, rows.slides_by_way || is_static);
             // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
             let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
-            let rubs = rows.weight[row] > T::zero() || knows;
+            let rubs = match self.rubs_later(rows, row) {
+                true => self.part == Part::Massive,
+                false => rows.weight[row] > T::zero() || knows,
+            };
             rows.weight[tangents.of(row)].fill(if rubs { weight } else { T::zero() });
             // (Candidates may have come and gone: these were other rows before.)
             rows.compliance[tangents.of(row)].fill(T::zero());
             rows.shift[tangents.of(row)].fill(T::zero());
         }
+    }
+
+    /// Whether the friction of a contact on dofs without mass acts on dofs with mass alone. In an explicit stage it is
+    /// no part of the static balance, in which nothing would answer to it: it is found after that, when its normal
+    /// force is known.
+    fn rubs_later(&self, rows: &ContactRowsWork<T>, row: usize) -> bool {
+        let tangents = (self.constraints.tangents(), &*self.g);
+        self.part != Part::All && rows.on_massless[row] && !is_static(self.part, tangents, &rows.massless, row)
     }
 
     /// Evaluates y of the tangential rows at the d that was [placed](Self::place).
@@ -62,7 +87,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         past: &[Motion<T>],
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
-        let Self { stage, clock, constraints, g, iterate, .. } = self;
+        let Self { stage, clock, constraints, g, iterate, part, .. } = self;
         if constraints.tangents().is_empty() {
             return Ok(());
         }
@@ -83,8 +108,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         constraints.finite_slip_rates(t, &new.u, &new.v, slips)?;
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
-            let is_massless = tangents.act_on(g, row, massless);
-            let (source, weight) = source(stage, is_massless || *slides_by_way);
+            let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
             for k in tangents.of(row) {
                 let own = slips[k - tangents.all().start].rate;
                 (y[k], tolerance[k]) = match source {

@@ -7,7 +7,7 @@ use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
 use super::scheme::Scheme;
-use super::start_problem::{StartProblem, rubbed, sliding, stop_in_time};
+use super::start_problem::{StartProblem, sliding, stop_in_time};
 use super::supports::put_initial_supports;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
@@ -233,8 +233,14 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        let pushing = (&mut *projection, *massless);
-        rub_springs(constraints, g, &mut **contact_solver, pushing, h, (&mut motion, &mut contacts))?;
+        // (Dofs without mass respond to no impulse: what friction there gave to one body the other would not lose.)
+        let drags = |constraints: &Constraints<'_, T>, row: usize| {
+            constraints.tangents().of(row).any(|k| g.acts_on(k, massless))
+        };
+        let springs = |row: usize| constraints.law(row).is_spring() && !drags(constraints, row);
+        let rows = constraints.tangents().contacts().filter(|&row| contacts.closed[row] && springs(row)).collect();
+        let moved = (&mut motion, &mut contacts);
+        rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, rows)?;
         if !massless.is_empty() {
             // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
             let mut forces = vec![T::zero(); dofs];
@@ -248,8 +254,14 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| g.acts_on(row, massless));
             problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
             problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
-            problem.solve(t, constraints, g, (&mut unit, &[]), &mut **contact_solver)?;
+            // (What rubs on dofs with mass alone follows, when its normal force is known.)
+            problem.solve(t, constraints, g, (&mut unit, &|row| drags(constraints, row)), &mut **contact_solver)?;
+            let pressed = problem.rows.clone();
             problem.press(g, projection, &mut motion, &mut contacts)?;
+            let later = |row: usize| pressed.binary_search(&row).is_ok() && !drags(constraints, row);
+            let rows = constraints.tangents().contacts().filter(|&row| contacts.closed[row] && later(row)).collect();
+            let moved = (&mut motion, &mut contacts);
+            rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, rows)?;
         }
         let mut problem = match looks_ahead {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
@@ -261,7 +273,8 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
-        problem.solve(t, constraints, g, (&mut *projection, massless), &mut **contact_solver)?;
+        let rubs = |row: usize| !drags(constraints, row);
+        problem.solve(t, constraints, g, (&mut *projection, &rubs), &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts)?;
         pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), &contacts, &mut motion)?;
         Ok(Found { motion, contacts, adjustment })
@@ -310,24 +323,25 @@ fn all_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[T])
     Ok((0..v.len()).filter(|dof| prescribed.binary_search(dof).is_err()).collect())
 }
 
-/// The friction of springs in compression, whose forces are known: it holds what is at rest, and slows what slides.
-fn rub_springs<T: Real>(
+/// The friction of contacts whose normal forces are known, those of springs in compression and of static balance: it
+/// holds what is at rest, and slows what slides.
+fn rub_known<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
     solver: &mut dyn ContactSolver<T>,
-    (projection, massless): (&mut JumpProjection<T>, &[usize]),
+    projection: &mut JumpProjection<T>,
     h: f64,
     (motion, contacts): (&mut Motion<T>, &mut ContactState<T>),
+    rows: Vec<usize>,
 ) -> Result<()> {
-    let mut slips = vec![GapRates::default(); constraints.tangents().len()];
-    constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
-    let mut sliding = sliding(constraints, (g, &slips), motion);
-    let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
-    let rubs = |row: &usize| constraints.law(*row).is_spring() && !rubbed(tangents, g, massless, *row).is_empty();
-    let rows: Vec<usize> = tangents.contacts().filter(|&row| contacts.closed[row] && rubs(&row)).collect();
     if rows.is_empty() {
         return Ok(());
     }
+    let mut slips = vec![GapRates::default(); constraints.tangents().len()];
+    constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
+    let mut sliding = sliding(constraints, (g, &slips), motion);
+    sliding.retain(|slide| rows.binary_search(&slide.contact).is_ok());
+    let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
     let own = |k: usize| slips[k - tangents.all().start].acceleration;
     let (rows, forces) = loop {
         problem.clear();

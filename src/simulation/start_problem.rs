@@ -10,7 +10,6 @@ use crate::real::Real;
 use crate::state::{ContactState, Motion};
 use crate::system::System;
 use crate::tableau::ContactLevel;
-use std::ops::Range;
 
 /// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0. q is the acceleration of the gap without contact, or, for a
 /// scheme that imposes contact ahead of the state, the violation of that condition as an acceleration.
@@ -230,13 +229,13 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// Solves. Friction along dofs that are `unreached` by the projection is left out.
+    /// Solves. Says `rubs` of a contact whether its friction takes part.
     pub(super) fn solve(
         &mut self,
         t: f64,
         constraints: &Constraints<'_, T>,
         g: &ContactJacobian<T>,
-        (projection, unreached): (&mut JumpProjection<T>, &[usize]),
+        (projection, rubs): (&mut JumpProjection<T>, &dyn Fn(usize) -> bool),
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         self.solved.clear();
@@ -244,7 +243,7 @@ impl<T: Real> StartProblem<T> {
             match (self.rows.is_empty(), constraints.tangents().is_empty()) {
                 (true, _) => {}
                 (_, true) => self.solve_gaps(t, constraints, (g, &mut *projection), solver)?,
-                (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection, unreached), solver)?,
+                (_, false) => self.solve_rubbing(t, constraints, (g, &mut *projection, rubs), solver)?,
             }
             let Self { rows, waiting, offset, tolerance, sliding, h, solved, lambda, .. } = self;
             let mut pushed = vec![T::zero(); projection.dofs()];
@@ -299,13 +298,13 @@ impl<T: Real> StartProblem<T> {
         &mut self,
         t: f64,
         constraints: &Constraints<'_, T>,
-        (g, projection, unreached): (&ContactJacobian<T>, &mut JumpProjection<T>, &[usize]),
+        (g, projection, rubs): (&ContactJacobian<T>, &mut JumpProjection<T>, &dyn Fn(usize) -> bool),
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         let Self { rows, offset, tolerance, compliance, sliding, h, solved, lambda, .. } = self;
         let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
         for &row in rows.iter() {
-            let own = rubbed(tangents, g, unreached, row);
+            let own = if rubs(row) { tangents.of(row) } else { 0..0 };
             let slide = sliding.iter().find(|slide| slide.contact == row && !own.is_empty());
             let direction = slide.and_then(|slide| slide.friction(tangents));
             let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
@@ -323,19 +322,6 @@ impl<T: Real> StartProblem<T> {
         *lambda = problem.totals;
         Ok(())
     }
-}
-
-/// The tangential rows of a contact along which forces reach the bodies: none if they act on dofs without mass, which
-/// respond to no impulse, for what the body on one side got the other would not lose.
-pub(super) fn rubbed<T: Real>(
-    tangents: &Tangents,
-    g: &ContactJacobian<T>,
-    unreached: &[usize],
-    contact: usize,
-) -> Range<usize> {
-    let own = tangents.of(contact);
-    let reaches = unreached.is_empty() || !own.clone().any(|row| g.acts_on(row, unreached));
-    if reaches { own } else { 0..0 }
 }
 
 /// A contact with friction that slides at the start.

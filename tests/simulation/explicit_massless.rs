@@ -310,6 +310,45 @@ fn compliant_laws_press_on_them_too() {
     }
 }
 
+/// A foot without mass toward the floor, and with mass along it: it slides to its stop as far as it should, and sticks
+/// there, whatever pulls at it below the bound.
+#[test]
+fn friction_slows_what_has_mass_along_the_floor_alone() {
+    let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
+        [|| Box::new(CentralDifference), || Box::new(CdLagrange), || Box::new(NohBathe::new(0.54).unwrap())];
+    let (mass, weight, k, h) = (0.5, 10.0, 100.0, 1e-3);
+    let laws = [ContactLaw::Rigid, ContactLaw::Penalty { stiffness: 1e4 }];
+    for (make, law) in schemes.into_iter().flat_map(|make| laws.map(|law| (make, law))) {
+        for (friction, pull) in [(0.3, 0.0), (0.3, 1.0), (0.3, -1.0), (1e6, 0.0), (1e6, 1.0)] {
+            let name = format!("{}, {law:?}, μ = {friction}, pull {pull}", make().name());
+            // Dofs: the foot toward the floor and along it, and a mass on a spring that stands on it, at rest.
+            let springs = [(0, 0, k), (0, 2, -k), (2, 0, -k), (2, 2, k)];
+            let system = LinearSystem::lumped(vec![0.0, mass, 1.0], matrix(3, springs)).unwrap().load(move |_, f| {
+                (f[1], f[2]) = (pull, -weight);
+            });
+            let depth = if law == ContactLaw::Rigid { 0.0 } else { weight / 1e4 };
+            let mut run = Simulation::builder(system, make(), h)
+                .displacement(vec![-depth, 0.0, -depth - weight / k])
+                .velocity(vec![0.0, 1.0, 0.0])
+                .constraint(LinearRows::new().row(law, &[(0, 1.0)], 0.0).friction(friction, &[&[(1, 1.0)]]))
+                .build()
+                .unwrap();
+            let brake = (friction * weight - pull) / mass;
+            while run.time() < 0.5 {
+                run.step().unwrap();
+                let contacts = run.state().contacts();
+                let (normal, along) = (contacts.forces()[0], contacts.friction_forces(0)[0]);
+                assert!((normal / weight - 1.0).abs() < 1e-9, "{name}: {normal}");
+                assert!(along.abs() <= friction * normal * (1.0 + 1e-12), "{name}: {along}");
+            }
+            let (u, v) = (run.state().displacement()[1], run.state().velocity()[1]);
+            assert!((u - 0.5 / brake).abs() < 1.5 * h && v.abs() < 1e-12, "{name}: {u} {v}");
+            let along = run.state().contacts().friction_forces(0)[0];
+            assert!((along + pull).abs() < 1e-9, "{name}: {along}");
+        }
+    }
+}
+
 #[test]
 fn what_explicit_stages_cannot_do_is_refused() {
     let bars = Bars::paper(10);

@@ -26,13 +26,23 @@ fn scenes_that_have_failed_hold() {
     let by_units = [40_062_161, 50_043_714, 50_122_859, 50_123_697, 90_017_504, 91_237_725];
     let by_units = by_units.into_iter().chain([80_276_381, 92_222_309, 92_405_630, 94_064_348, 94_109_335]);
     let by_units = by_units.chain([95_397_770, 95_411_149, 96_434_204, 99_075_647, 101_796_554, 103_495_303]);
+    let by_units = by_units.chain([105_752_472, 105_843_541]);
     let by_order = [40_073_095, 50_175_212, 60_019_637, 60_025_014, 70_203_147, 80_267_802, 80_288_695, 80_397_469];
     let by_order = by_order.into_iter().chain([80_649_817, 91_268_618, 92_799_461, 96_569_854, 96_862_299]);
     let by_friction = [93_518_671, 95_441_833, 97_020_357, 97_083_399, 97_653_618, 100_387_625];
+    let by_start = [103_572_554];
     let by_velocity = [70_113_558, 80_083_120, 80_155_686, 90_202_306];
     let by_energy = [10_004_401, 50_162_224, 70_122_330, 80_083_433, 80_204_920, 90_151_631, 97_407_527, 103_452_536];
+    let by_energy = by_energy.into_iter().chain([97_064_646, 105_032_403]);
     let not_resumed = [50_041_867, 60_027_999];
-    for seed in by_units.chain(by_order).chain(by_velocity).chain(by_energy).chain(not_resumed).chain(by_friction) {
+    for seed in by_units
+        .chain(by_order)
+        .chain(by_velocity)
+        .chain(by_energy)
+        .chain(not_resumed)
+        .chain(by_friction)
+        .chain(by_start)
+    {
         let recipe = Recipe::of_seed(seed);
         let verdict = recipe.examine();
         assert_eq!(verdict.finding, None, "`--example random_scenes -- --scene {seed}`: {}", recipe.summary());
