@@ -233,35 +233,15 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        // (Dofs without mass respond to no impulse: what friction there gave to one body the other would not lose.)
-        let drags = |constraints: &Constraints<'_, T>, row: usize| {
-            constraints.tangents().of(row).any(|k| g.acts_on(k, massless))
-        };
-        let springs = |row: usize| constraints.law(row).is_spring() && !drags(constraints, row);
-        let rows = constraints.tangents().contacts().filter(|&row| contacts.closed[row] && springs(row)).collect();
+        let springs = |row: usize| constraints.law(row).is_spring() && !drags(constraints, g, massless, row);
+        let springs = |row: &usize| contacts.closed[*row] && springs(*row);
+        let rows: Vec<usize> = constraints.tangents().contacts().filter(springs).collect();
         let moved = (&mut motion, &mut contacts);
-        rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, rows)?;
+        rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, &rows)?;
         if !massless.is_empty() {
-            // Where a contact acts on dofs without mass the balance is algebraic: f + Gᵀ λ = 0.
-            let mut forces = vec![T::zero(); dofs];
-            let mut unit = forces.clone();
-            for (&dof, &force) in massless.iter().zip(&unbalanced) {
-                (forces[dof], unit[dof]) = (force, T::one());
-            }
-            let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
-            let mut problem = StartProblem::at_rest(constraints, g, &motion, h, &touching)?;
-            problem.h = None;
-            problem.rows.retain(|&row| g.acts_on(row, massless));
-            problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
-            problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
-            // (What rubs on dofs with mass alone follows, when its normal force is known.)
-            problem.solve(t, constraints, g, (&mut unit, &|row| drags(constraints, row)), &mut **contact_solver)?;
-            let pressed = problem.rows.clone();
-            problem.press(g, projection, &mut motion, &mut contacts)?;
-            let later = |row: usize| pressed.binary_search(&row).is_ok() && !drags(constraints, row);
-            let rows = constraints.tangents().contacts().filter(|&row| contacts.closed[row] && later(row)).collect();
             let moved = (&mut motion, &mut contacts);
-            rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, rows)?;
+            let solver = &mut **contact_solver;
+            press_static(constraints, (g, projection), solver, (massless, &unbalanced), (h, &touching), moved)?;
         }
         let mut problem = match looks_ahead {
             true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
@@ -273,12 +253,49 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
-        let rubs = |row: usize| !drags(constraints, row);
+        let rubs = |row: usize| !drags(constraints, g, massless, row);
         problem.solve(t, constraints, g, (&mut *projection, &rubs), &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts)?;
         pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), &contacts, &mut motion)?;
         Ok(Found { motion, contacts, adjustment })
     }
+}
+
+/// Whether friction of a contact acts on dofs without mass. They respond to no impulse: what it gave there to one body
+/// the other would not lose.
+fn drags<T: Real>(constraints: &Constraints<'_, T>, g: &ContactJacobian<T>, massless: &[usize], row: usize) -> bool {
+    constraints.tangents().of(row).any(|k| g.acts_on(k, massless))
+}
+
+/// Contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0. Friction that acts on dofs with mass
+/// alone follows, when the normal force is known.
+fn press_static<T: Real>(
+    constraints: &mut Constraints<'_, T>,
+    (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+    solver: &mut dyn ContactSolver<T>,
+    (massless, unbalanced): (&[usize], &[T]),
+    (h, touching): (f64, &[bool]),
+    (motion, contacts): (&mut Motion<T>, &mut ContactState<T>),
+) -> Result<()> {
+    let dofs = motion.u.len();
+    let mut forces = vec![T::zero(); dofs];
+    let mut unit = forces.clone();
+    for (&dof, &force) in massless.iter().zip(unbalanced) {
+        (forces[dof], unit[dof]) = (force, T::one());
+    }
+    let mut unit = JumpProjection::with(InverseMass::Lumped(unit), dofs, constraints.len())?;
+    let mut problem = StartProblem::at_rest(constraints, g, motion, h, touching)?;
+    problem.h = None;
+    problem.rows.retain(|&row| g.acts_on(row, massless));
+    problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
+    problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
+    let drags = |row: usize| drags(constraints, g, massless, row);
+    problem.solve(motion.t, constraints, g, (&mut unit, &drags), solver)?;
+    let later: Vec<usize> = problem.rows.iter().copied().filter(|&row| !drags(row)).collect();
+    problem.press(g, projection, motion, contacts)?;
+    let rubs = |row: &usize| contacts.closed[*row] && !constraints.tangents().of(*row).is_empty();
+    let rows: Vec<usize> = later.into_iter().filter(rubs).collect();
+    rub_known(constraints, g, solver, projection, h, (motion, contacts), &rows)
 }
 
 /// What of the forces on dofs without mass contact has not balanced either goes on to the dofs with mass, and
@@ -332,7 +349,7 @@ fn rub_known<T: Real>(
     projection: &mut JumpProjection<T>,
     h: f64,
     (motion, contacts): (&mut Motion<T>, &mut ContactState<T>),
-    rows: Vec<usize>,
+    rows: &[usize],
 ) -> Result<()> {
     if rows.is_empty() {
         return Ok(());
@@ -345,7 +362,7 @@ fn rub_known<T: Real>(
     let own = |k: usize| slips[k - tangents.all().start].acceleration;
     let (rows, forces) = loop {
         problem.clear();
-        for &row in &rows {
+        for &row in rows {
             let slide = sliding.iter().find(|slide| slide.contact == row);
             let direction = slide.and_then(|slide| slide.friction(tangents));
             let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
