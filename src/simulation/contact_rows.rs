@@ -358,12 +358,11 @@ impl<T: Real> KnownForces<T> {
         let (Self { delassus, offset }, size) = (self, problem.size());
         delassus.clear();
         offset.clear();
-        // (Nothing here answers to a force that a static balance has found: a number as large as the others', then.)
-        let largest = (0..size).fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
-        let own = |i: usize| match problem.delassus(i, i) {
-            none if none == T::zero() => largest,
-            own => own,
-        };
+        // (The diagonal of rows that stay as they are may be any number, that of a force which a static balance has
+        // found is in no unit of W: it is as large as the others' here.)
+        let unknown = (0..size).filter(|&i| force(i).is_none());
+        let largest = unknown.fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
+        let own = |i: usize| if largest > T::zero() { largest } else { problem.delassus(i, i) };
         for i in 0..size {
             let known = force(i);
             let entry = |j: usize| match (i == j, known.is_some() || force(j).is_some()) {
