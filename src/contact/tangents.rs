@@ -88,7 +88,12 @@ impl Tangents {
 
     /// Whether a contact acts on any of the dofs given (ascending), by its gap or by its friction.
     pub(crate) fn act_on<T: Real>(&self, g: &ContactJacobian<T>, contact: usize, dofs: &[usize]) -> bool {
-        !dofs.is_empty() && std::iter::once(contact).chain(self.of(contact)).any(|row| g.acts_on(row, dofs))
+        !dofs.is_empty() && (g.acts_on(contact, dofs) || self.rub_on(g, contact, dofs))
+    }
+
+    /// Whether the friction of a contact acts on any of the dofs given (ascending).
+    pub(crate) fn rub_on<T: Real>(&self, g: &ContactJacobian<T>, contact: usize, dofs: &[usize]) -> bool {
+        self.of(contact).any(|row| g.acts_on(row, dofs))
     }
 
     /// The contact that a row belongs to: that of a gap is its own.

@@ -102,7 +102,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         for (row, on_massless) in on_massless.iter_mut().enumerate().take(self.constraints.len()) {
             *on_massless = self.g.acts_on(row, &block.dofs);
             let (law, tangents) = (self.constraints.law(row), self.constraints.tangents());
-            let rubs = tangents.friction(row) > 0.0 && tangents.of(row).any(|k| self.g.acts_on(k, &block.dofs));
+            let rubs = tangents.friction(row) > 0.0 && tangents.rub_on(self.g, row, &block.dofs);
             if rubs && !*on_massless {
                 return Err(Error::Incompatible {
                     part: format!("friction of contact {} on dofs without mass", self.constraints.ids[row]),

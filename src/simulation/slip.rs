@@ -48,7 +48,7 @@ fn is_static<T: Real>(
 ) -> bool {
     match part {
         Part::All => tangents.act_on(g, row, massless),
-        Part::Massless | Part::Massive => tangents.of(row).any(|k| g.acts_on(k, massless)),
+        Part::Massless | Part::Massive => tangents.rub_on(g, row, massless),
     }
 }
 

@@ -233,9 +233,11 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        let springs = |row: usize| constraints.law(row).is_spring() && !drags(constraints, g, massless, row);
-        let springs = |row: &usize| contacts.closed[*row] && springs(*row);
-        let rows: Vec<usize> = constraints.tangents().contacts().filter(springs).collect();
+        // (Dofs without mass respond to no impulse: what friction gave there to one body the other would not lose.)
+        let drags = |constraints: &Constraints<'_, T>, row: usize| constraints.tangents().rub_on(g, row, massless);
+        let is_spring = |row: usize| contacts.closed[row] && constraints.law(row).is_spring();
+        let rubs = |row: &usize| is_spring(*row) && !drags(constraints, *row);
+        let rows: Vec<usize> = constraints.tangents().contacts().filter(rubs).collect();
         let moved = (&mut motion, &mut contacts);
         rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, &rows)?;
         if !massless.is_empty() {
@@ -253,18 +255,12 @@ impl<T: Real> Start<'_, T> {
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
-        let rubs = |row: usize| !drags(constraints, g, massless, row);
+        let rubs = |row: usize| !drags(constraints, row);
         problem.solve(t, constraints, g, (&mut *projection, &rubs), &mut **contact_solver)?;
         problem.press(g, projection, &mut motion, &mut contacts)?;
         pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), &contacts, &mut motion)?;
         Ok(Found { motion, contacts, adjustment })
     }
-}
-
-/// Whether friction of a contact acts on dofs without mass. They respond to no impulse: what it gave there to one body
-/// the other would not lose.
-fn drags<T: Real>(constraints: &Constraints<'_, T>, g: &ContactJacobian<T>, massless: &[usize], row: usize) -> bool {
-    constraints.tangents().of(row).any(|k| g.acts_on(k, massless))
 }
 
 /// Contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0. Friction that acts on dofs with mass
@@ -289,7 +285,7 @@ fn press_static<T: Real>(
     problem.rows.retain(|&row| g.acts_on(row, massless));
     problem.offset = (0..g.rows()).map(|row| g.product(row, &forces)).collect();
     problem.tolerance = (0..g.rows()).map(|row| rounding(g.magnitude(row, &forces))).collect();
-    let drags = |row: usize| drags(constraints, g, massless, row);
+    let drags = |row: usize| constraints.tangents().rub_on(g, row, massless);
     problem.solve(motion.t, constraints, g, (&mut unit, &drags), solver)?;
     let later: Vec<usize> = problem.rows.iter().copied().filter(|&row| !drags(row)).collect();
     problem.press(g, projection, motion, contacts)?;

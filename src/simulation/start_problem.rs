@@ -229,7 +229,7 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// Solves. Says `rubs` of a contact whether its friction takes part.
+    /// Solves. `rubs` says of a contact whether its friction takes part.
     pub(super) fn solve(
         &mut self,
         t: f64,
