@@ -23,6 +23,7 @@ mod energy;
 mod excess_forces;
 mod finite;
 mod gaps;
+mod impulses;
 mod interface;
 mod judge;
 mod jumps;

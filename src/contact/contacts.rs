@@ -207,7 +207,8 @@ pub struct Contact<'c, T> {
 
 impl<T: Real> Contact<'_, T> {
     /// A row beside the normal one, along which bodies slide: (place, weight) pairs, so that its product with the
-    /// velocities is the slip. One in the plane; two in space, along directions that are orthonormal, for the cone of
+    /// velocities is the slip. One in the plane, along (n_y, −n_x) by all constraints of this crate, n the direction in
+    /// which the gap opens; two in space, along directions that are orthonormal, for the cone of
     /// friction is round. Without [`friction`](Self::friction) it is kept for output.
     pub fn tangent(&mut self, row: &[(usize, T)]) -> &mut Self {
         self.contacts.tangents.push(row);

@@ -167,6 +167,12 @@ impl<T: Real> ContactJacobian<T> {
         self.row(row).map(|(dof, weight)| weight * x[dof]).sum()
     }
 
+    /// Σ_j G_row,j F_other,j with a row of another list.
+    pub(crate) fn dot(&self, row: usize, (others, other): (&Self, usize)) -> T {
+        let of_other = |dof: usize| others.row(other).filter(move |&(at, _)| at == dof);
+        self.row(row).flat_map(|(dof, weight)| of_other(dof).map(move |(_, other)| weight * other)).sum()
+    }
+
     /// Whether a row acts on any of the dofs given (ascending).
     pub(crate) fn acts_on(&self, row: usize, dofs: &[usize]) -> bool {
         self.row(row).any(|(dof, weight)| weight != T::zero() && dofs.binary_search(&dof).is_ok())

@@ -112,6 +112,38 @@ impl Tangents {
         }
     }
 
+    /// Turns the tangential entries of a list of the rows with their contacts: given along the tangents of `from`, they
+    /// are along those of `to` afterwards.
+    ///
+    /// With C = T Fᵀ, T and F the tangential rows of a contact in `to` and `from`, they are multiplied by the orthogonal
+    /// factor of the polar decomposition of C: the least turn that takes the one tangential plane to the other, whatever
+    /// tangents are chosen in either.
+    pub(crate) fn turn<T: Real>(&self, [from, to]: [&ContactJacobian<T>; 2], values: &mut [T]) {
+        if std::ptr::eq(from, to) {
+            return;
+        }
+        for contact in 0..self.friction.len() {
+            let rows = self.of(contact);
+            let dot = |i: usize, j: usize| to.dot(rows.start + i, (from, rows.start + j));
+            match rows.len() {
+                1 if dot(0, 0) < T::zero() => values[rows.start] = -values[rows.start],
+                2 => {
+                    let ([a, b], [c, d]) = ([dot(0, 0), dot(0, 1)], [dot(1, 0), dot(1, 1)]);
+                    // C + sgn(det C) cof C, which is the orthogonal factor times the sum of the singular values.
+                    let sign = if a * d - b * c < T::zero() { -T::one() } else { T::one() };
+                    let ([a, b], [c, d]) = ([a + sign * d, b - sign * c], [c - sign * b, d + sign * a]);
+                    let size = a.hypot(b);
+                    let [x, y] = [values[rows.start], values[rows.start + 1]];
+                    if size > T::zero() {
+                        values[rows.start] = (a * x + b * y) / size;
+                        values[rows.start + 1] = (c * x + d * y) / size;
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// Whether contacts have the same rows in another list.
     pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
         self.first == other.first
@@ -137,5 +169,35 @@ mod tests {
         let mut rows = Vec::new();
         tangents.expand([0, 2].into_iter(), &mut rows);
         assert_eq!(rows, [0, 3, 4, 2, 5]);
+    }
+
+    /// A node between tangents turned by any angle, mirrored or not: the same vector, also where the plane leans by 0.1.
+    #[test]
+    fn entries_turn_with_their_tangents() {
+        let mut tangents = Tangents::default();
+        tangents.begin(1);
+        tangents.push(0.3, 2);
+        let rows = |[x, y]: [[f64; 3]; 2]| {
+            let mut g = ContactJacobian::default();
+            for row in [[0.0, 0.0, 1.0], x, y] {
+                g.push_entries((0..3).map(|k| (k, row[k])));
+            }
+            g
+        };
+        let from = rows([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        for lean in [0.0_f64, 0.1] {
+            for step in 0..12 {
+                let (sin, cos) = (0.5 * f64::from(step)).sin_cos();
+                for mirror in [1.0, -1.0] {
+                    // The plane leans about x.
+                    let leaning = |[x, y]: [f64; 2]| [x, lean.cos() * y, lean.sin() * y];
+                    let to = rows([leaning([cos, sin]), leaning([-mirror * sin, mirror * cos])]);
+                    let mut values = [5.0, 3.0, 4.0];
+                    tangents.turn([&from, &to], &mut values);
+                    let exact = [5.0, 3.0 * cos + 4.0 * sin, mirror * (4.0 * cos - 3.0 * sin)];
+                    assert!(values.iter().zip(exact).all(|(x, y)| (x - y).abs() < 1e-14), "{values:?} {exact:?}");
+                }
+            }
+        }
     }
 }

@@ -30,7 +30,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
-        let ContactWork { trial, rows, was_closed, was_sticking, closed_at_start, .. } = contact;
+        let ContactWork { trial, impulses, rows, was_closed, was_sticking, closed_at_start, .. } = contact;
         let level = Level { target: stage.contact.as_ref(), clock: *clock };
         rows.evaluate(&level, constraints, g, new, 1e-10)?;
         if level.target.is_none() {
@@ -41,6 +41,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
             constraints.follow(new.t, &new.u, g)?;
             rows.curved.release(constraints);
             constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
+        }
+        let impulse_weight = T::of(clock.h * booking.impulse_weight);
+        impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
+        if rows.curved.apart {
+            // Multipliers along the rows of the balance: from here on all is along those of the state.
+            constraints.tangents().turn([&rows.curved.rows, g], &mut trial.lambda_raw);
         }
         rows.measure(stage, clock.h, constraints, g, new, None)?;
         if self.part != Part::All && level.target.is_some() {
@@ -59,7 +65,6 @@ impl<T: Real> ContactStep<'_, '_, T> {
         buffers.closed.clear();
         buffers.opened.clear();
         buffers.released.clear();
-        let impulse_weight = T::of(clock.h * booking.impulse_weight);
         trial.lambda.copy_from_slice(&trial.lambda_raw);
         trial.lambda_v.fill(T::zero());
         trial.lambda_a.fill(T::zero());
@@ -109,15 +114,15 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let (mut slip, mut noise) = (T::zero(), T::zero());
             for row in constraints.tangents().of(row) {
                 let own = rows.slips[row - constraints.tangents().all().start].rate;
-                let forces = rows.curved.forces(g);
-                slip = slip.hypot(forces.product(row, &new.v) + own);
+                slip = slip.hypot(g.product(row, &new.v) + own);
                 // (A velocity that has vanished has the rounding of what it is the sum of.)
-                let size = forces.magnitude(row, &new.v) + T::of(clock.h) * forces.magnitude(row, &new.a) + own.abs();
+                let size = g.magnitude(row, &new.v) + T::of(clock.h) * g.magnitude(row, &new.a) + own.abs();
                 noise = noise.max(rounding(size));
             }
             let bound = T::of(constraints.tangents().friction(row)) * trial.lambda_raw[row];
             trial.sliding[row] = slides(trial.tangential(row, &trial.lambda_raw), bound) && slip > noise;
         }
+        impulses.note(trial);
         Ok(())
     }
 }
@@ -134,9 +139,8 @@ pub(super) fn note_slips<T: Real>(
     }
     let ContactWork { trial, rows, .. } = contact;
     constraints.finite_slip_rates(new.t, &new.u, &new.v, &mut rows.slips)?;
-    let forces = rows.curved.forces(g);
     for ((row, slip), own) in constraints.tangents().all().zip(&mut trial.slip).zip(&rows.slips) {
-        *slip = forces.product(row, &new.v) + own.rate;
+        *slip = g.product(row, &new.v) + own.rate;
     }
     Ok(())
 }

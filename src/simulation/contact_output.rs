@@ -46,7 +46,8 @@ impl<T: Real> ContactForce<T> {
 impl<T: Real> Simulation<'_, T> {
     /// The contacts of the state with their forces as vectors, their rows, and where they are.
     ///
-    /// Rows are those of the state, so that M a = f + Σ [`forces`](ContactForce::forces) there. Contacts are in the
+    /// Rows are those of the state: M a = f + Σ [`forces`](ContactForce::forces) there, to rounding or O(h) as
+    /// [`ContactState::forces`](crate::state::ContactState::forces) says. Contacts are in the
     /// order of [`ContactState::ids`](crate::state::ContactState::ids). Allocates: for output, not for inner loops.
     ///
     /// ```

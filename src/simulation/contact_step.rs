@@ -3,6 +3,7 @@
 
 use super::constraints::Constraints;
 use super::contact_rows::{ContactRowsWork, Level, Part};
+use super::impulses::Impulses;
 use super::interface::{InterfaceWork, advance, keep};
 use super::operator::Operator;
 use super::program::CompiledStage;
@@ -23,6 +24,7 @@ pub(super) struct ContactWork<T> {
     pub(super) rows: ContactRowsWork<T>,
     /// The contacts of the step that is being tried.
     pub(super) trial: ContactState<T>,
+    pub(super) impulses: Impulses<T>,
     /// Closed flags at the start of the step.
     pub(super) closed_at_start: Vec<bool>,
     /// Which contacts exerted a force at the start of the step.

@@ -32,6 +32,8 @@ pub(crate) struct Ledger<T: Real> {
     /// The same of friction; empty as long as there is none.
     friction: Vec<T>,
     next_friction: Vec<T>,
+    /// Reported forces along the rows where they act.
+    forces: Vec<T>,
     /// Works and damping power at the end of a step that is not accepted yet.
     next: (Works<T>, T),
 }
@@ -79,6 +81,7 @@ impl<T: Real> Ledger<T> {
             next_contact: zero(),
             friction: Vec::new(),
             next_friction: Vec::new(),
+            forces: Vec::new(),
             next: (Works::default(), T::zero()),
         };
         let energy = energy(system, together, state, None);
@@ -156,7 +159,9 @@ impl<T: Real> Ledger<T> {
         self.next_friction.resize(self.friction.len(), T::zero());
         self.next_contact.fill(T::zero());
         self.next_friction.fill(T::zero());
-        for (row, &force) in books.contacts.lambda.iter().enumerate() {
+        self.forces.clone_from(&books.contacts.lambda);
+        books.contacts.tangents.turn([books.g, books.forces], &mut self.forces);
+        for (row, &force) in self.forces.iter().enumerate() {
             let tangential = books.forces.is_tangential(row);
             books.forces.scatter(row, force, if tangential { &mut self.next_friction } else { &mut self.next_contact });
         }

@@ -52,6 +52,7 @@ impl<T: Real> Simulation<'_, T> {
         let ContactWork { trial, exerting_at_start, .. } = &mut work.contact;
         note_exerting((constraints, g), trial, &state.motion.u, exerting_at_start);
         work.backup.begin();
+        work.contact.impulses.begin();
         work.correction.energy = T::zero();
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         work.backup.underway = true;
@@ -177,6 +178,7 @@ impl<T: Real> Simulation<'_, T> {
         std::mem::swap(&mut state.shown, &mut work.shown);
         constraints.measure_from_surfaces(&mut work.contact.trial.gap);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
+        work.contact.impulses.accept();
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;
         history.known = (history.known + 1).min(depth);
@@ -291,6 +293,7 @@ impl<T: Real> Simulation<'_, T> {
                     };
                     correction.correct(correctors)?;
                 }
+                work.contact.impulses.push_corrections(g, &work.contact.trial);
             }
         }
         Ok(())

@@ -5,6 +5,7 @@ use super::constraints::Constraints;
 use super::contact_rows::ContactRowsWork;
 use super::contact_step::ContactWork;
 use super::excess_forces::ExcessForces;
+use super::impulses::Impulses;
 use super::interface::InterfaceWork;
 use super::massless::{MasslessBlock, is_damped};
 use super::mixing::Mixing;
@@ -107,6 +108,7 @@ impl<T: Real> Workspace<T> {
                 interface: InterfaceWork::new(interface),
                 rows: contact_rows,
                 trial: ContactState::with_capacity(rows),
+                impulses: Impulses::new(room(true)),
                 closed_at_start: Vec::with_capacity(rows),
                 exerting_at_start: Vec::with_capacity(rows),
                 was_closed: Vec::with_capacity(rows),

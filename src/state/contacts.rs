@@ -187,8 +187,10 @@ impl<T: Real> ContactState<T> {
         &self.gap
     }
 
-    /// Contact forces, compression positive: those of the instant of the state, after correction, so that M a = f + Gᵀ
-    /// λ there.
+    /// Contact forces, compression positive, after correction.
+    ///
+    /// By schemes whose balance holds at the state, M a = f + Gᵀ λ there, to rounding. By the others λ is the force at
+    /// the time of the balance ([`Stage::load`](crate::tableau::Stage::load)): M a and f + Gᵀ λ differ by O(h) there.
     ///
     /// They are values, not means over the step: summed over the steps, times h, they are not the change of momentum.
     /// The force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a
@@ -197,10 +199,15 @@ impl<T: Real> ContactState<T> {
         self.normal(&self.lambda)
     }
 
-    /// Friction forces of a contact at the instant of the state, after correction, one along each of its
+    /// Friction forces of a contact, after correction, one along each of its
     /// [tangents](crate::contact::Contact::tangent): |f| ≤ μ λ, and they act on the bodies as f times the tangential
     /// row. Nothing for contacts without friction. Values, as [`forces`](Self::forces) are;
     /// [`friction_impulses`](Self::friction_impulses) close to rounding.
+    ///
+    /// In the plane the tangent of the constraints of this crate is (n_y, −n_x), n the direction in which the gap opens
+    /// for the first body (that of the nodes, or the slave): on a floor, to the right. In space the two tangents are
+    /// any orthonormal ones, chosen anew when normals turn; [`ContactForce`](crate::ContactForce) has them, and forces
+    /// as vectors.
     pub fn friction_forces(&self, contact: usize) -> &[T] {
         &self.lambda[self.tangents.of(contact)]
     }
@@ -239,8 +246,9 @@ impl<T: Real> ContactState<T> {
         }
     }
 
-    /// Impulses of the last step (force × time), corrections included: along G, their sum over the steps is the change
-    /// of the momentum that the scheme conserves ([`Simulation::momentum`](crate::Simulation::momentum)), to rounding.
+    /// Impulses of the last step (force × time) along the rows, corrections included. Where normals turn within a step,
+    /// parts of it act along different normals: [`Simulation::impulses_on_dofs`](crate::Simulation::impulses_on_dofs)
+    /// has their vectors.
     pub fn impulses(&self) -> &[T] {
         self.normal(&self.impulse)
     }

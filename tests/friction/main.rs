@@ -13,6 +13,7 @@ mod slab;
 mod solids;
 mod systems;
 mod tangents;
+mod turning;
 mod well;
 
 use contact_dynamics::{LinearSystem, Result, Simulation, SimulationBuilder, TimeIntegrator};

@@ -1,6 +1,6 @@
 //! Tangents of every constraint with friction are orthonormal, and what is wrong with those of a host is said.
 
-use contact_dynamics::contact::{ContactConstraint, NodeToFacet, NodesOnObstacle, Side, Sphere};
+use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet, NodesOnObstacle, Plane, Side, Sphere};
 use contact_dynamics::{ContactLaw, LinearRows, verify};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
@@ -30,6 +30,28 @@ fn tangents_of_constraints_are_orthonormal() {
     let mut contact = NodeToFacet::new(&solid.nodes, &solid.node_dofs(), above, below).unwrap().friction(0.3);
     let u: Vec<_> = (0..solid.dofs()).map(|dof| 1e-3 * (0.7 * dof as f64).sin()).collect();
     assert!(skewness(&mut contact, &u) < 1e-13);
+}
+
+/// In the plane a tangent is the normal turned clockwise: to the right on a floor.
+#[test]
+fn tangents_in_the_plane_are_the_normal_turned() {
+    let line = Plane::new([0.0; 2], [0.6, 0.8]).unwrap();
+    let on_line = NodesOnObstacle::new(line, &[[1.0, 1.0]], &[[0, 1]], &[0]).unwrap().friction(0.3);
+    let pair = LinearRows::new().pair_with_friction((ContactLaw::Rigid, 0.3), [0, 1], [2, 3], [0.6, 0.8], 0.1).unwrap();
+    let (nodes, dofs) = ([[0.2, 1.0], [-1.0, 0.0], [1.0, 0.3]], [[0, 1], [2, 3], [4, 5]]);
+    let on_facet = NodeToFacet::one_pass(&nodes, &dofs, &[0], [[1, 2]]).unwrap().reach(2.0).unwrap().friction(0.3);
+    let constraints: [Box<dyn ContactConstraint<f64>>; 3] = [Box::new(on_line), Box::new(pair), Box::new(on_facet)];
+    for mut constraint in constraints {
+        let zero = vec![0.0; constraint.dofs().len()];
+        constraint.search(0.0, &zero, &zero, 0.0).unwrap();
+        let contacts = Contacts::of(&*constraint);
+        let [normal, tangent] = [contacts.row(0).collect(), contacts.tangents(0).remove(0)];
+        let weight = |row: &[(usize, f64)], dof| row.iter().find(|entry| entry.0 == dof).map_or(0.0, |entry| entry.1);
+        for x in (0..zero.len()).step_by(2) {
+            assert!((weight(&tangent, x) - weight(&normal, x + 1)).abs() < 1e-14, "{normal:?} {tangent:?}");
+            assert!((weight(&tangent, x + 1) + weight(&normal, x)).abs() < 1e-14, "{normal:?} {tangent:?}");
+        }
+    }
 }
 
 /// A tangent that is too long, or leans on the normal, changes μ without a word.
