@@ -292,16 +292,20 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the free dofs
-    /// are brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way
-    /// from there, laws of springs as they are. A load that begins with the run then does not shake it.
+    /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the bodies are
+    /// brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way from
+    /// there, laws of springs as they are. A load that begins with the run then does not shake it.
+    ///
+    /// Bodies are what K couples. A body that has a velocity, or whose own K is not positive definite since it flies
+    /// free, keeps the displacements and velocities given: so a hammer may strike a structure under preload.
     ///
     /// Newton's method, of linear systems two factorizations of K (no more than one is held at a time), one contact
     /// problem on the rows that close. [`start_adjustment`](Simulation::start_adjustment) says how far dofs have moved.
     /// Accelerations and contact forces follow from that state as from any other.
     ///
-    /// Refused at [`build`](Self::build): initial velocities, of supports too; a K that is not positive definite, as
-    /// that of a body which contact alone holds ([`Error::Singular`]); a balance that is not found, as of nonlinear
+    /// Refused at [`build`](Self::build): runs in which every body has a velocity, supports included; runs in which no
+    /// body at rest has a positive definite K, as one which contact alone holds ([`Error::Singular`]); a balance that
+    /// is not found, as of nonlinear
     /// systems far from it ([`Error::StartNotBalanced`]); systems over ranks. A run that is
     /// [resumed](Self::resume) has started.
     ///

@@ -40,7 +40,7 @@ const ITERATIONS: usize = 30;
 pub(super) enum Balanced {
     /// Those without mass, if they have a stiffness of their own and no damping.
     Massless,
-    /// All that are free: the run starts at rest, or is refused.
+    /// Those of all bodies at rest that have a stiffness of their own; if there is none, the run is refused.
     All,
 }
 
@@ -68,10 +68,10 @@ pub(super) fn balance_start<T: Real>(
     (dofs, balanced): (&[usize], Balanced),
     [h, ahead]: [f64; 2],
 ) -> Result<Option<(StartAdjustment<T>, T)>> {
+    let all = parts(system, dofs);
     let mut parts = match balanced {
-        Balanced::All => vec![dofs.to_vec()],
+        Balanced::All => all,
         Balanced::Massless => {
-            let all = parts(system, dofs);
             let [_, undamped] = by_damping(system, all)?;
             undamped
         }
@@ -88,7 +88,17 @@ pub(super) fn balance_start<T: Real>(
             }
         }
     }
-    Ok(None)
+    match balanced {
+        Balanced::Massless => Ok(None),
+        // No body can: the factor says why.
+        Balanced::All => {
+            let columns = Columns::of(system, dofs, motion)?;
+            Embedded::factorized(&columns, dofs, &[]).map(|_| None).map_err(|error| match error {
+                Error::Singular { dof, .. } => Error::Singular { matrix: AT_REST, dof },
+                other => other,
+            })
+        }
+    }
 }
 
 /// Balances some parts of the dofs together, for contacts may couple them. Where it cannot, `parts` keeps those that
@@ -113,16 +123,7 @@ fn balance<T: Real>(
     for iteration in 0..ITERATIONS {
         system.force(t, &motion.u, &motion.v, &mut residual)?;
         let columns = Columns::of(system, dofs, motion)?;
-        let factor = match balanced {
-            Balanced::Massless => match factorize(&columns, dofs, parts, &interface)? {
-                Some(factor) => factor,
-                None => return Ok(Balance::Indefinite),
-            },
-            Balanced::All => Embedded::factorized(&columns, dofs, &interface).map_err(|error| match error {
-                Error::Singular { dof, .. } => Error::Singular { matrix: AT_REST, dof },
-                other => other,
-            })?,
-        };
+        let Some(factor) = factorize(&columns, dofs, parts, &interface)? else { return Ok(Balance::Indefinite) };
         let mut operator = Operator::of_part(Box::new(factor), &interface, unit)?;
         operator.begin(&mut residual, &mut on_interface)?;
         let sliver = press_start(

@@ -2,6 +2,7 @@
 
 use super::constraints::Constraints;
 use super::finite::check_state;
+use super::massless_parts::{joined, parts};
 use super::massless_start::{Balanced, StartAdjustment, balance_rates, balance_start, pass_on};
 use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
@@ -181,11 +182,11 @@ impl<T: Real> Start<'_, T> {
         let mut touching = touching_contacts(constraints, g, (&motion, T::zero()), h, violation, &mut contacts)?;
         let mut adjustment = None;
         if let Violation::Initial(_) = violation {
-            let all = match balanced {
-                Balanced::Massless => Vec::new(),
-                Balanced::All => all_at_rest(&**system, together, &motion.v)?,
+            let resting = match balanced {
+                Balanced::Massless => massless.to_vec(),
+                Balanced::All => bodies_at_rest(&**system, together, &motion.v)?,
             };
-            let balanced = (if *balanced == Balanced::All { &all } else { *massless }, *balanced);
+            let balanced = (&resting[..], *balanced);
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let rows = (&mut *constraints, &mut *g);
             if let Some((adjusted, missed)) = balance_start(parts, solver, rows, &mut motion, balanced, [h, ahead])? {
@@ -322,18 +323,28 @@ fn pass_on_rest<T: Real>(
     Ok(())
 }
 
-/// The free dofs of a run that starts at rest. Refuses what moves, and ranks, none of which has all of the stiffness.
-fn all_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[T]) -> Result<Vec<usize>> {
+/// The free dofs of the bodies at rest: parts that K couples without a velocity, those of their supports included.
+/// Refuses runs in which everything moves, and ranks, none of which has all of the stiffness.
+fn bodies_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[T]) -> Result<Vec<usize>> {
     if !together.is_alone() {
         let reason = "no rank has all of the stiffness: give displacements in balance, as a static analysis finds them";
         return Err(Error::Incompatible { part: "a start at rest over ranks".into(), reason });
     }
-    if let Some(dof) = v.iter().position(|v| *v != T::zero()) {
-        let part = format!("a start at rest with the initial velocity {:e} of dof {dof}", v[dof]);
-        return Err(Error::Incompatible { part, reason: "what starts at rest has none, supports included" });
-    }
     let prescribed = system.prescribed();
-    Ok((0..v.len()).filter(|dof| prescribed.binary_search(dof).is_err()).collect())
+    let free: Vec<usize> = (0..v.len()).filter(|dof| prescribed.binary_search(dof).is_err()).collect();
+    let pattern = system.pattern();
+    let coupled = |dof: usize| if pattern.row_idx().is_empty() { &[] } else { pattern.row_idx_of_col_raw(dof) };
+    let rests = |dof: &usize| v[*dof] == T::zero() && coupled(*dof).iter().all(|&other| v[other] == T::zero());
+    let resting = parts(system, &free).into_iter().filter(|part| part.iter().all(rests));
+    let resting = joined(&resting.collect::<Vec<_>>());
+    match v.iter().position(|v| *v != T::zero()) {
+        Some(dof) if resting.is_empty() => {
+            let part = format!("a start at rest with the initial velocity {:e} of dof {dof}", v[dof]);
+            let reason = "a body that starts at rest has none, supports included, and there is no other body";
+            Err(Error::Incompatible { part, reason })
+        }
+        _ => Ok(resting),
+    }
 }
 
 /// The friction of contacts whose normal forces are known, those of springs in compression and of static balance: it
