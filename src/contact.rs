@@ -41,7 +41,7 @@ pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps, rounding, share_of_rounding};
 pub(crate) use groups::Groups;
 pub use law::ContactLaw;
-pub(crate) use law::Measure;
+pub(crate) use law::{Course, Measure};
 pub use linear_rows::{GapOffset, LinearRows};
 #[cfg(feature = "search")]
 pub use mortar::Mortar;

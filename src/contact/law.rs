@@ -95,6 +95,58 @@ pub enum ContactLaw {
         /// p ≥ 1.
         exponent: f64,
     },
+    /// A spring and a dashpot side by side (Kelvin and Voigt): with δ = −g > 0, λ = ⟨k δ + c δ̇⟩. The force never
+    /// pulls: a contact ends where k δ + c δ̇ = 0, while the gap is negative still. Gap and rate are those of the
+    /// instant at which the scheme balances all forces, so that in lasting compression the dashpot is one of C.
+    ///
+    /// * The force jumps to c δ̇ where bodies touch at speed, somewhere within a step: errors are of first order.
+    ///   [`HuntCrossley`](Self::HuntCrossley) has no jump.
+    /// * An impact of a mass m at the speed v leaves with e v, whatever v; with ξ = c/(2 √(k m)) < 1 it is
+    ///   e = exp(−ξ φ/√(1 − ξ²)), cos φ = 2 ξ² − 1.
+    /// * Of the work of contact forces [`Works::contact`](crate::Works::contact) has that of the spring, −½ k δ²;
+    ///   [`Works::damping`](crate::Works::damping) has the rest.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::ContactLaw;
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    ///
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let law = ContactLaw::KelvinVoigt { stiffness: 100.0, damping: 5.0 };
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Newmark::trapezoidal(), 1e-4)
+    ///     .velocity(vec![-5.0])
+    ///     .constraint(LinearRows::new().row(law, &[(0, 1.0)], 0.1))
+    ///     .build()?;
+    /// run.run_until(0.5, &mut ())?;
+    /// let (xi, v) = (0.25_f64, run.state().velocity()[0]);
+    /// let e = (-xi / (1.0 - xi * xi).sqrt() * (2.0 * xi * xi - 1.0).acos()).exp();
+    /// assert!((v / (5.0 * e) - 1.0).abs() < 1e-3); // 2.836
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    KelvinVoigt {
+        /// k (force/length).
+        stiffness: f64,
+        /// c (force·time/length), not negative.
+        damping: f64,
+    },
+    /// A spring that dissipates as it is pressed (Hunt and Crossley, J. Appl. Mech. 42, 1975): with δ = −g > 0,
+    /// λ = k δ^p ⟨1 + χ δ̇⟩. The force begins and ends at zero, so errors are those of a spring. An impact at the speed
+    /// v leaves with the speed w of v − ln(1 + χ v)/χ = −w − ln(1 − χ w)/χ, whatever mass, k and p: e = w/v is
+    /// 1 − ⅔ χ v + … for small χ v. Works are booked as under [`KelvinVoigt`](Self::KelvinVoigt).
+    ///
+    /// ```
+    /// use contact_dynamics::contact::ContactLaw;
+    /// let law = ContactLaw::HuntCrossley { stiffness: 1e5, exponent: 1.5, dissipation: 0.2 };
+    /// assert!(law.is_compliant());
+    /// ```
+    HuntCrossley {
+        /// k (force/length^p).
+        stiffness: f64,
+        /// p ≥ 1.
+        exponent: f64,
+        /// χ (time/length), not negative.
+        dissipation: f64,
+    },
     /// λ = ⟨−k g − m g̈⟩: a spring and a mass that contact couples in (Asano 1986; Hetherington, Rodríguez-Ferran,
     /// Askes 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical step.
     /// Switching the mass on at speed changes the kinetic energy, and over many impacts energy grows;
@@ -158,13 +210,45 @@ pub(crate) enum Measure {
     Undecided,
 }
 
+/// How the depth δ of a row, and its rate δ̇, depend on what the row constrains, y, in a stage: [value at y = 0, slope by
+/// −y] of each. y is the gap, or h times its rate where the unknown moves the rate alone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Course<T> {
+    pub(crate) depth: [T; 2],
+    pub(crate) approach: [T; 2],
+}
+
+impl<T: Real> Course<T> {
+    /// y is the gap, at a rate of zero.
+    pub(crate) fn at_rest() -> Self {
+        Self { depth: [T::zero(), T::one()], approach: [T::zero(); 2] }
+    }
+
+    /// Whether y is the gap.
+    fn moves(&self) -> bool {
+        self.depth[1] != T::zero()
+    }
+
+    /// δ and δ̇ at −y = x.
+    fn at(&self, x: T) -> [T; 2] {
+        [self.depth, self.approach].map(|[start, slope]| start + slope * x)
+    }
+
+    /// The tangent of a damped law there, as 0 ≤ y + c λ + s.
+    fn tangent(&self, law: &ContactLaw, x: T, [by_depth, by_rate]: [T; 2]) -> (T, T) {
+        let [depth, approach] = self.at(x);
+        let slope = (by_depth * self.depth[1] + by_rate * self.approach[1]).max(T::min_positive_value());
+        (slope.recip(), x - law.pull(depth, approach) / slope)
+    }
+}
+
 impl ContactLaw {
     /// Hertz' law for two elastic bodies: λ = 4/3 E* √R ⟨−g⟩^{3/2}, with 1/E* = Σ (1 − ν²)/E and 1/R = Σ 1/Rᵢ.
     pub fn hertz(modulus: f64, radius: f64) -> Self {
         Self::PowerLaw { stiffness: 4.0 / 3.0 * modulus * radius.sqrt(), exponent: 1.5 }
     }
 
-    /// Whether the force follows from the gap alone (and its acceleration): the gap may be negative.
+    /// Whether the force follows from the gap (and its derivatives): the gap may be negative.
     pub fn is_compliant(&self) -> bool {
         match self {
             Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
@@ -172,9 +256,19 @@ impl ContactLaw {
             }
             Self::Penalty { .. }
             | Self::PowerLaw { .. }
+            | Self::KelvinVoigt { .. }
+            | Self::HuntCrossley { .. }
             | Self::Bipenalty { .. }
             | Self::StabilizedBipenalty { .. }
             | Self::AugmentedLagrangian { .. } => true,
+        }
+    }
+
+    /// Whether the force depends on the rate of the gap.
+    pub(crate) fn is_damped(&self) -> bool {
+        match *self {
+            Self::KelvinVoigt { damping: d, .. } | Self::HuntCrossley { dissipation: d, .. } => d > 0.0,
+            _ => false,
         }
     }
 
@@ -207,19 +301,19 @@ impl ContactLaw {
         !self.is_compliant() || self.is_predictive()
     }
 
-    /// Whether the force follows from the gap of the state alone, without masses and predictions.
+    /// Whether the force follows from the gap of the state and its rate, without masses and predictions.
     pub(crate) fn is_spring(&self) -> bool {
         self.is_compliant() && self.inertia() == 0.0 && !self.is_predictive()
     }
 
     /// Whether the rates of the gap matter: to the condition, or to corrections.
     pub(crate) fn reads_rates(&self) -> bool {
-        !self.is_compliant() || self.inertia() > 0.0
+        !self.is_compliant() || self.inertia() > 0.0 || self.is_damped()
     }
 
     /// Whether the force is no piecewise linear function of the gap: it is then linearized until it is met.
     pub(crate) fn is_nonlinear(&self) -> bool {
-        matches!(self, Self::PowerLaw { .. })
+        matches!(self, Self::PowerLaw { .. } | Self::KelvinVoigt { .. } | Self::HuntCrossley { .. })
     }
 
     /// Whether the gap of a closed row may be other than zero.
@@ -246,6 +340,8 @@ impl ContactLaw {
             | Self::Restitution { .. }
             | Self::Penalty { .. }
             | Self::PowerLaw { .. }
+            | Self::KelvinVoigt { .. }
+            | Self::HuntCrossley { .. }
             | Self::AugmentedLagrangian { .. } => true,
             Self::Equality
             | Self::RateCondition
@@ -288,6 +384,13 @@ impl ContactLaw {
             false => Err(Error::Parameter { name, value, range }),
         };
         let stiff = |stiffness| positive("the contact stiffness", stiffness).map(|_| ());
+        let power = |stiffness, exponent: f64| {
+            stiff(stiffness)?;
+            let ok = exponent >= 1.0 && exponent.is_finite();
+            inside("the exponent of the contact law", exponent, ok, "at least 1 and finite")
+        };
+        let damps =
+            |name, value: f64| inside(name, value, value >= 0.0 && value.is_finite(), "not negative and finite");
         match *self {
             Self::Rigid | Self::Equality | Self::RateCondition | Self::PersistencySwitch => Ok(()),
             Self::Restitution { coefficient: e } => {
@@ -304,10 +407,14 @@ impl ContactLaw {
                     "at most 10000: each of them solves the contact problem again",
                 )
             }
-            Self::PowerLaw { stiffness, exponent } => {
+            Self::PowerLaw { stiffness, exponent } => power(stiffness, exponent),
+            Self::KelvinVoigt { stiffness, damping } => {
                 stiff(stiffness)?;
-                let ok = exponent >= 1.0 && exponent.is_finite();
-                inside("the exponent of the contact law", exponent, ok, "at least 1 and finite")
+                damps("the contact damping", damping)
+            }
+            Self::HuntCrossley { stiffness, exponent, dissipation } => {
+                power(stiffness, exponent)?;
+                damps("the dissipation of the contact law", dissipation)
             }
             Self::Bipenalty { stiffness, mass } => {
                 stiff(stiffness)?;
@@ -341,6 +448,14 @@ impl ContactLaw {
                 fits("the exponent of the contact law", exponent)?;
                 fits("the contact stiffness times the exponent", stiffness * exponent)
             }
+            Self::KelvinVoigt { stiffness, damping } => {
+                fits("the contact stiffness", stiffness)?;
+                if damping > 0.0 { fits("the contact damping", damping) } else { Ok(()) }
+            }
+            Self::HuntCrossley { stiffness, exponent, dissipation } => {
+                Self::PowerLaw { stiffness, exponent }.check_scalar::<T>()?;
+                if dissipation > 0.0 { fits("the dissipation of the contact law", dissipation) } else { Ok(()) }
+            }
             Self::Bipenalty { stiffness, mass } => {
                 fits("the contact stiffness", stiffness)?;
                 match mass > 0.0 {
@@ -359,8 +474,8 @@ impl ContactLaw {
         }
     }
 
-    /// The force of a compliant law for y, the gap with its inertia: zero if y ≥ 0.
-    pub(crate) fn force<T: Real>(&self, y: T) -> T {
+    /// The force of a compliant law for y, the gap with its inertia, and the rate δ̇ of approach: zero if y ≥ 0.
+    pub(crate) fn force<T: Real>(&self, y: T, approach: T) -> T {
         let depth = (-y).max(T::zero());
         match *self {
             Self::Penalty { stiffness }
@@ -368,31 +483,67 @@ impl ContactLaw {
             | Self::StabilizedBipenalty { stiffness }
             | Self::AugmentedLagrangian { stiffness, .. } => T::of(stiffness) * depth,
             Self::PowerLaw { stiffness, exponent } => T::of(stiffness) * depth.powf(T::of(exponent)),
+            Self::KelvinVoigt { .. } | Self::HuntCrossley { .. } if depth == T::zero() => T::zero(),
+            Self::KelvinVoigt { .. } | Self::HuntCrossley { .. } => self.pull(depth, approach).max(T::zero()),
             Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
                 T::zero()
             }
         }
     }
 
-    /// The stiffness of a spring that presses with a force.
-    pub(crate) fn tangent(&self, force: f64) -> f64 {
+    /// The force of a damped law, where it would pull too.
+    fn pull<T: Real>(&self, depth: T, approach: T) -> T {
+        match *self {
+            Self::KelvinVoigt { stiffness, damping } => T::of(stiffness) * depth + T::of(damping) * approach,
+            Self::HuntCrossley { stiffness, exponent, dissipation } => {
+                T::of(stiffness) * depth.powf(T::of(exponent)) * (T::one() + T::of(dissipation) * approach)
+            }
+            _ => T::zero(),
+        }
+    }
+
+    /// The slopes of the force of a spring that presses, by δ and by δ̇.
+    pub(crate) fn slopes(&self, force: f64, depth: f64) -> [f64; 2] {
         match *self {
             Self::Penalty { stiffness }
             | Self::Bipenalty { stiffness, .. }
             | Self::StabilizedBipenalty { stiffness }
-            | Self::AugmentedLagrangian { stiffness, .. } => stiffness,
+            | Self::AugmentedLagrangian { stiffness, .. } => [stiffness, 0.0],
+            Self::KelvinVoigt { stiffness, damping } => [stiffness, damping],
             // λ = k δ^p: dλ/dδ = p λ/δ.
-            Self::PowerLaw { stiffness, exponent } => exponent * force / (force / stiffness).powf(exponent.recip()),
-            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
-                0.0
+            Self::PowerLaw { stiffness, exponent } => {
+                [exponent * force / (force / stiffness).powf(exponent.recip()), 0.0]
             }
+            Self::HuntCrossley { stiffness, exponent, dissipation } if depth > 0.0 => {
+                [exponent * force / depth, dissipation * stiffness * depth.powf(exponent)]
+            }
+            Self::HuntCrossley { .. }
+            | Self::Rigid
+            | Self::Equality
+            | Self::Restitution { .. }
+            | Self::RateCondition
+            | Self::PersistencySwitch => [0.0; 2],
         }
     }
 
-    /// The law linearized as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
+    /// What a damped spring has stored at a gap, and gives to its dashpot at the latest.
+    pub(crate) fn stored<T: Real>(&self, gap: T) -> T {
+        let depth = (-gap).max(T::zero());
+        match *self {
+            Self::KelvinVoigt { stiffness, .. } => T::of(0.5 * stiffness) * depth * depth,
+            Self::HuntCrossley { stiffness, exponent, .. } => {
+                T::of(stiffness / (exponent + 1.0)) * depth.powf(T::of(exponent + 1.0))
+            }
+            _ => T::zero(),
+        }
+    }
+
+    /// The law linearized at y as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
     ///
-    /// `depth` is where a power law is linearized (positive), `augmented` the multiplier λ̂ of an augmented Lagrangian.
-    pub(crate) fn linearized<T: Real>(&self, depth: T, augmented: T) -> (T, T) {
+    /// Springs are linearized at `least` where they are less deep. `force` is the one found before: the multiplier λ̂
+    /// of an augmented Lagrangian. A dashpot that begins to press takes any force up to c δ̇ at the gap zero.
+    pub(crate) fn linearized<T: Real>(&self, y: T, least: T, force: T, course: Course<T>) -> (T, T) {
+        let depth = (-y).max(least);
         match *self {
             Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
                 (T::zero(), T::zero())
@@ -402,12 +553,28 @@ impl ContactLaw {
             Self::StabilizedBipenalty { stiffness } => (T::of(2.0 / stiffness), T::zero()),
             Self::AugmentedLagrangian { stiffness, .. } => {
                 let compliance = T::of(stiffness).recip();
-                (compliance, -compliance * augmented)
+                (compliance, -compliance * force)
             }
             Self::PowerLaw { stiffness, exponent } => {
                 let slope = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0));
                 // At a depth that is next to nothing the spring is next to none, but not infinitely soft.
                 (slope.max(T::min_positive_value()).recip(), depth * (T::one() - T::of(exponent).recip()))
+            }
+            Self::KelvinVoigt { stiffness, damping } => {
+                let [_, touching] = course.at(T::zero());
+                let begins = course.moves() && touching > T::zero() && force <= T::of(damping) * touching;
+                match begins {
+                    true => (T::zero(), T::zero()),
+                    false => course.tangent(self, -y, [T::of(stiffness), T::of(damping)]),
+                }
+            }
+            Self::HuntCrossley { stiffness, exponent, dissipation } => {
+                let x = if course.moves() { depth } else { -y };
+                let [depth, approach] = course.at(x);
+                let factor = (T::one() + T::of(dissipation) * approach).max(T::zero());
+                let by_depth = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0)) * factor;
+                let by_rate = T::of(stiffness * dissipation) * depth.powf(T::of(exponent));
+                course.tangent(self, x, [by_depth, by_rate])
             }
         }
     }
@@ -423,21 +590,21 @@ impl ContactLaw {
 
 #[cfg(test)]
 mod tests {
-    use super::ContactLaw;
+    use super::{ContactLaw, Course};
 
     #[test]
     fn the_linearization_touches_the_law() {
         let law = ContactLaw::PowerLaw { stiffness: 3.0, exponent: 1.5 };
         for depth in [1e-3, 0.2, 5.0_f64] {
-            let force = law.force(-depth);
-            let (c, s) = law.linearized(depth, 0.0);
+            let force = law.force(-depth, 0.0);
+            let (c, s) = law.linearized(-depth, 0.0, 0.0, Course::at_rest());
             assert!((-depth + c * force + s).abs() < 1e-15 * depth.max(1.0));
-            let slope = (law.force(-depth * (1.0 + 1e-6)) - force) / (depth * 1e-6);
+            let slope = (law.force(-depth * (1.0 + 1e-6), 0.0) - force) / (depth * 1e-6);
             assert!((slope * c - 1.0).abs() < 1e-5);
-            assert!((law.tangent(force) * c - 1.0).abs() < 1e-14);
+            assert!((law.slopes(force, depth)[0] * c - 1.0).abs() < 1e-14);
         }
         let law = ContactLaw::AugmentedLagrangian { stiffness: 4.0, augmentations: 1 };
-        let (c, s) = law.linearized(0.0, 2.0_f64);
+        let (c, s) = law.linearized(0.0, 0.0, 2.0_f64, Course::at_rest());
         let force = 2.0 + 4.0 * 0.5;
         assert!((-0.5 + c * force + s).abs() < 1e-15);
     }
@@ -451,6 +618,10 @@ mod tests {
             ContactLaw::PowerLaw { stiffness: 1.0, exponent: 0.5 },
             ContactLaw::PowerLaw { stiffness: f64::INFINITY, exponent: 1.5 },
             ContactLaw::Bipenalty { stiffness: 1.0, mass: -1.0 },
+            ContactLaw::KelvinVoigt { stiffness: 0.0, damping: 1.0 },
+            ContactLaw::KelvinVoigt { stiffness: 1.0, damping: -1.0 },
+            ContactLaw::HuntCrossley { stiffness: 1.0, exponent: 0.9, dissipation: 1.0 },
+            ContactLaw::HuntCrossley { stiffness: 1.0, exponent: 1.5, dissipation: f64::NAN },
             ContactLaw::StabilizedBipenalty { stiffness: -1.0 },
             ContactLaw::AugmentedLagrangian { stiffness: -1.0, augmentations: 3 },
             ContactLaw::AugmentedLagrangian { stiffness: 1.0, augmentations: usize::MAX },

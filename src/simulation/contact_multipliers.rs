@@ -5,21 +5,21 @@ use super::contact_rows::{ContactRowsWork, Part};
 use super::contact_step::{ContactStep, ContactWork};
 use super::interface::InterfaceWork;
 use super::operator::Operator;
-use crate::contact::Measure;
+use crate::contact::{Course, Measure};
 use crate::contact_solver::{ContactFailure, ContactProblem};
-use crate::corrector::{Gaps, contact_error};
+use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 use crate::state::Motion;
 
-/// The most linearizations of power laws in a stage.
+/// The most linearizations of nonlinear laws in a stage.
 const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
     /// Decides which rows the problem begins with; says whether there is any that is violated, or an equality row.
     pub(super) fn condition(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> bool {
-        let Self { stage, clock, constraints, g, part, .. } = self;
+        let Self { stage, clock, constraints, g, part, .. } = &*self;
         let ContactWork { trial, rows, .. } = contact;
         let mut needed = false;
         let tangents = constraints.tangents();
@@ -33,7 +33,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in 0..constraints.len() {
             let law = &laws[row];
             let equality = laws.equality && law.is_equality();
-            let mut depth = T::zero();
+            let mut presses = equality;
             if laws.compliant && law.is_compliant() {
                 let gap = rows.balance_gap[row];
                 rows.y[row] = match law.is_predictive() {
@@ -44,17 +44,25 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     false => gap,
                 };
                 rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
-                depth = (-rows.y[row]).max(rows.tolerance[row]);
+                if self.slows(law) {
+                    // (Its gap is known: it says whether there is a force.)
+                    rows.enabled[row] = gap < -rows.tolerance[row];
+                    rows.y[row] = -T::of(clock.h) * rows.approach[row];
+                    rows.tolerance[row] = rounding(T::of(clock.h) * g.magnitude(row, &new.v));
+                    presses = rows.enabled[row];
+                }
             } else if !laws.are_uniform() {
                 let own = rows.own_weight(stage, clock.h, row).filter(|_| part.takes(&rows.on_massless, row));
                 rows.weight[row] = own.unwrap_or(rows.weight[row]);
                 rows.enabled[row] &= rows.measure[row] != Measure::Nothing;
             }
             let coupled = rows.weight[row] > T::zero();
-            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || equality;
+            let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || presses;
             rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
             if rows.in_problem[row] {
-                (rows.compliance[row], rows.shift[row]) = law.linearized(depth, T::zero());
+                let course = self.course([rows.balance_gap[row], rows.approach[row]]);
+                let linearized = law.linearized(rows.y[row], rows.tolerance[row], T::zero(), course);
+                (rows.compliance[row], rows.shift[row]) = linearized;
             } else if coupled {
                 trial.lambda_raw[row] = T::zero();
             }
@@ -86,6 +94,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             self.press_linearized(operator, t, contact)?;
             let ContactWork { rows, trial, interface, .. } = &mut *contact;
             let ContactRowsWork { problem, multipliers, weight, y, tolerance, compliance, shift, curved, .. } = rows;
+            let (gaps, approach) = (&rows.balance_gap, &rows.approach);
             let forces = curved.forces(self.g);
             // The laws at the solution.
             let (mut worst, mut deepest, mut augments) = ((0, T::zero()), T::zero(), false);
@@ -97,16 +106,18 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 if law.is_nonlinear() {
                     let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
-                    let (slope, _) = law.linearized(depth.max(tolerance[row]), T::zero());
-                    let miss = (lambda - law.force(gap)).abs() * slope;
+                    let course = self.course([gaps[row], approach[row]]);
+                    let (c, s) = law.linearized(gap, tolerance[row], lambda, course);
+                    let left = gap + c * lambda + s;
+                    let miss = if lambda > T::zero() { left.abs() } else { -left };
                     deepest = deepest.max(depth);
                     if miss > tolerance[row] + rounded * depth && miss > worst.1 {
                         worst = (row, miss);
                     }
-                    (compliance[row], shift[row]) = law.linearized(depth.max(tolerance[row]), T::zero());
+                    (compliance[row], shift[row]) = (c, s);
                 } else if pass < law.augmentations() {
                     augments = true;
-                    (compliance[row], shift[row]) = law.linearized(T::zero(), lambda);
+                    (compliance[row], shift[row]) = law.linearized(T::zero(), T::zero(), lambda, Course::at_rest());
                 }
             }
             for (&row, &lambda) in problem.iter().zip(multipliers.iter()) {
@@ -146,6 +157,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         t: f64,
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
+        let course = |at| self.course(at);
         let Self { constraints, g, solver, statistics, .. } = self;
         let ContactWork { rows, trial, interface, .. } = contact;
         let count = constraints.len();
@@ -228,8 +240,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     let pushed = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);
-                        let depth = (-pushed).max(tolerance[row]);
-                        (compliance[row], shift[row]) = constraints.law(row).linearized(depth, T::zero());
+                        let course = course([rows.balance_gap[row], rows.approach[row]]);
+                        let law = constraints.law(row);
+                        (compliance[row], shift[row]) = law.linearized(pushed, tolerance[row], T::zero(), course);
                     }
                 }
             }

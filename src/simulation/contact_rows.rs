@@ -53,6 +53,8 @@ pub(super) struct ContactRowsWork<T> {
     pub(super) shift: Vec<T>,
     /// Gaps where the balance holds, for compliant laws.
     pub(super) balance_gap: Vec<T>,
+    /// −ġ there, for laws that read it.
+    pub(super) approach: Vec<T>,
     pub(super) curved: CurvedRowsWork<T>,
     /// What each row constrains in this stage; for rows whose law reads it, the gap where the stage starts, and the gap
     /// below which it counts as closed there.
@@ -110,6 +112,7 @@ impl<T: Real> ContactRowsWork<T> {
             compliance: Vec::new(),
             shift: Vec::new(),
             balance_gap: Vec::new(),
+            approach: Vec::new(),
             curved: CurvedRowsWork::new(),
             measure: Vec::new(),
             start_gap: Vec::new(),
@@ -140,8 +143,8 @@ impl<T: Real> ContactRowsWork<T> {
 
     /// Memory for so many rows, of so many weights.
     pub(super) fn make_room(&mut self, rows: usize, entries: usize) {
-        let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, .. } = self;
-        for values in [y, tolerance, weight, compliance, shift, balance_gap] {
+        let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, approach, .. } = self;
+        for values in [y, tolerance, weight, compliance, shift, balance_gap, approach] {
             values.resize(rows, T::zero());
         }
         for values in [&mut self.start_gap, &mut self.start_tolerance, &mut self.hover] {

@@ -155,10 +155,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if self.constraints.laws().compliant {
             self.balance_gaps(new, vectors, contact)?;
             self.add_inertia(new, vectors, contact)?;
+            self.approach(new, vectors, contact)?;
             if self.press_without_coupling(operator, contact)? {
                 self.place(new, vectors, contact);
                 self.balance_gaps(new, vectors, contact)?;
                 self.add_inertia(new, vectors, contact)?;
+                self.approach(new, vectors, contact)?;
             }
         }
         self.evaluate(new, contact)?;

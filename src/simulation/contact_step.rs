@@ -10,7 +10,7 @@ use super::program::CompiledStage;
 use super::results::Statistics;
 use super::stage_vectors::StageVectors;
 use super::supports::{Supports, finite_supports};
-use crate::contact::ContactJacobian;
+use crate::contact::{ContactJacobian, ContactLaw, Course};
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Gaps, rounding};
 use crate::error::{Error, Result};
@@ -115,9 +115,30 @@ impl<T: Real> ContactStep<'_, '_, T> {
         [rigid, balance_u, balance_a]
     }
 
+    /// How depth and approach of a row of springs depend on its y: both change with d as the rows of the balance say.
+    pub(super) fn course(&self, [gap, approach]: [T; 2]) -> Course<T> {
+        let [by_u, by_v, _] = self.stage.balanced().weights();
+        match by_u > T::zero() {
+            true => {
+                let slope = by_v / by_u;
+                Course { depth: [T::zero(), T::one()], approach: [approach + slope * gap, slope] }
+            }
+            false => {
+                Course { depth: [-gap, T::zero()], approach: [T::zero(), T::of(self.clock.h.recip())] }
+            }
+        }
+    }
+
+    /// Whether the unknown moves the rate of a damped row alone, and not its gap: explicit schemes whose velocities
+    /// contain it.
+    pub(super) fn slows(&self, law: &ContactLaw) -> bool {
+        let [by_u, by_v, _] = self.stage.balanced().weights();
+        law.is_damped() && by_u == T::zero() && by_v > T::zero()
+    }
+
     /// Sets the weights of d in y: those of the scheme, and of compliant laws.
     pub(super) fn weigh(&self, rows: &mut ContactRowsWork<T>) {
-        let [rigid, balance_u, balance_a] = self.weights();
+        let ([rigid, balance_u, balance_a], Self { stage, clock, .. }) = (self.weights(), self);
         if self.constraints.laws().are_uniform() && self.part == Part::All {
             rows.weight.fill(rigid);
             self.weigh_slips(rows);
@@ -126,6 +147,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for (row, law) in self.constraints.laws().iter().enumerate() {
             let weight = match (law.is_compliant(), law.is_predictive()) {
                 (false, _) => rigid,
+                (true, false) if self.slows(law) => T::of(clock.h) * stage.balanced().weights()[1],
                 (true, false) => balance_u + T::of(law.inertia()) * balance_a,
                 (true, true) => T::of(0.5) * rigid,
             };
@@ -223,6 +245,29 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
+    /// Evaluates with which rates the gaps of damped rows close where the balance holds, at the d of their gaps.
+    pub(super) fn approach(
+        &mut self,
+        new: &Motion<T>,
+        vectors: &StageVectors<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        if !self.constraints.laws().damped {
+            return Ok(());
+        }
+        let [_, by_v, _] = self.stage.balanced().weights();
+        let (t, motion) = self.balanced(new, vectors.balance.as_ref());
+        let Self { constraints, g, .. } = self;
+        let ContactWork { interface, rows, .. } = contact;
+        constraints.finite_rates(t, &motion.u, &motion.v, &mut rows.rates)?;
+        let forces = rows.curved.forces(g);
+        for row in (0..constraints.len()).filter(|&row| constraints.law(row).is_damped()) {
+            let moved = by_v * forces.interface_product(row, &interface.increment);
+            rows.approach[row] = -(forces.product(row, &motion.v) + moved + rows.rates[row].rate);
+        }
+        Ok(())
+    }
+
     /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are
     /// any.
     pub(super) fn press_without_coupling(
@@ -237,7 +282,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for row in (0..constraints.len()).filter(|&row| part.takes(&rows.on_massless, row)) {
             let law = constraints.law(row);
             if law.is_compliant() && rows.weight[row] == T::zero() {
-                let force = law.force(rows.balance_gap[row]);
+                let force = law.force(rows.balance_gap[row], rows.approach[row]);
                 trial.lambda_raw[row] = force;
                 forces.interface_scatter(row, force, &mut interface.forces);
                 pressed |= force > T::zero();

@@ -48,9 +48,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if self.constraints.laws().compliant {
             self.balance_gaps_from_tried(contact);
             self.add_inertia(new, vectors, contact)?;
+            self.approach(new, vectors, contact)?;
             if self.press_without_coupling(operator, contact)? {
                 self.balance_gaps_from_tried(contact);
                 self.add_inertia(new, vectors, contact)?;
+                self.approach(new, vectors, contact)?;
             }
         }
         let [rigid, ..] = self.weights();

@@ -1,6 +1,7 @@
 //! Energy of a state, the energy balance of a run, and the forces of the supports.
 
 use super::constraints::Constraints;
+use super::laws::Laws;
 use super::results::{Energy, Works, finite};
 use crate::contact::ContactJacobian;
 use crate::error::Result;
@@ -34,8 +35,13 @@ pub(crate) struct Ledger<T: Real> {
     next_friction: Vec<T>,
     /// Reported forces along the rows where they act.
     forces: Vec<T>,
-    /// Works and damping power at the end of a step that is not accepted yet.
-    next: (Works<T>, T),
+    /// The same of springs with dashpots; empty as long as there are none.
+    damped: Vec<T>,
+    next_damped: Vec<T>,
+    /// What these springs have stored at the start of a step.
+    stored: T,
+    /// Works, damping power and stored energy at the end of a step that is not accepted yet.
+    next: (Works<T>, T, T),
 }
 
 /// The constraints and their rows of G.
@@ -47,6 +53,7 @@ pub(crate) struct StepBooks<'a, T> {
     /// u, v and a at the time of the state.
     pub(crate) motion: [&'a [T]; 3],
     pub(crate) contacts: &'a ContactState<T>,
+    pub(crate) laws: &'a Laws,
     /// The rows of the gaps, and those along which the reported forces act.
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) forces: &'a ContactJacobian<T>,
@@ -82,7 +89,10 @@ impl<T: Real> Ledger<T> {
             friction: Vec::new(),
             next_friction: Vec::new(),
             forces: Vec::new(),
-            next: (Works::default(), T::zero()),
+            damped: Vec::new(),
+            next_damped: Vec::new(),
+            stored: T::zero(),
+            next: (Works::default(), T::zero(), T::zero()),
         };
         let energy = energy(system, together, state, None);
         energy.check(state.time())?;
@@ -114,8 +124,20 @@ impl<T: Real> Ledger<T> {
             self.friction.resize(self.contact.len(), T::zero());
         }
         self.friction.fill(T::zero());
+        if constraints.laws().damped {
+            self.damped.resize(self.contact.len(), T::zero());
+        }
+        self.damped.fill(T::zero());
+        self.stored = T::zero();
         for (contact, row) in constraints.all_rows_of(&state.contacts) {
-            let forces = if g.is_tangential(row) { &mut self.friction } else { &mut self.contact };
+            let forces = if g.is_tangential(row) {
+                &mut self.friction
+            } else if constraints.law(row).is_damped() {
+                self.stored += constraints.law(row).stored(state.contacts.gap[contact]);
+                &mut self.damped
+            } else {
+                &mut self.contact
+            };
             g.scatter(row, state.contacts.lambda[contact], forces);
         }
         Ok(())
@@ -156,14 +178,27 @@ impl<T: Real> Ledger<T> {
         if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
             self.friction.resize(u.len(), T::zero());
         }
+        if books.laws.damped && self.damped.is_empty() {
+            self.damped.resize(u.len(), T::zero());
+        }
         self.next_friction.resize(self.friction.len(), T::zero());
+        self.next_damped.resize(self.damped.len(), T::zero());
         self.next_contact.fill(T::zero());
         self.next_friction.fill(T::zero());
+        self.next_damped.fill(T::zero());
+        let mut stored = T::zero();
         self.forces.clone_from(&books.contacts.lambda);
         books.contacts.tangents.turn([books.g, books.forces], &mut self.forces);
         for (row, &force) in self.forces.iter().enumerate() {
-            let tangential = books.forces.is_tangential(row);
-            books.forces.scatter(row, force, if tangential { &mut self.next_friction } else { &mut self.next_contact });
+            let forces = if books.forces.is_tangential(row) {
+                &mut self.next_friction
+            } else if books.laws[row].is_damped() {
+                stored += books.laws[row].stored(books.contacts.gap[row]);
+                &mut self.next_damped
+            } else {
+                &mut self.next_contact
+            };
+            books.forces.scatter(row, force, forces);
         }
         // The force in the middle of the step, by the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
@@ -173,26 +208,30 @@ impl<T: Real> Ledger<T> {
         };
         let (by_contact, by_friction) =
             (work(&self.contact, &self.next_contact), work(&self.friction, &self.next_friction));
-        let parts = [by_supports, by_loads, by_contact, by_friction].map(T::value);
-        let [by_supports, by_loads, by_contact, by_friction] = self.together.sum(Ok(parts))?.map(T::of);
+        let by_damped = work(&self.damped, &self.next_damped);
+        let parts = [by_supports, by_loads, by_contact, by_friction, by_damped].map(T::value);
+        let [by_supports, by_loads, by_contact, by_friction, by_damped] = self.together.sum(Ok(parts))?.map(T::of);
         works.supports += by_supports;
         works.load += by_loads;
-        works.contact += by_contact;
+        // What springs do not store, or give back, is the dashpots'.
+        let kept = stored - self.stored;
+        works.contact += by_contact - kept;
         works.friction += by_friction;
         works.corrections += books.corrections;
         let power = self.damping_power(system, u, v)?;
-        works.damping += half * (self.power + power) * T::of(books.h);
-        self.next = (works, power);
+        works.damping += half * (self.power + power) * T::of(books.h) + by_damped + kept;
+        self.next = (works, power, stored);
         works.check(books.t)
     }
 
     /// Takes over what [`prepare`](Self::prepare) computed, for the step is accepted.
     pub(crate) fn end(&mut self) {
-        (self.works, self.power) = self.next;
+        (self.works, self.power, self.stored) = self.next;
         std::mem::swap(&mut self.load, &mut self.old_load);
         std::mem::swap(&mut self.reactions, &mut self.next_reactions);
         std::mem::swap(&mut self.contact, &mut self.next_contact);
         std::mem::swap(&mut self.friction, &mut self.next_friction);
+        std::mem::swap(&mut self.damped, &mut self.next_damped);
     }
 
     fn works(&self, total: T) -> Works<T> {

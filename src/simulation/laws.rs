@@ -13,6 +13,8 @@ pub(crate) struct Laws {
     pub(crate) compliant: bool,
     pub(crate) predictive: bool,
     pub(crate) inertial: bool,
+    /// Whether the force of any row depends on the rate of its gap.
+    pub(crate) damped: bool,
     /// Whether any row leaves with a share of its approach.
     pub(crate) rebound: bool,
     /// Whether any row holds both ways.
@@ -40,6 +42,7 @@ impl Laws {
         self.compliant |= law.is_compliant();
         self.predictive |= law.is_predictive();
         self.inertial |= law.inertia() != 0.0;
+        self.damped |= law.is_damped();
         self.rebound |= law.rebounds();
         self.equality |= law.is_equality();
         self.augmentations = self.augmentations.max(law.augmentations());

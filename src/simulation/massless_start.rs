@@ -6,7 +6,7 @@ use super::massless::{Columns, Embedded};
 use super::massless_parts::{by_damping, factorize, joined, parts};
 use super::operator::Operator;
 use super::responses::Unit;
-use crate::contact::{Candidates, ContactJacobian};
+use crate::contact::{Candidates, ContactJacobian, Course};
 use crate::contact_solver::{ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
 use crate::error::{Error, Result};
@@ -319,8 +319,7 @@ fn press_start<T: Real>(
     let mut laws: Vec<[T; 2]> = (0..rows)
         .map(|row| {
             let law = constraints.law(row);
-            let depth = (-gaps[row]).max(tolerance[row]);
-            let (compliance, shift) = law.linearized(depth, T::zero());
+            let (compliance, shift) = law.linearized(gaps[row], tolerance[row], T::zero(), Course::at_rest());
             if law.is_compliant() { [compliance, shift] } else { [T::zero(); 2] }
         })
         .collect();

@@ -111,7 +111,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                              of a contact, or from all",
                 });
             }
-            if *on_massless && (law.rebounds() || law.inertia() > 0.0) {
+            if *on_massless && (law.rebounds() || law.inertia() > 0.0 || law.is_damped()) {
                 return Err(Error::Incompatible {
                     part: format!("{law:?} of contact {} on dofs without mass", self.constraints.ids[row]),
                     reason: "such dofs stop and start at once; choose a law that reads the gap alone, or give them a \

@@ -79,9 +79,9 @@ pub struct Works<T> {
     pub load: T,
     /// Work of the supports.
     pub supports: T,
-    /// Work of damping (not positive).
+    /// Work of damping (not positive), and of the dashpots of contact laws.
     pub damping: T,
-    /// Work of the reported contact forces along the normals.
+    /// Work of the reported contact forces along the normals, but for that of dashpots.
     pub contact: T,
     /// Work of the reported friction forces on the bodies: not positive where obstacles do not move along themselves.
     pub friction: T,

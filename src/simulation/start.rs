@@ -223,10 +223,14 @@ impl<T: Real> Start<'_, T> {
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let looks_ahead = contact.lead() > 0.0;
         // Springs in compression push from the start.
+        let mut rates = vec![GapRates::default(); constraints.len()];
+        if constraints.laws().damped {
+            constraints.finite_rates(t, &motion.u, &motion.v, &mut rates)?;
+        }
         for row in 0..constraints.len() {
             let law = constraints.law(row);
             if law.is_spring() {
-                let force = law.force(contacts.gap[row]);
+                let force = law.force(contacts.gap[row], -(g.product(row, &motion.v) + rates[row].rate));
                 if force > T::zero() {
                     projection.push(g, (&[row], &[force]), T::one(), &mut motion.a)?;
                 }

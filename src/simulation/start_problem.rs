@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::supports::finite_supports;
-use crate::contact::{ContactJacobian, ContactLaw, GapRates, Tangents};
+use crate::contact::{ContactJacobian, ContactLaw, Course, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
 use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, rounding, slides};
 use crate::error::Result;
@@ -90,7 +90,7 @@ impl<T: Real> StartProblem<T> {
             let law = constraints.law(row);
             if inertia(law) > T::zero() {
                 let per_gap = inertia(law).recip();
-                let (compliance, _) = law.linearized(T::zero(), T::zero());
+                let (compliance, _) = law.linearized(T::zero(), T::zero(), T::zero(), Course::at_rest());
                 self.compliance[row] = per_gap * compliance;
                 self.offset[row] = g.product(row, &motion.a) + rates[row].acceleration + per_gap * gaps[row];
                 self.tolerance[row] = rounding(g.magnitude(row, &motion.a) + self.offset[row].abs());
@@ -190,7 +190,7 @@ impl<T: Real> StartProblem<T> {
         let aimed = |row: &usize| open[*row] && constraints.law(*row).needs_multiplier();
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
         // (A mean gap changes by half of the response.)
-        let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(T::one(), T::zero()).0;
+        let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(-T::one(), T::zero(), T::zero(), Course::at_rest()).0;
         let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
         Ok(Self {
             rows,

@@ -164,7 +164,8 @@ impl<T: Real> Simulation<'_, T> {
         let (forces, load) =
             (work.contact.rows.curved.forces(g), if self.startup.is_some() { 1.0 } else { stage.load });
         let (contacts, h) = (&work.contact.trial, history.clock.h);
-        let books = StepBooks { t: new.t, motion, contacts, g, forces, load, corrections, h };
+        let laws = constraints.laws();
+        let books = StepBooks { t: new.t, motion, contacts, laws, g, forces, load, corrections, h };
         if let Some(ledger) = ledger {
             ledger.prepare(&mut **system, &books)?;
         }

@@ -228,9 +228,14 @@ impl<T: Real> Stiffening<T> {
         for (row, law) in step.constraints.laws().iter().enumerate() {
             // (A contact that has opened before the end of the step has pressed in one of its stages.)
             let force = trial.lambda_raw[row].max(trial.impulse[row] / T::of(step.clock.h));
-            let coupled = rows.weight[row] != T::zero() || rows.on_massless.get(row).is_some_and(|on| *on);
+            // (The unknown may hold the dashpot alone.)
+            let holds = rows.weight[row] != T::zero();
+            let coupled = holds && !law.is_damped() || rows.on_massless.get(row).is_some_and(|on| *on);
             if law.is_spring() && !coupled && force > T::zero() {
-                self.springs.push((row, law.tangent(force.value())));
+                let [stiffness, damping] = law.slopes(force.value(), (-rows.balance_gap[row]).value());
+                // A dashpot whose force is that of the rate before takes c h/2 from the mass: ω² h²/4 + ξ ω h < 1.
+                let lagged = if holds { 0.0 } else { 2.0 * damping / step.clock.h };
+                self.springs.push((row, stiffness + lagged));
             }
         }
     }
