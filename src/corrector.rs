@@ -109,6 +109,19 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
+    /// Whether contacts leave with the share of their approach that [`ContactLaw::Restitution`] asks for, by a scheme
+    /// that imposes contact on the displacements of the state, or why not; asked once, at build. Default: they do not.
+    ///
+    /// [`ContactLaw::Restitution`]: crate::contact::ContactLaw::Restitution
+    ///
+    /// # Errors
+    ///
+    /// The reason, as from [`check`](Self::check).
+    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        let _ = tableau;
+        Err("the correction knows nothing of restitution: choose `PersistencyCorrection::with_history_projection`")
+    }
+
     /// Whether it takes the forces of closed contacts out of the accelerations, and leaves those of the smooth motion.
     /// Those of the start are without them then, and friction holds the way made in a stage, not its velocity, which
     /// the correction changes. Default: the forces stay.
@@ -176,6 +189,9 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     }
     fn check_switch(&self) -> std::result::Result<(), &'static str> {
         (**self).check_switch()
+    }
+    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        (**self).check_restitution(tableau)
     }
     fn leaves_smooth_motion(&self) -> bool {
         (**self).leaves_smooth_motion()

@@ -27,9 +27,27 @@ pub enum ContactLaw {
     Rigid,
     /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multiplier).
     Equality,
-    /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0 with ġ the rate at the start of the stage. Schemes that
-    /// impose contact on velocities only; with several contacts at once it is the law of simultaneous impact, which
-    /// for Newton's cradle is not the outcome of a sequence of pairwise impacts.
+    /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0, with ġ the rate at the start of the stage by schemes
+    /// that impose contact on velocities. Where it is imposed on the displacements of the state,
+    /// [`PersistencyCorrection`](crate::PersistencyCorrection) lets a contact that closes leave with e times the rate
+    /// at which it has met the gap zero. With several contacts at once it is the law of simultaneous impact, which for
+    /// Newton's cradle is not the outcome of a sequence of pairwise impacts. Schemes that impose contact ahead of the
+    /// state do not take it.
+    ///
+    /// ```
+    /// use contact_dynamics::contact::ContactLaw;
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    ///
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let ball = LinearSystem::lumped(vec![1.0], free)?.load(|_, f| f[0] = -9.81);
+    /// let floor = LinearRows::new().row(ContactLaw::Restitution { coefficient: 0.5 }, &[(0, 1.0)], 1.0);
+    /// let mut run = Simulation::builder(ball, Newmark::trapezoidal(), 0.01).constraint(floor).build()?;
+    /// run.run_until(0.6, &mut ())?;
+    /// let (u, v) = (run.state().displacement()[0] + 1.0, run.state().velocity()[0]);
+    /// assert!((9.81 * u + 0.5 * v * v - 0.25 * 9.81).abs() < 1e-12); // e² of the height
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     Restitution {
         /// e, from 0 (plastic, the same as `Rigid`) to 1 (elastic).
         coefficient: f64,

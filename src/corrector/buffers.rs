@@ -1,5 +1,6 @@
 //! Memory of the corrections, reserved when a simulation is built.
 
+use super::correction::Rebounds;
 use super::group_problem::GroupProblem;
 use super::rubbing_problem::Rubbing;
 use super::switching::Switching;
@@ -39,6 +40,8 @@ pub(crate) struct Buffers<T> {
     pub(super) s: Vec<T>,
     /// Contacts with friction among the others.
     pub(super) rubbing: Box<Rubbing<T>>,
+    /// Contacts that leave with a share of their approach.
+    pub(super) rebounds: Box<Rebounds<T>>,
     /// Rates of slips, one a tangential row.
     pub(super) slips: Vec<GapRates<T>>,
     pub(super) past_slips: Vec<GapRates<T>>,
@@ -110,6 +113,7 @@ impl<T: Real> Buffers<T> {
             group: Box::new(GroupProblem::new(rows)),
             s: reals(rows.min(FORESEEN) * rows.min(FORESEEN)),
             rubbing: Box::default(),
+            rebounds: Box::default(),
             slips: Vec::new(),
             past_slips: Vec::new(),
             rates: vec![GapRates::default(); rows],

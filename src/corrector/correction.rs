@@ -5,6 +5,7 @@ mod energy;
 mod friction;
 mod parts;
 mod past;
+mod restitution;
 
 use super::group_problem::Jumps;
 use super::{Buffers, Corrector, JumpProjection};
@@ -12,6 +13,7 @@ use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
+pub(super) use restitution::Rebounds;
 use crate::simulation::{MasslessBlock, Operator};
 use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Linearity, System};
@@ -168,12 +170,16 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching
-    /// rows), and the engaged rows.
+    /// rows), and the engaged rows. Rows that close under a law with restitution get the rates with which they leave,
+    /// and are not engaged then.
     ///
     /// # Errors
     ///
     /// [`Error::ContactNotFinite`], [`Error::Contact`].
     pub fn solve_velocity_jumps(&mut self) -> Result<()> {
+        if self.find_rebounds()? {
+            return self.solve_rebounds();
+        }
         if self.rubs() {
             return self.solve_rubbing_velocity(Pressed::Stays);
         }
@@ -257,6 +263,10 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn push_velocity(&mut self) -> Result<()> {
+        if self.buffers.rebounds.any() {
+            self.push_rubbing_velocity()?;
+            return self.release_rebounds();
+        }
         if self.rubs() {
             return self.push_rubbing_velocity();
         }

@@ -3,6 +3,7 @@
 use super::{Correction, Corrector, Edits};
 use crate::error::Result;
 use crate::real::Real;
+use crate::tableau::Tableau;
 
 /// Which jumps are removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,6 +117,23 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
 
     fn check_friction(&self) -> std::result::Result<(), &'static str> {
         Ok(())
+    }
+
+    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+        let reads_past = |stage: usize| {
+            let read = tableau.read_after(stage);
+            read.is_ok_and(|read| read.iter().skip(1).flatten().any(|&read| read))
+        };
+        match (self.parts, self.history) {
+            (Parts::Both, HistoryProjection::On) => Ok(()),
+            (Parts::Both, HistoryProjection::Off) if !(0..tableau.stages.len()).any(reads_past) => Ok(()),
+            (Parts::Both, HistoryProjection::Off) => {
+                Err("the past that the scheme reads would go on to approach: choose `with_history_projection`")
+            }
+            (Parts::Velocity | Parts::Acceleration, _) => {
+                Err("what leaves has neither its old velocity nor the force of the impact: choose both parts")
+            }
+        }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

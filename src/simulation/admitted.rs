@@ -23,6 +23,8 @@ pub(crate) struct Admitted {
     pub(crate) no_switch: Option<&'static str>,
     /// The correction that cannot act on the persistency switch, and why not.
     pub(crate) uncorrected_switch: Option<(String, &'static str)>,
+    /// The correction that does not let contacts leave with a share of their approach, and why not.
+    pub(crate) unrestored: Option<(String, &'static str)>,
     /// Why friction is refused, if it is.
     pub(crate) no_friction: Option<&'static str>,
     /// The contact solver, if there are sets that it does not take, and these.
@@ -41,6 +43,9 @@ impl Admitted {
         }
         let switches = law.measure(true) == Measure::Rate;
         if let Some((corrector, reason)) = self.uncorrected_switch.as_ref().filter(|_| switches) {
+            return Err(Error::Incompatible { part: format!("{law:?} with {corrector}"), reason });
+        }
+        if let Some((corrector, reason)) = self.unrestored.as_ref().filter(|_| law.rebounds()) {
             return Err(Error::Incompatible { part: format!("{law:?} with {corrector}"), reason });
         }
         let reasons = [
@@ -74,7 +79,7 @@ impl Admitted {
                 .then_some("its constraint gives no tangent, or more than two: one in the plane, two in space"),
             (!law.admits_friction()).then_some(
                 "friction goes with laws of one instant that only press: `Rigid`, `Restitution`, `Penalty`, \
-                 `PowerLaw`, `AugmentedLagrangian`",
+                 `PowerLaw`, `KelvinVoigt`, `HuntCrossley`, `AugmentedLagrangian`",
             ),
             self.no_sets.iter().any(kind).then_some("the contact solver takes no friction; choose `ActiveSet`"),
             self.no_friction,
@@ -113,6 +118,10 @@ pub(super) fn admitted<T: Real>(
              predicts; choose `CentralDifference`",
         );
     }
+    admitted.unrestored = correctors
+        .iter()
+        .filter(|corrector| corrects && !corrector.corrects_massless())
+        .find_map(|corrector| corrector.check_restitution(tableau).err().map(|reason| (corrector.name(), reason)));
     for stage in &tableau.stages {
         if stage.contact_row().z == 0.0 && admitted.no_friction.is_none() {
             admitted.no_friction = Some(
@@ -143,10 +152,17 @@ pub(super) fn admitted<T: Real>(
         }
         match stage.contact {
             ContactLevel::Position { .. } => {
-                admitted.no_restitution = Some(
-                    "it imposes contact on positions, where a coefficient of restitution has no meaning; choose a \
-                     scheme that imposes it on velocities",
-                );
+                if stage.contact != ContactLevel::POSITION {
+                    admitted.no_restitution = Some(
+                        "it imposes contact on displacements ahead of the state, whose velocities are not corrected; \
+                         choose a scheme that imposes it on velocities, or on the displacements of the state",
+                    );
+                } else if correctors.is_empty() && !by_default {
+                    admitted.no_restitution = Some(
+                        "it imposes contact on displacements, and contacts leave by a correction of velocities: choose \
+                         `PersistencyCorrection::with_history_projection`",
+                    );
+                }
                 if stage.contact_row().z == 0.0 {
                     admitted.no_rigid = Some(
                         "its displacements do not contain the unknown, so a multiplier cannot close a gap; choose a \

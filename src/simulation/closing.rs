@@ -5,7 +5,7 @@ use super::contact_rows::{Level, Part};
 use super::contact_step::{ContactStep, ContactWork};
 use crate::contact::{ContactJacobian, ContactLaw, GapRates};
 use crate::corrector::{Buffers, Gaps, rounding, slides};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
 
@@ -81,6 +81,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
             // dofs: friction there would be taken from one side alone.)
             let is_static = !massless.is_empty() && g.acts_on(row, massless);
             let has_mass = !is_static && !constraints.tangents().act_on(g, row, massless);
+            if law.rebounds() && is_static {
+                return Err(Error::Incompatible {
+                    part: format!("{law:?} of contact {} on dofs without mass", constraints.ids[row]),
+                    reason: "such dofs stop and start at once; choose `ContactLaw::Rigid`, or give them a mass",
+                });
+            }
             if law.leaves_jumps() && has_mass {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),

@@ -2,7 +2,7 @@
 
 use super::applied_rows::AppliedRows;
 use super::contact_rows::{ContactRowsWork, Part};
-use super::contact_step::{ContactStep, ContactWork};
+use super::contact_step::{ContactStep, ContactWork, course};
 use super::interface::InterfaceWork;
 use super::operator::Operator;
 use crate::contact::{Course, Measure};
@@ -60,7 +60,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let violated = rows.enabled[row] && rows.y[row] < -rows.tolerance[row] || presses;
             rows.in_problem[row] = coupled && (violated || rows.enabled[row] && trial.lambda_raw[row] > T::zero());
             if rows.in_problem[row] {
-                let course = self.course([rows.balance_gap[row], rows.approach[row]]);
+                let course = course(stage, clock.h, [rows.balance_gap[row], rows.approach[row]]);
                 let linearized = law.linearized(rows.y[row], rows.tolerance[row], T::zero(), course);
                 (rows.compliance[row], rows.shift[row]) = linearized;
             } else if coupled {
@@ -106,12 +106,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 if law.is_nonlinear() {
                     let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
-                    let course = self.course([gaps[row], approach[row]]);
+                    let course = course(self.stage, self.clock.h, [gaps[row], approach[row]]);
                     let (c, s) = law.linearized(gap, tolerance[row], lambda, course);
                     let left = gap + c * lambda + s;
                     let miss = if lambda > T::zero() { left.abs() } else { -left };
                     deepest = deepest.max(depth);
-                    if miss > tolerance[row] + rounded * depth && miss > worst.1 {
+                    let size = gap.abs().max((c * lambda).abs()).max(s.abs());
+                    if miss > tolerance[row] + rounded * size && miss > worst.1 {
                         worst = (row, miss);
                     }
                     (compliance[row], shift[row]) = (c, s);
@@ -157,7 +158,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         t: f64,
         contact: &mut ContactWork<T>,
     ) -> Result<()> {
-        let course = |at| self.course(at);
+        let (stage, h) = (self.stage, self.clock.h);
         let Self { constraints, g, solver, statistics, .. } = self;
         let ContactWork { rows, trial, interface, .. } = contact;
         let count = constraints.len();
@@ -240,7 +241,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     let pushed = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     if pushed < -tolerance[row] {
                         (in_problem[row], grown) = (true, true);
-                        let course = course([rows.balance_gap[row], rows.approach[row]]);
+                        let course = course(stage, h, [rows.balance_gap[row], rows.approach[row]]);
                         let law = constraints.law(row);
                         (compliance[row], shift[row]) = law.linearized(pushed, tolerance[row], T::zero(), course);
                     }

@@ -50,6 +50,16 @@ pub(super) struct ContactStep<'s, 'a, T: Real> {
     pub(super) part: Part,
 }
 
+/// How depth and approach of a row of springs depend on its y: both change with d as the rows of the balance say.
+pub(super) fn course<T: Real>(stage: &CompiledStage<T>, h: f64, [gap, approach]: [T; 2]) -> Course<T> {
+    let [by_u, by_v, _] = stage.balanced().weights();
+    if by_u > T::zero() {
+        let slope = by_v / by_u;
+        return Course { depth: [T::zero(), T::one()], approach: [approach + slope * gap, slope] };
+    }
+    Course { depth: [-gap, T::zero()], approach: [T::zero(), T::of(h.recip())] }
+}
+
 impl<T: Real> ContactStep<'_, '_, T> {
     /// Evaluates what contact constrains, without contact forces, and decides which rows may be pressed.
     pub(super) fn aim(
@@ -113,20 +123,6 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let rigid = self.stage.contact.as_ref().map_or(self.stage.recovery.weights()[0], |target| target.row.weight);
         let [balance_u, _, balance_a] = self.stage.balanced().weights();
         [rigid, balance_u, balance_a]
-    }
-
-    /// How depth and approach of a row of springs depend on its y: both change with d as the rows of the balance say.
-    pub(super) fn course(&self, [gap, approach]: [T; 2]) -> Course<T> {
-        let [by_u, by_v, _] = self.stage.balanced().weights();
-        match by_u > T::zero() {
-            true => {
-                let slope = by_v / by_u;
-                Course { depth: [T::zero(), T::one()], approach: [approach + slope * gap, slope] }
-            }
-            false => {
-                Course { depth: [-gap, T::zero()], approach: [T::zero(), T::of(self.clock.h.recip())] }
-            }
-        }
     }
 
     /// Whether the unknown moves the rate of a damped row alone, and not its gap: explicit schemes whose velocities
@@ -300,7 +296,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(super) fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
-        let (Some(start), true) = (past.first(), constraints.laws().rebound) else {
+        // (Where the gap is constrained, the correction of velocities makes contacts leave.)
+        let at_velocities = stage.contact.as_ref().is_some_and(|target| target.forecast.is_some());
+        let (Some(start), true) = (past.first(), constraints.laws().rebound && at_velocities) else {
             return Ok(());
         };
         let h = T::of(clock.h);

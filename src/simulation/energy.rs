@@ -132,8 +132,8 @@ impl<T: Real> Ledger<T> {
         for (contact, row) in constraints.all_rows_of(&state.contacts) {
             let forces = if g.is_tangential(row) {
                 &mut self.friction
-            } else if constraints.law(row).is_damped() {
-                self.stored += constraints.law(row).stored(state.contacts.gap[contact]);
+            } else if constraints.laws()[row].is_damped() {
+                self.stored += constraints.laws()[row].stored(state.contacts.gap[contact]);
                 &mut self.damped
             } else {
                 &mut self.contact

@@ -4,7 +4,6 @@
 use super::constraints::Constraints;
 use super::scheme::Scheme;
 use crate::analysis::{self, LocalError};
-use crate::contact::ContactLaw;
 use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
@@ -137,7 +136,7 @@ fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, 
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
         && constraints.may_press()
-        && (constraints.len() == 0 || constraints.laws().iter().any(ContactLaw::is_plain))
+        && (constraints.len() == 0 || constraints.laws().iter().any(|law| law.is_plain() || law.restitution().is_some()))
         && constraints.interface().iter().any(has_mass)
 }
 

@@ -8,6 +8,7 @@ mod by_chance;
 mod constraints;
 mod curved;
 mod curved_patch;
+mod dashpots;
 mod dual;
 mod edges;
 mod gap_function;

@@ -6,4 +6,5 @@ mod of_a_host;
 mod papers;
 mod persistency;
 mod release;
+mod restitution;
 mod work_balance;

@@ -86,7 +86,7 @@ impl<T: Real> Correction<'_, T> {
     /// Writes down the problem of the contacts `rows`, of which raw multipliers have given `share` times theirs.
     fn pose_rubbing(&mut self, rows: &[usize], (jump, presses): (Jump, Pressed), share: T) {
         let Self { buffers, constraints, contacts, g, new, .. } = self;
-        let Buffers { rubbing, rates, slips, .. } = &mut **buffers;
+        let Buffers { rubbing, rebounds, rates, slips, .. } = &mut **buffers;
         let tangents = constraints.0.tangents();
         rubbing.clear();
         for &row in rows {
@@ -111,7 +111,8 @@ impl<T: Real> Correction<'_, T> {
                 let is_any = own.is_empty() && presses == Pressed::Stays;
                 let base = if is_any { T::zero() } else { share * contacts.lambda_raw[k] };
                 let size = g.magnitude(k, values) + own_rate.abs();
-                rubbing.demand(k, g.product(k, values) + own_rate, rounding(size), base);
+                let asked = if jump == Jump::Velocity { rebounds.asked(k) } else { T::zero() };
+                rubbing.demand(k, g.product(k, values) + own_rate - asked, rounding(size), base);
             }
         }
         // (The past takes each row for a block of its own.)
@@ -176,7 +177,7 @@ impl<T: Real> Correction<'_, T> {
     /// norm of the mass.
     fn solve_past(&mut self, (k, field): (usize, usize), engaged: &[usize], straight: bool) -> Result<T> {
         let Self { past, constraints, buffers, projection, solver, g, contacts, t, new, .. } = self;
-        let Buffers { rubbing, gaps, straight: seen, slips, past_slips, .. } = &mut **buffers;
+        let Buffers { rubbing, rebounds, gaps, straight: seen, slips, past_slips, .. } = &mut **buffers;
         let motion = &past[k - 1];
         let before = T::of(new.t - motion.t);
         let tangents = constraints.0.tangents();
@@ -199,9 +200,9 @@ impl<T: Real> Correction<'_, T> {
         for (place, &row) in engaged.iter().enumerate() {
             let own = tangents.of(row);
             let gap = if straight { seen[place] } else { gaps[row] };
-            if own.is_empty() || !contacts.sliding[row] {
+            if own.is_empty() || !contacts.sliding[row] || rebounds.leaves(row) {
                 for row in std::iter::once(row).chain(own) {
-                    let jump = if row < first { gap } else { slip(row) };
+                    let jump = if row < first { gap } else { slip(row) } - rebounds.past(row, field, before);
                     rubbing.push(&Block::new(row, 0, AdmissibleSet::Free));
                     rubbing.demand(row, jump, size(row, jump), T::zero());
                 }

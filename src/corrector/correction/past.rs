@@ -19,12 +19,17 @@ impl<T: Real> Correction<'_, T> {
     /// [`Error::Incompatible`](crate::Error::Incompatible) if the corrector's
     /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
+        let leave = self.note_outgoing()?;
         let begins = |&row: &usize| !self.was_closed[row] || self.sticks(row) && !self.was_sticking[row];
-        if !self.buffers.engaged.iter().any(begins) {
+        if !leave && !self.buffers.engaged.iter().any(begins) {
             return Ok(());
         }
         self.backup.check()?;
-        let rows = std::mem::take(&mut self.buffers.engaged);
+        let mut rows = std::mem::take(&mut self.buffers.engaged);
+        if leave {
+            rows.extend(self.buffers.rebounds.contacts(self.g));
+            rows.sort_unstable();
+        }
         let mut closing = match self.rubs() {
             true => self.read_slip_rates(),
             false => self.close(&rows),
@@ -44,6 +49,7 @@ impl<T: Real> Correction<'_, T> {
                 }
             }
         }
+        rows.retain(|&row| !self.buffers.rebounds.leaves(row));
         self.buffers.engaged = rows;
         closing
     }
@@ -51,15 +57,16 @@ impl<T: Real> Correction<'_, T> {
     /// Projects one field of past state k onto the engaged rows.
     fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, projection, contacts, scheme, h, new, .. } = self;
-        let Buffers { gaps, jump, tolerance: before, .. } = &mut **buffers;
+        let Buffers { gaps, jump, tolerance: before, rebounds, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
+        let ago = T::of(new.t - motion.t);
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
         // Of the past motion on its own part of a curved surface: u, v and a fit each other.
         constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
         // Where a gap is held, under a law that reads it where a stage starts.
         let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
             true => contacts.gap[row],
-            false => T::zero(),
+            false => rebounds.past(row, field, ago),
         };
         jump.clear();
         jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
@@ -70,14 +77,15 @@ impl<T: Real> Correction<'_, T> {
             self.see_straight((k, field), rows)?;
         }
         let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, .. } = self;
-        let Buffers { rates, jump, tolerance: before, .. } = &mut **buffers;
+        let Buffers { rates, jump, tolerance: before, rebounds, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
+        let ago = T::of(self.t - motion.t);
         // In a stage before the last the state that the step starts from loses what the later stages do not see any
         // more.
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
             constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
             for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
-                let taken = T::of(0.5) * multiplier * before;
+                let taken = multiplier * (T::of(0.5) * before + rebounds.past(row, field, ago));
                 contacts.dissipated[row] += taken;
                 **energy += multiplier * rates[row].rate - taken;
             }
@@ -100,8 +108,12 @@ impl<T: Real> Correction<'_, T> {
     /// come.
     fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
         self.look_straight((k, field), rows)?;
-        let Self { buffers, projection, .. } = self;
-        let Buffers { jump, tolerance: before, straight, by_straight, .. } = &mut **buffers;
+        let Self { buffers, projection, past, new, .. } = self;
+        let Buffers { jump, tolerance: before, straight, by_straight, rebounds, .. } = &mut **buffers;
+        let ago = T::of(new.t - past[k - 1].t);
+        for (straight, &row) in straight.iter_mut().zip(rows) {
+            *straight -= rebounds.past(row, field, ago);
+        }
         by_straight.clear();
         by_straight.extend_from_slice(straight);
         projection.solve(by_straight);

@@ -1,0 +1,207 @@
+//! Restitution: contacts that close leave with a share of their approach, ġ′ = −e ġ⁻ (theory, section 7.5).
+
+use super::{Correction, Pressed};
+use crate::contact::{ContactJacobian, GapRates};
+use crate::corrector::{Buffers, rounding};
+use crate::error::Result;
+use crate::real::Real;
+
+/// The contacts of a stage that leave with a share of their approach. One entry a row of G unless said otherwise.
+#[derive(Debug, Default)]
+pub(in crate::corrector) struct Rebounds<T> {
+    /// Whether there are any.
+    any: bool,
+    /// The rate before the impact, and that with which a contact is to leave: zero if it is to stay.
+    before: Vec<T>,
+    target: Vec<T>,
+    /// The share of the targets that adds no energy.
+    share: T,
+    /// The contacts that leave, ascending, and their tangential rows.
+    leaving: Vec<usize>,
+    /// Rate and acceleration with which they do.
+    outgoing: Vec<[T; 2]>,
+    forces: Vec<T>,
+}
+
+impl<T: Real> Rebounds<T> {
+    /// Whether contacts leave with a share of their approach.
+    pub(in crate::corrector) fn any(&self) -> bool {
+        self.any
+    }
+
+    /// The rate that is asked of a row.
+    pub(super) fn asked(&self, row: usize) -> T {
+        if self.any { self.share * self.target[row] } else { T::zero() }
+    }
+
+    /// Whether a contact, or one of the rows of its friction, leaves.
+    pub(super) fn leaves(&self, row: usize) -> bool {
+        self.leaving.binary_search(&row).is_ok()
+    }
+
+    /// The contacts that leave.
+    pub(super) fn contacts(&self, g: &ContactJacobian<T>) -> impl Iterator<Item = usize> {
+        self.leaving.iter().copied().filter(|&row| !g.is_tangential(row))
+    }
+
+    /// Where a row that leaves has been (`field` 0, less where it is now), its rate and its acceleration, a time ago.
+    pub(super) fn past(&self, row: usize, field: usize, ago: T) -> T {
+        if !self.leaves(row) {
+            return T::zero();
+        }
+        let [rate, acceleration] = self.outgoing[row];
+        match field {
+            0 => ago * (T::of(0.5) * ago * acceleration - rate),
+            1 => rate - ago * acceleration,
+            _ => acceleration,
+        }
+    }
+}
+
+impl<T: Real> Correction<'_, T> {
+    /// Finds the contacts that close, under a law with restitution, faster than they would come back within a step.
+    ///
+    /// The rate before the impact is that at the gap zero, by rate and acceleration of the gap where the stage starts:
+    /// an elastic impact then neither gives nor takes what the gap still was worth in the potential.
+    pub(super) fn find_rebounds(&mut self) -> Result<bool> {
+        self.buffers.rebounds.any = false;
+        self.buffers.rebounds.leaving.clear();
+        let may_rebound = |row: &usize| self.constraints.0.law(*row).rebounds();
+        if !self.buffers.closed.iter().any(may_rebound) || self.past.is_empty() {
+            return Ok(false);
+        }
+        self.read_rates()?;
+        let Self { buffers, constraints, g, past, new, was_closed, h, .. } = self;
+        let Buffers { rebounds, closed, gaps, rates, past_slips, .. } = &mut **buffers;
+        let (Some(start), h) = (past.first(), T::of(*h)) else { return Ok(false) };
+        let comes = |&row: &usize| !was_closed[row] || g.product(row, &start.v) + rates[row].rate < T::zero();
+        if !closed.iter().any(|row| constraints.0.law(*row).rebounds() && comes(row)) {
+            return Ok(false);
+        }
+        let Rebounds { any, before, target, outgoing, share, .. } = &mut **rebounds;
+        for values in [&mut *before, target] {
+            values.clear();
+            values.resize(g.rows(), T::zero());
+        }
+        outgoing.clear();
+        outgoing.resize(g.rows(), [T::zero(); 2]);
+        *share = T::one();
+        // Gap and acceleration are kept where the ways of those that leave will be.
+        for field in 0..3 {
+            constraints.0.elsewhere(field, start.place(), (new.t, &new.u), gaps)?;
+            for &row in closed.iter() {
+                match field {
+                    0 => outgoing[row][0] = gaps[row].max(T::zero()),
+                    1 => before[row] = gaps[row],
+                    _ => outgoing[row][1] = gaps[row],
+                }
+            }
+        }
+        for &row in closed.iter() {
+            let (Some(e), [gap, acceleration]) = (constraints.0.law(row).restitution(), outgoing[row]) else { continue };
+            let square = before[row] * before[row] - T::of(2.0) * acceleration * gap;
+            if square <= T::zero() || before[row] >= T::zero() && acceleration >= T::zero() {
+                continue;
+            }
+            let approach = square.sqrt();
+            before[row] = -approach;
+            let leaves = T::of(e) * approach;
+            // (What would be back within two steps stays: it would chatter.)
+            let noise = rounding(g.magnitude(row, &start.v) + g.magnitude(row, &start.u) / h);
+            if leaves > (-h * acceleration).max(noise) {
+                (target[row], *any) = (leaves, true);
+            }
+        }
+        let tangents = constraints.0.tangents();
+        if *any && !tangents.is_empty() {
+            past_slips.resize(past_slips.len().max(tangents.len()), GapRates::default());
+            constraints.0.slip_rates(start.t, &start.u, &start.v, past_slips)?;
+            let tangents = constraints.0.tangents();
+            for k in tangents.all() {
+                before[k] = g.product(k, &start.v) + past_slips[k - tangents.all().start].rate;
+            }
+        }
+        Ok(rebounds.any)
+    }
+
+    /// Finds impulses with which the contacts of [`find_rebounds`](Self::find_rebounds) leave, and others stay or part:
+    /// all totals press. Where the law would add energy, as it may for different coefficients in one impact, and with
+    /// friction, contacts leave with the largest share of these rates that adds none.
+    pub(super) fn solve_rebounds(&mut self) -> Result<()> {
+        /// Halvings of the share.
+        const HALVINGS: usize = 30;
+        self.solve_rubbing_velocity(Pressed::MayPart)?;
+        if self.rebounds_gain() {
+            let half = T::of(0.5);
+            let (mut least, mut most) = (T::zero(), T::one());
+            for _ in 0..HALVINGS {
+                self.buffers.rebounds.share = half * (least + most);
+                self.solve_rubbing_velocity(Pressed::MayPart)?;
+                let bound = if self.rebounds_gain() { &mut most } else { &mut least };
+                *bound = self.buffers.rebounds.share;
+            }
+            self.buffers.rebounds.share = least;
+            self.solve_rubbing_velocity(Pressed::MayPart)?;
+        }
+        let Self { buffers, constraints, contacts, .. } = self;
+        let Buffers { rebounds, rubbing, engaged, .. } = &mut **buffers;
+        for block in &rubbing.blocks {
+            let total = rubbing.totals[block.places().start];
+            let parts = total == T::zero() && contacts.lambda_raw[block.row] > T::zero();
+            if !block.set.is_bilateral() && (parts || total > T::zero() && rebounds.asked(block.row) > T::zero()) {
+                rebounds.leaving.push(block.row);
+            }
+        }
+        engaged.retain(|row| rebounds.leaving.binary_search(row).is_err());
+        let contacts = rebounds.leaving.len();
+        for place in 0..contacts {
+            rebounds.leaving.extend(constraints.0.tangents().of(rebounds.leaving[place]));
+        }
+        rebounds.leaving.sort_unstable();
+        Ok(())
+    }
+
+    /// Whether the impulses found add energy: X·(ẏ⁻ + ẏ′)/2 of all rows.
+    fn rebounds_gain(&self) -> bool {
+        let Buffers { rebounds, rubbing, .. } = &*self.buffers;
+        let (mut work, mut size) = (T::zero(), T::zero());
+        for ((&row, &total), &left) in rubbing.rows.iter().zip(&rubbing.totals).zip(&rubbing.left) {
+            let [before, after] = [rebounds.before[row], left + rebounds.asked(row)];
+            work += total * (before + after);
+            size += total.abs() * (before.abs() + after.abs());
+        }
+        work > T::epsilon().sqrt() * T::epsilon().sqrt().sqrt() * size
+    }
+
+    /// Takes the forces of contacts that leave out of the accelerations and of what is reported: they act no more.
+    pub(super) fn release_rebounds(&mut self) -> Result<()> {
+        let share = T::of(self.scheme.balance / self.scheme.acceleration);
+        let Rebounds { leaving, forces, .. } = &mut *self.buffers.rebounds;
+        let (rows, mut forces) = (std::mem::take(leaving), std::mem::take(forces));
+        forces.clear();
+        forces.extend(rows.iter().map(|&row| -self.contacts.lambda_raw[row] / share));
+        let result = self.push_forces(&rows, &forces);
+        for &row in &rows {
+            self.contacts.lambda[row] = T::zero();
+        }
+        (self.buffers.rebounds.leaving, self.buffers.rebounds.forces) = (rows, forces);
+        result
+    }
+
+    /// Notes rate and acceleration with which contacts leave; says whether any does.
+    pub(super) fn note_outgoing(&mut self) -> Result<bool> {
+        if self.buffers.rebounds.leaving.is_empty() {
+            return Ok(false);
+        }
+        self.read_rates()?;
+        self.read_slip_rates()?;
+        let Self { buffers, constraints, g, new, .. } = self;
+        let Buffers { rebounds, rates, slips, .. } = &mut **buffers;
+        let first = constraints.0.tangents().all().start;
+        for &row in &rebounds.leaving {
+            let own = if g.is_tangential(row) { slips[row - first] } else { rates[row] };
+            rebounds.outgoing[row] = [g.product(row, &new.v) + own.rate, g.product(row, &new.a) + own.acceleration];
+        }
+        Ok(true)
+    }
+}
