@@ -129,7 +129,7 @@ impl<T: Real> Correction<'_, T> {
     /// friction, contacts leave with the largest share of these rates that adds none.
     pub(super) fn solve_rebounds(&mut self) -> Result<()> {
         /// Halvings of the share.
-        const HALVINGS: usize = 30;
+        const HALVINGS: usize = 45;
         self.solve_rubbing_velocity(Pressed::MayPart)?;
         if self.rebounds_gain() {
             let half = T::of(0.5);

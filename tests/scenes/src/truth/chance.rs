@@ -265,6 +265,12 @@ fn in_units(law: ContactLaw, scene: &Scene) -> ContactLaw {
             // The unit of depth is the way of a unit of velocity in a step.
             ContactLaw::PowerLaw { stiffness: stiffness * k * scene.h.powf(1.0 - exponent), exponent }
         }
+        ContactLaw::KelvinVoigt { stiffness, damping } => {
+            ContactLaw::KelvinVoigt { stiffness: stiffness * k, damping: damping * k * scene.h }
+        }
+        ContactLaw::HuntCrossley { stiffness, exponent, dissipation } => {
+            ContactLaw::HuntCrossley { stiffness: stiffness * k * scene.h.powf(1.0 - exponent), exponent, dissipation }
+        }
         ContactLaw::Bipenalty { stiffness, mass } => {
             ContactLaw::Bipenalty { stiffness: stiffness * k, mass: mass * k * scene.h * scene.h }
         }

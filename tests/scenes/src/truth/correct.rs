@@ -46,6 +46,10 @@ struct Step<'s> {
     response: [f64; 3],
     closed: Vec<usize>,
     engaged: Vec<usize>,
+    /// Rates that restitution asks of rows, those before the impact, and rows that leave.
+    asked: Vec<f64>,
+    started: Vec<f64>,
+    leaving: Vec<usize>,
     /// Of contacts with friction the direction in which it acts.
     directions: Vec<f64>,
 }
@@ -71,6 +75,9 @@ pub fn correct(
         response: rows.map(|row| row.z / place.stage.balance.a.z),
         closed,
         engaged: Vec::new(),
+        asked: vec![0.0; scene.rows.len()],
+        started: Vec::new(),
+        leaving: Vec::new(),
         directions: vec![0.0; scene.rows.len()],
     };
     match correction {
@@ -118,15 +125,110 @@ impl Step<'_> {
     /// λ_v/λ_a.
     fn persist(&mut self) {
         let rows = self.closed.clone();
-        let x = self.jumps(&rows, Jump::Velocity, true);
+        let rebounds = self.ask_rebounds();
+        let mut x = self.jumps(&rows, Jump::Velocity, !rebounds);
+        if rebounds {
+            x = self.rebound(&rows, x);
+        }
         self.apply(&x);
+        let share = self.share();
+        for axis in self.axes_of(&self.leaving) {
+            add(&mut self.past[0].a, -self.contacts.raw[axis] / share, &self.responses[axis]);
+            self.contacts.forces[axis] = 0.0;
+        }
         let rows = self.engaged.clone();
         let y = self.jumps(&rows, Jump::Acceleration, true);
-        let share = self.share();
         for &(axis, y) in &y {
             add(&mut self.past[0].a, y, &self.responses[axis]);
             self.contacts.forces[axis] += share * y;
         }
+    }
+
+    /// Finds the rates with which contacts leave that close under a law with restitution; says whether any does.
+    fn ask_rebounds(&mut self) -> bool {
+        let (scene, h, start) = (self.scene, self.h(), &self.past[1]);
+        self.started = scene
+            .axes()
+            .iter()
+            .enumerate()
+            .map(|(axis, g)| dot(g, &start.v) + scene.rows.get(axis).map_or(0.0, |row| row.offset.at(start.t)[1]))
+            .collect();
+        let law = |i: usize| match scene.rows[i].law {
+            ContactLaw::Restitution { coefficient } => coefficient,
+            _ => 0.0,
+        };
+        let comes = |&&i: &&usize| law(i) > 0.0 && (!self.before.was_closed[i] || self.started[i] < 0.0);
+        if self.closed.iter().find(comes).is_none() {
+            return false;
+        }
+        for &i in &self.closed {
+            let (e, row) = (law(i), &scene.rows[i]);
+            let gap = scene.gap(i, start.t, &start.u).max(0.0);
+            let acceleration = dot(&row.g, &start.a) + row.offset.at(start.t)[2];
+            // The square of the rate at the gap zero.
+            let square = self.started[i].powi(2) - 2.0 * acceleration * gap;
+            if e > 0.0 && square > 0.0 && (self.started[i] < 0.0 || acceleration < 0.0) {
+                self.started[i] = -square.sqrt();
+                let noise = 64.0 * f64::EPSILON * (size(&row.g, &start.v) + size(&row.g, &start.u) / h);
+                if e * square.sqrt() > noise.max(-h * acceleration) {
+                    self.asked[i] = e * square.sqrt();
+                }
+            }
+        }
+        self.asked.iter().any(|asked| *asked > 0.0)
+    }
+
+    /// Chooses the share of the rates that adds no energy, and finds which contacts leave; x is for all of them.
+    fn rebound(&mut self, rows: &[usize], mut x: Vec<(usize, f64)>) -> Vec<(usize, f64)> {
+        let given = self.h() * self.response[1];
+        let asked = self.asked.clone();
+        let gains = |step: &Self, x: &[(usize, f64)]| {
+            let (mut work, mut size) = (0.0, 0.0_f64);
+            for &(i, impulse) in x {
+                let total = impulse + given * step.contacts.raw[i];
+                let own = step.scene.rows.get(i).map_or(0.0, |row| row.offset.at(step.past[0].t)[1]);
+                let now = dot(step.scene.axes()[i], &step.past[0].v) + own;
+                let after = now + x.iter().map(|&(j, x)| step.s(i, j) * x).sum::<f64>();
+                work += total * (after + step.started[i]);
+                size += total.abs() * (after.abs() + step.started[i].abs());
+            }
+            work > f64::EPSILON.powf(0.75) * size
+        };
+        if gains(self, &x) {
+            let (mut least, mut most) = (0.0, 1.0);
+            for _ in 0..45 {
+                let share = 0.5 * (least + most);
+                self.asked.iter_mut().zip(&asked).for_each(|(own, all)| *own = share * all);
+                x = self.jumps(rows, Jump::Velocity, false);
+                if gains(self, &x) { most = share } else { least = share }
+            }
+            self.asked.iter_mut().zip(&asked).for_each(|(own, all)| *own = least * all);
+            x = self.jumps(rows, Jump::Velocity, false);
+        }
+        for &(i, impulse) in x.iter().filter(|(axis, _)| *axis < self.scene.rows.len()) {
+            let raw = self.contacts.raw[i];
+            let total = impulse + given * raw;
+            let presses = self.engaged.contains(&i);
+            let is_held = self.scene.rows[i].law == ContactLaw::Equality;
+            if !is_held && (!presses && raw > 0.0 && total <= 0.0 || presses && self.asked[i] > 0.0) {
+                self.leaving.push(i);
+            }
+        }
+        let leaving = &self.leaving;
+        self.engaged.retain(|i| !leaving.contains(i));
+        x
+    }
+
+    /// Where a row that leaves was, its rate and its acceleration, at a past state; zero for all others.
+    fn outgoing(&self, axis: usize, field: usize, k: usize) -> f64 {
+        let (scene, now, ago) = (self.scene, &self.past[0], self.past[0].t - self.past[k].t);
+        if !self.axes_of(&self.leaving).contains(&axis) {
+            return 0.0;
+        }
+        let own = scene.rows.get(axis).map_or([0.0; 3], |row| row.offset.at(now.t));
+        let rate = dot(scene.axes()[axis], &now.v) + own[1];
+        let acceleration = dot(scene.axes()[axis], &now.a) + own[2];
+        [ago * (0.5 * ago * acceleration - rate), rate - ago * acceleration, acceleration][field]
     }
 
     /// w_ā/w_a.
@@ -149,7 +251,8 @@ impl Step<'_> {
         for &axis in &axes {
             let (values, field) = if jump == Jump::Velocity { (&new.v, 1) } else { (&new.a, 2) };
             let own = scene.rows.get(axis).map_or(0.0, |row| row.offset.at(new.t)[field]);
-            q.push(dot(scene.axes()[axis], values) + own);
+            let asked = if jump == Jump::Velocity { self.asked.get(axis).copied().unwrap_or(0.0) } else { 0.0 };
+            q.push(dot(scene.axes()[axis], values) + own - asked);
             noise.push(64.0 * f64::EPSILON * (size(scene.axes()[axis], values) + own.abs()));
             given.push(share * self.contacts.raw[axis]);
         }
@@ -229,7 +332,7 @@ impl Step<'_> {
             let sticks = self.scene.rows[i].friction.is_some() && !self.contacts.slides[i];
             !self.before.was_closed[i] || sticks && !self.before.stuck[i]
         };
-        if !self.engaged.iter().any(begins) {
+        if self.leaving.is_empty() && !self.engaged.iter().any(begins) {
             return;
         }
         for k in 1..self.past.len().min(self.place.reads.len()) {
@@ -243,7 +346,9 @@ impl Step<'_> {
 
     /// Projects one field of one state.
     fn project(&mut self, k: usize, field: usize) {
-        let (scene, rows) = (self.scene, self.engaged.clone());
+        let (scene, mut rows) = (self.scene, self.engaged.clone());
+        rows.extend(&self.leaving);
+        rows.sort_unstable();
         let axes = self.axes_of(&rows);
         let (now, old) = (&self.past[0], &self.past[k]);
         let values = [&old.u, &old.v, &old.a][field];
@@ -259,6 +364,8 @@ impl Step<'_> {
                 None if field == 0 => dot(scene.axes()[axis], &old.u) - dot(scene.axes()[axis], &now.u),
                 None => dot(scene.axes()[axis], values),
             })
+            .zip(&axes)
+            .map(|(jump, &axis)| jump - self.outgoing(axis, field, k))
             .collect();
         let before = jumps.clone();
         // An impulse that presses moves past displacements back: the problem of these has the other sign.
@@ -268,7 +375,8 @@ impl Step<'_> {
         let contact = |&i: &usize| {
             let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
                 behind += 1;
-                let direction = self.contacts.slides[i].then(|| self.directions[i]);
+                let slides = self.contacts.slides[i] && !self.leaving.contains(&i);
+                let direction = slides.then(|| self.directions[i]);
                 Friction { row: behind - 1, coefficient: *coefficient, direction }
             });
             // (What sticks is held both ways, however it presses.)
@@ -298,7 +406,8 @@ impl Step<'_> {
             // What the state that the step starts from loses here no later stage sees any more.
             for (place, &i) in rows.iter().enumerate() {
                 let after = before[place] + dot(&w[place], &multipliers);
-                self.contacts.taken[i] -= multipliers[place] * 0.5 * (before[place] + after);
+                let mean = 0.5 * (before[place] + after) + self.outgoing(i, field, k);
+                self.contacts.taken[i] -= multipliers[place] * mean;
             }
         }
         let old = &mut self.past[k];

@@ -29,6 +29,8 @@ struct Form {
     compliance: f64,
     shift: f64,
     enabled: bool,
+    /// Of springs with dashpots.
+    line: [f64; 2],
 }
 
 impl Form {
@@ -37,7 +39,7 @@ impl Form {
         let by_z: Vec<f64> = row.iter().zip(&x.weight).map(|(g, w)| g * w).collect();
         let known = dot(row, &x.known) + own;
         let noise = 64.0 * f64::EPSILON * (size(row, &x.known) + own.abs());
-        Self { by_z, known, noise, compliance: 0.0, shift: 0.0, enabled: true }
+        Self { by_z, known, noise, compliance: 0.0, shift: 0.0, enabled: true, line: [0.0; 2] }
     }
 
     fn at(&self, z: &[f64]) -> f64 {
@@ -200,9 +202,12 @@ impl Stage<'_> {
             ContactLaw::Restitution { coefficient } => {
                 let mut form = Form { enabled: self.enables(i), ..rigid() };
                 form.known += self.hover(i);
-                let lead = self.place.stage.contact.lead();
-                let rate = scene.rate(i, start.t, &start.v) + lead * h * dot(&row.g, &start.a);
-                form.known += coefficient * h * rate;
+                // (Where gaps are constrained, corrections let contacts leave.)
+                if self.target.forecast.is_some() {
+                    let lead = self.place.stage.contact.lead();
+                    let rate = scene.rate(i, start.t, &start.v) + lead * h * dot(&row.g, &start.a);
+                    form.known += coefficient * h * rate;
+                }
                 form
             }
             ContactLaw::RateCondition | ContactLaw::PersistencySwitch => {
@@ -242,8 +247,44 @@ impl Stage<'_> {
             ContactLaw::Penalty { stiffness } | ContactLaw::AugmentedLagrangian { stiffness, .. } => {
                 Form { compliance: stiffness.recip(), ..spring() }
             }
+            ContactLaw::KelvinVoigt { .. } | ContactLaw::HuntCrossley { .. } => {
+                let gap = spring();
+                let rate = Form::new(&row.g, &self.balance[1], row.offset.at(self.t_balance)[1]);
+                self.damped(row.law, gap, rate)
+            }
             _ => spring(),
         }
+    }
+
+    /// What a spring with a dashpot constrains. Where the unknown moves its gap, the rate of approach is `touching` at
+    /// the gap zero, and grows by `slope` for a unit of depth.
+    fn damped(&self, law: ContactLaw, gap: Form, rate: Form) -> Form {
+        let [by_gap, by_rate] =
+            [&gap, &rate].map(|form| form.by_z.iter().copied().max_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(0.0));
+        if by_gap.abs() > 0.0 {
+            let slope = by_rate / by_gap;
+            return Form { line: [-(rate.known - slope * gap.known), slope], ..gap };
+        }
+        let (depth, h) = (-gap.known, self.scene.h);
+        let (at_rest, per_rate) = match law {
+            ContactLaw::KelvinVoigt { stiffness, damping } => (stiffness * depth, damping),
+            ContactLaw::HuntCrossley { stiffness, exponent, dissipation } => {
+                let spring = stiffness * depth.max(0.0).powf(exponent);
+                (spring, spring * dissipation)
+            }
+            _ => (0.0, 0.0),
+        };
+        if depth <= 0.0 {
+            return Form { enabled: false, ..gap };
+        }
+        if by_rate.abs() > 0.0 {
+            // λ = F − D ġ, with y = h ġ.
+            let by_z = rate.by_z.iter().map(|by| h * by).collect();
+            let (compliance, shift) = (h / per_rate, -h * at_rest / per_rate);
+            return Form { by_z, known: h * rate.known, noise: h * rate.noise, compliance, shift, ..rate };
+        }
+        // All is known.
+        Form { known: -(at_rest - per_rate * rate.known).max(0.0), compliance: 1.0, noise: 0.0, ..gap }
     }
 
     /// How far a contact whose velocity is constrained, if it is closed, may go on nevertheless.
@@ -288,9 +329,26 @@ impl Stage<'_> {
     fn multipliers(&self, mut forms: Vec<Form>, responses: &[Vec<f64>]) -> Vec<f64> {
         let laws: Vec<ContactLaw> = self.scene.rows.iter().map(|row| row.law).collect();
         let mut depth: Vec<f64> = forms.iter().map(|form| -form.at(&self.free)).collect();
-        let mut pass = 0;
+        let (mut pass, mut before) = (0, vec![0.0; laws.len()]);
         loop {
-            for ((form, law), depth) in forms.iter_mut().zip(&laws).zip(&depth) {
+            for (((form, law), depth), before) in forms.iter_mut().zip(&laws).zip(&depth).zip(&before) {
+                let [touching, slope] = form.line;
+                match *law {
+                    ContactLaw::KelvinVoigt { stiffness, damping } if slope > 0.0 => {
+                        // As it begins to press it takes any force up to that at the gap zero.
+                        let begins = touching > 0.0 && *before <= damping * touching;
+                        form.compliance = if begins { 0.0 } else { (stiffness + damping * slope).recip() };
+                        form.shift = -form.compliance * damping * touching;
+                    }
+                    ContactLaw::HuntCrossley { stiffness, exponent, dissipation } if slope > 0.0 => {
+                        let depth = depth.max(form.noise);
+                        let (spring, rate) = (stiffness * depth.powf(exponent), 1.0 + dissipation * (touching + slope * depth));
+                        let tangent = exponent * spring / depth * rate.max(0.0) + spring * dissipation * slope;
+                        form.compliance = tangent.recip();
+                        form.shift = depth - spring * rate / tangent;
+                    }
+                    _ => {}
+                }
                 if let ContactLaw::PowerLaw { stiffness, exponent } = *law {
                     // F = k δ^p about the depth δ.
                     let depth = depth.max(form.noise);
@@ -302,7 +360,13 @@ impl Stage<'_> {
             let mut again = false;
             for (i, law) in laws.iter().enumerate() {
                 match *law {
-                    ContactLaw::PowerLaw { .. } => {
+                    ContactLaw::KelvinVoigt { damping, .. } => {
+                        let least = damping * forms[i].line[0];
+                        again |= forms[i].line[1] > 0.0 && (raw[i] <= least) != (before[i] <= least) && pass < 60;
+                        before[i] = raw[i];
+                    }
+                    ContactLaw::HuntCrossley { .. } if forms[i].line[1] <= 0.0 => {}
+                    ContactLaw::PowerLaw { .. } | ContactLaw::HuntCrossley { .. } => {
                         let y = forms[i].at(&self.free)
                             + raw.iter().zip(responses).map(|(r, x)| r * dot(&forms[i].by_z, x)).sum::<f64>();
                         again |= (depth[i] + y).abs() > 1e-14 * y.abs() && pass < 60;

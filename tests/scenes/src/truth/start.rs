@@ -35,6 +35,12 @@ pub fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) -> (Vec<M
         let force = match row.law {
             ContactLaw::Penalty { stiffness } | ContactLaw::AugmentedLagrangian { stiffness, .. } => stiffness * depth,
             ContactLaw::PowerLaw { stiffness, exponent } => stiffness * depth.powf(exponent),
+            ContactLaw::KelvinVoigt { stiffness, damping } if depth > 0.0 => {
+                (stiffness * depth - damping * scene.rate(i, now.t, &now.v)).max(0.0)
+            }
+            ContactLaw::HuntCrossley { stiffness, exponent, dissipation } => {
+                stiffness * depth.powf(exponent) * (1.0 - dissipation * scene.rate(i, now.t, &now.v)).max(0.0)
+            }
             _ => 0.0,
         };
         (raw[i], closed[i]) = (force, force > 0.0);
