@@ -13,10 +13,10 @@ use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
-pub(super) use restitution::Rebounds;
 use crate::simulation::{MasslessBlock, Operator};
 use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Linearity, System};
+pub(super) use restitution::Rebounds;
 
 /// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
 ///

@@ -136,7 +136,8 @@ fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, 
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
         && constraints.may_press()
-        && (constraints.len() == 0 || constraints.laws().iter().any(|law| law.is_plain() || law.restitution().is_some()))
+        && (constraints.len() == 0
+            || constraints.laws().iter().any(|law| law.is_plain() || law.restitution().is_some()))
         && constraints.interface().iter().any(has_mass)
 }
 

@@ -190,7 +190,8 @@ impl<T: Real> StartProblem<T> {
         let aimed = |row: &usize| open[*row] && constraints.law(*row).needs_multiplier();
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
         // (A mean gap changes by half of the response.)
-        let compliance = |law: ContactLaw| T::of(2.0) * scale * law.linearized(-T::one(), T::zero(), T::zero(), Course::at_rest()).0;
+        let compliance =
+            |law: ContactLaw| T::of(2.0) * scale * law.linearized(-T::one(), T::zero(), T::zero(), Course::at_rest()).0;
         let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
         Ok(Self {
             rows,

@@ -4,6 +4,7 @@ use super::constraints::Constraints;
 use super::contact_step::ContactWork;
 use super::scheme::Scheme;
 use super::stability::{self, StepLimit};
+use crate::analysis;
 use crate::contact::ContactJacobian;
 use crate::contact_id::ContactId;
 use crate::corrector::Gaps;
@@ -44,6 +45,9 @@ const LEAP: f64 = 4.0;
 pub(super) struct Stiffening<T> {
     /// Ω up to which the scheme is stable without damping.
     critical: f64,
+    /// By how much a dashpot counts as a spring, times h: Ω² over the c h/m up to which the scheme is stable with forces
+    /// of the rate before. Found when one presses.
+    lag: Option<f64>,
     may_stiffen: bool,
     /// Rows that press by springs without coupling in the step, and their stiffness.
     springs: Vec<(usize, f64)>,
@@ -115,6 +119,12 @@ pub(super) struct Taken<'s, 'a, T: Real> {
     pub(super) new: &'s Motion<T>,
 }
 
+/// Ω² over c h/m of the largest stable steps of a spring alone and of a dashpot alone.
+fn lag(scheme: &Scheme<'_>, critical: f64) -> f64 {
+    let longest = analysis::critical_step(&scheme.tableau, 0.0, 1.0);
+    longest.map_or(0.0, |longest| critical * critical / longest)
+}
+
 impl<T: Real> Stiffening<T> {
     /// None for schemes that are stable whatever the frequency, and for systems that stay as they are.
     pub(super) fn of(system: &dyn System<T>, scheme: &Scheme<'_>, may_press: bool) -> Option<Self> {
@@ -127,6 +137,7 @@ impl<T: Real> Stiffening<T> {
         let (body, bodies) = bodies(system);
         Some(Self {
             critical,
+            lag: None,
             may_stiffen,
             springs: Vec::new(),
             body,
@@ -233,9 +244,10 @@ impl<T: Real> Stiffening<T> {
             let coupled = holds && !law.is_damped() || rows.on_massless.get(row).is_some_and(|on| *on);
             if law.is_spring() && !coupled && force > T::zero() {
                 let [stiffness, damping] = law.slopes(force.value(), (-rows.balance_gap[row]).value());
-                // A dashpot whose force is that of the rate before takes c h/2 from the mass: ω² h²/4 + ξ ω h < 1.
-                let lagged = if holds { 0.0 } else { 2.0 * damping / step.clock.h };
-                self.springs.push((row, stiffness + lagged));
+                // Both limits together: (Ω/Ω_c)² + (c h/m)/x_c < 1.
+                let lagged = damping > 0.0 && !holds;
+                let lag = lagged.then(|| *self.lag.get_or_insert_with(|| lag(step.scheme, self.critical)));
+                self.springs.push((row, stiffness + lag.unwrap_or(0.0) * damping / step.clock.h));
             }
         }
     }

@@ -403,10 +403,12 @@ fn schemes_take_the_laws_they_can_serve() {
         assert!(build(scheme(), penalty).is_ok(), "{}", listed.name());
         assert_eq!(build(scheme(), ContactLaw::Rigid).is_ok(), listed.takes_multipliers(), "{}", listed.name());
         assert_eq!(build(scheme(), plastic).is_ok(), listed.takes_multipliers(), "{}", listed.name());
-        let velocity = listed.takes_multipliers()
-            && matches!(scheme().tableau().stages[0].contact, contact_dynamics::tableau::ContactLevel::Velocity { .. });
+        // (On velocities by the law, on displacements of the state by the correction.)
+        let velocity =
+            matches!(scheme().tableau().stages[0].contact, contact_dynamics::tableau::ContactLevel::Velocity { .. });
+        let serves = listed.takes_multipliers() && (velocity || listed.takes_corrections());
         let built = build(scheme(), restitution);
-        assert_eq!(built.is_ok(), velocity, "{}", listed.name());
+        assert_eq!(built.is_ok(), serves, "{}", listed.name());
         if let Err(error) = built {
             assert!(matches!(error, Error::Incompatible { .. }), "{error}");
         }

@@ -87,7 +87,7 @@ fn relative(
     Some(seen)
 }
 
-fn laws() -> [ContactLaw; 9] {
+fn laws() -> [ContactLaw; 11] {
     let k = 1.5 * STIFFNESS;
     [
         ContactLaw::Rigid,
@@ -99,6 +99,8 @@ fn laws() -> [ContactLaw; 9] {
         ContactLaw::Bipenalty { stiffness: k, mass: 0.25 * k * H * H },
         ContactLaw::StabilizedBipenalty { stiffness: k },
         ContactLaw::AugmentedLagrangian { stiffness: k, augmentations: 2 },
+        ContactLaw::KelvinVoigt { stiffness: k, damping: 0.5 * k * H },
+        ContactLaw::HuntCrossley { stiffness: 10.0 * k, exponent: 1.5, dissipation: 0.2 },
     ]
 }
 

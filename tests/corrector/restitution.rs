@@ -108,16 +108,12 @@ fn impulses_are_the_change_of_momentum() {
 
 /// Equal balls in a row, the first one flies at the others.
 fn cradle(n: usize, gap: f64, e: &[f64], listed: &Listed) -> Vec<f64> {
-    let rows = (1..n).fold(LinearRows::new(), |rows, i| {
-        rows.row(restitution(e[i - 1]), &[(i - 1, -1.0), (i, 1.0)], gap)
-    });
+    let rows =
+        (1..n).fold(LinearRows::new(), |rows, i| rows.row(restitution(e[i - 1]), &[(i - 1, -1.0), (i, 1.0)], gap));
     let mut v = vec![0.0; n];
     v[0] = 1.0;
-    let mut run = Simulation::builder(free(&vec![1.0; n]), (listed.make)(), 1e-3)
-        .velocity(v)
-        .constraint(rows)
-        .build()
-        .unwrap();
+    let mut run =
+        Simulation::builder(free(&vec![1.0; n]), (listed.make)(), 1e-3).velocity(v).constraint(rows).build().unwrap();
     run.run_until(0.2, &mut ()).unwrap();
     let v = run.state().velocity().to_vec();
     assert!((v.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{}: {v:?}", listed.name());
@@ -255,8 +251,11 @@ fn no_impact_with_friction_adds_energy() {
 #[test]
 fn what_cannot_let_contacts_leave_is_refused() {
     let built = |scheme: Box<dyn TimeIntegrator>, correction: Option<PersistencyCorrection>| {
-        let builder = Simulation::builder(free(&[1.0]), scheme, 0.01)
-            .constraint(LinearRows::new().row(restitution(0.5), &[(0, 1.0)], 0.1));
+        let builder = Simulation::builder(free(&[1.0]), scheme, 0.01).constraint(LinearRows::new().row(
+            restitution(0.5),
+            &[(0, 1.0)],
+            0.1,
+        ));
         match correction {
             Some(correction) => builder.corrector(correction).build().map(|_| ()),
             None => builder.uncorrected().build().map(|_| ()),

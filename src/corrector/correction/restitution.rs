@@ -98,7 +98,9 @@ impl<T: Real> Correction<'_, T> {
             }
         }
         for &row in closed.iter() {
-            let (Some(e), [gap, acceleration]) = (constraints.0.law(row).restitution(), outgoing[row]) else { continue };
+            let (Some(e), [gap, acceleration]) = (constraints.0.law(row).restitution(), outgoing[row]) else {
+                continue;
+            };
             let square = before[row] * before[row] - T::of(2.0) * acceleration * gap;
             if square <= T::zero() || before[row] >= T::zero() && acceleration >= T::zero() {
                 continue;

@@ -259,8 +259,8 @@ impl Stage<'_> {
     /// What a spring with a dashpot constrains. Where the unknown moves its gap, the rate of approach is `touching` at
     /// the gap zero, and grows by `slope` for a unit of depth.
     fn damped(&self, law: ContactLaw, gap: Form, rate: Form) -> Form {
-        let [by_gap, by_rate] =
-            [&gap, &rate].map(|form| form.by_z.iter().copied().max_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(0.0));
+        let [by_gap, by_rate] = [&gap, &rate]
+            .map(|form| form.by_z.iter().copied().max_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(0.0));
         if by_gap.abs() > 0.0 {
             let slope = by_rate / by_gap;
             return Form { line: [-(rate.known - slope * gap.known), slope], ..gap };
@@ -342,7 +342,8 @@ impl Stage<'_> {
                     }
                     ContactLaw::HuntCrossley { stiffness, exponent, dissipation } if slope > 0.0 => {
                         let depth = depth.max(form.noise);
-                        let (spring, rate) = (stiffness * depth.powf(exponent), 1.0 + dissipation * (touching + slope * depth));
+                        let (spring, rate) =
+                            (stiffness * depth.powf(exponent), 1.0 + dissipation * (touching + slope * depth));
                         let tangent = exponent * spring / depth * rate.max(0.0) + spring * dissipation * slope;
                         form.compliance = tangent.recip();
                         form.shift = depth - spring * rate / tangent;
