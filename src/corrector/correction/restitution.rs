@@ -2,7 +2,7 @@
 
 use super::{Correction, Pressed};
 use crate::contact::{ContactJacobian, GapRates};
-use crate::corrector::{Buffers, rounding};
+use crate::corrector::{Buffers, rounding, share_of_rounding};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -72,13 +72,13 @@ impl<T: Real> Correction<'_, T> {
         }
         self.read_rates()?;
         let Self { buffers, constraints, g, past, new, was_closed, h, .. } = self;
-        let Buffers { rebounds, closed, gaps, rates, past_slips, .. } = &mut **buffers;
+        let Buffers { rebounds, closed, gaps, rates, .. } = &mut **buffers;
         let (Some(start), h) = (past.first(), T::of(*h)) else { return Ok(false) };
         let comes = |&row: &usize| !was_closed[row] || g.product(row, &start.v) + rates[row].rate < T::zero();
         if !closed.iter().any(|row| constraints.0.law(*row).rebounds() && comes(row)) {
             return Ok(false);
         }
-        let Rebounds { any, before, target, outgoing, share, .. } = &mut **rebounds;
+        let Rebounds { before, target, outgoing, share, .. } = &mut **rebounds;
         for values in [&mut *before, target] {
             values.clear();
             values.resize(g.rows(), T::zero());
@@ -97,23 +97,27 @@ impl<T: Real> Correction<'_, T> {
                 }
             }
         }
-        for &row in closed.iter() {
-            let (Some(e), [gap, acceleration]) = (constraints.0.law(row).restitution(), outgoing[row]) else {
-                continue;
-            };
-            let square = before[row] * before[row] - T::of(2.0) * acceleration * gap;
-            if square <= T::zero() || before[row] >= T::zero() && acceleration >= T::zero() {
+        for k in 0..self.buffers.closed.len() {
+            let row = self.buffers.closed[k];
+            let e = self.constraints.0.law(row).restitution().unwrap_or(0.0);
+            let (rate, [gap, acceleration]) = (self.buffers.rebounds.before[row], self.buffers.rebounds.outgoing[row]);
+            let square = rate * rate - T::of(2.0) * acceleration * gap;
+            if e == 0.0 || square <= T::zero() || rate >= T::zero() && acceleration >= T::zero() {
                 continue;
             }
             let approach = square.sqrt();
+            // What would be back within two steps, pulled by what its force balances too, stays: it would chatter.
+            let pulled = self.compliance(row)? * self.buffers.reported[row].max(T::zero()) - acceleration;
+            let least = (h * pulled).max(self.noise_of_rate(row, h));
+            let Rebounds { any, before, target, .. } = &mut *self.buffers.rebounds;
             before[row] = -approach;
-            let leaves = T::of(e) * approach;
-            // (What would be back within two steps stays: it would chatter.)
-            let noise = rounding(g.magnitude(row, &start.v) + g.magnitude(row, &start.u) / h);
-            if leaves > (-h * acceleration).max(noise) {
-                (target[row], *any) = (leaves, true);
+            if T::of(e) * approach > least {
+                (target[row], *any) = (T::of(e) * approach, true);
             }
         }
+        let Self { buffers, constraints, g, past, .. } = self;
+        let Buffers { rebounds, past_slips, .. } = &mut **buffers;
+        let (Some(start), Rebounds { any, before, .. }) = (past.first(), &mut **rebounds) else { return Ok(false) };
         let tangents = constraints.0.tangents();
         if *any && !tangents.is_empty() {
             past_slips.resize(past_slips.len().max(tangents.len()), GapRates::default());
@@ -124,6 +128,15 @@ impl<T: Real> Correction<'_, T> {
             }
         }
         Ok(rebounds.any)
+    }
+
+    /// What of a rate may be rounding (as in the jumps of a step).
+    fn noise_of_rate(&self, row: usize, h: T) -> T {
+        let Some(start) = self.past.first() else { return T::zero() };
+        let share = share_of_rounding::<T>();
+        let of_gap = self.constraints.0.gap_rounding(row, self.g.magnitude(row, &start.u), self.contacts.gap[row]);
+        let of_rates = self.g.magnitude(row, &start.v) + h * self.g.magnitude(row, &start.a);
+        share * of_rates + share / rounding(T::one()) * of_gap / h
     }
 
     /// Finds impulses with which the contacts of [`find_rebounds`](Self::find_rebounds) leave, and others stay or part:

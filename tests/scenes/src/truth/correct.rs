@@ -169,8 +169,12 @@ impl Step<'_> {
             let square = self.started[i].powi(2) - 2.0 * acceleration * gap;
             if e > 0.0 && square > 0.0 && (self.started[i] < 0.0 || acceleration < 0.0) {
                 self.started[i] = -square.sqrt();
-                let noise = 64.0 * f64::EPSILON * (size(&row.g, &start.v) + size(&row.g, &start.u) / h);
-                if e * square.sqrt() > noise.max(-h * acceleration) {
+                let share = f64::EPSILON.powf(2.0 / 3.0);
+                let gap_noise = scene.rounding(i, start.t, &start.u) / (64.0 * f64::EPSILON);
+                let noise = share * (size(&row.g, &start.v) + h * size(&row.g, &start.a) + gap_noise / h);
+                // What its force balances pulls it back too.
+                let pulled = self.s(i, i) * self.before.reported[i].max(0.0) - acceleration;
+                if e * square.sqrt() > noise.max(h * pulled) {
                     self.asked[i] = e * square.sqrt();
                 }
             }
