@@ -228,7 +228,7 @@ pub(crate) enum Measure {
     Undecided,
 }
 
-/// How the depth δ of a row, and its rate δ̇, depend on what the row constrains, y, in a stage: [value at y = 0, slope by
+/// How the depth δ of a row and its rate δ̇ depend on y, what the row constrains in a stage: [value at y = 0, slope by
 /// −y] of each. y is the gap, or h times its rate where the unknown moves the rate alone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Course<T> {

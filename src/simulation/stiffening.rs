@@ -45,8 +45,8 @@ const LEAP: f64 = 4.0;
 pub(super) struct Stiffening<T> {
     /// Ω up to which the scheme is stable without damping.
     critical: f64,
-    /// By how much a dashpot counts as a spring, times h: Ω² over the c h/m up to which the scheme is stable with forces
-    /// of the rate before. Found when one presses.
+    /// The stiffness for which a dashpot counts, times h/c: Ω² over the c h/m up to which the scheme is stable with
+    /// forces of the rate before. Found when one presses.
     lag: Option<f64>,
     may_stiffen: bool,
     /// Rows that press by springs without coupling in the step, and their stiffness.
