@@ -1,10 +1,9 @@
 //! The end of the contact of a stage: which contacts are closed, which have opened, and their forces and impulses.
 
-use super::constraints::Constraints;
 use super::contact_rows::{Level, Part};
 use super::contact_step::{ContactStep, ContactWork};
-use crate::contact::{ContactJacobian, ContactLaw, GapRates};
-use crate::corrector::{Buffers, Gaps, rounding, slides};
+use crate::contact::ContactLaw;
+use crate::corrector::{Buffers, Gaps};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
@@ -23,7 +22,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     /// impulse.
     pub(super) fn close(
         &mut self,
-        new: &Motion<T>,
+        (new, past): (&Motion<T>, &[Motion<T>]),
         booking: &Booking,
         massless: &[usize],
         buffers: &mut Buffers<T>,
@@ -46,7 +45,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
         if rows.curved.apart {
             // Multipliers along the rows of the balance: from here on all is along those of the state.
-            constraints.tangents().turn([&rows.curved.rows, g], &mut trial.lambda_raw);
+            let tangents = constraints.tangents();
+            tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
         }
         rows.measure(stage, clock.h, constraints, g, new, None)?;
         if self.part != Part::All && level.target.is_some() {
@@ -109,44 +109,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 trial.impulse[row] += impulse_weight * raw;
             }
         }
-        if !constraints.tangents().is_empty() {
-            rows.slips.resize(rows.slips.len().max(constraints.tangents().len()), GapRates::default());
-            constraints.finite_slip_rates(new.t, &new.u, &new.v, &mut rows.slips)?;
-        }
-        for row in constraints.tangents().contacts() {
-            for row in constraints.tangents().of(row) {
-                trial.impulse[row] += impulse_weight * trial.lambda_raw[row];
-            }
-            let (mut slip, mut noise) = (T::zero(), T::zero());
-            for row in constraints.tangents().of(row) {
-                let own = rows.slips[row - constraints.tangents().all().start].rate;
-                slip = slip.hypot(g.product(row, &new.v) + own);
-                // (A velocity that has vanished has the rounding of what it is the sum of.)
-                let size = g.magnitude(row, &new.v) + T::of(clock.h) * g.magnitude(row, &new.a) + own.abs();
-                noise = noise.max(rounding(size));
-            }
-            let bound = T::of(constraints.tangents().friction(row)) * trial.lambda_raw[row];
-            trial.sliding[row] = slides(trial.tangential(row, &trial.lambda_raw), bound) && slip > noise;
+        for row in constraints.tangents().all() {
+            trial.impulse[row] += impulse_weight * trial.lambda_raw[row];
         }
         impulses.note(trial);
-        Ok(())
+        self.note_slips(new, past, contact)
     }
-}
-
-/// Notes with which velocities the bodies slide on each other at the end of a step.
-pub(super) fn note_slips<T: Real>(
-    constraints: &mut Constraints<'_, T>,
-    g: &ContactJacobian<T>,
-    new: &Motion<T>,
-    contact: &mut ContactWork<T>,
-) -> Result<()> {
-    if constraints.tangents().is_empty() {
-        return Ok(());
-    }
-    let ContactWork { trial, rows, .. } = contact;
-    constraints.finite_slip_rates(new.t, &new.u, &new.v, &mut rows.slips)?;
-    for ((row, slip), own) in constraints.tangents().all().zip(&mut trial.slip).zip(&rows.slips) {
-        *slip = g.product(row, &new.v) + own.rate;
-    }
-    Ok(())
 }

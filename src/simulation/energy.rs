@@ -188,7 +188,8 @@ impl<T: Real> Ledger<T> {
         self.next_damped.fill(T::zero());
         let mut stored = T::zero();
         self.forces.clone_from(&books.contacts.lambda);
-        books.contacts.tangents.turn([books.g, books.forces], &mut self.forces);
+        let tangents = &books.contacts.tangents;
+        tangents.turn([books.g, books.forces], &mut self.forces[tangents.all()]);
         for (row, &force) in self.forces.iter().enumerate() {
             let forces = if books.forces.is_tangential(row) {
                 &mut self.next_friction

@@ -5,14 +5,15 @@
 //! do not contain the unknown, dofs have no mass, or corrections take contact forces out of the accelerations, it is
 //! the way made in the stage. It is measured along the rows along which friction acts.
 
+use super::constraints::Constraints;
 use super::contact_rows::{ContactRowsWork, Part};
 use super::contact_step::{ContactStep, ContactWork};
-use super::program::CompiledStage;
+use super::program::{CompiledStage, ContactTarget};
 use crate::contact::{ContactJacobian, GapRates, Tangents};
-use crate::corrector::rounding;
+use crate::corrector::{rounding, slides};
 use crate::error::Result;
 use crate::real::Real;
-use crate::state::Motion;
+use crate::state::{Clock, Motion};
 
 /// What the slip of a stage is taken from.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +50,16 @@ fn is_static<T: Real>(
     match part {
         Part::All => tangents.act_on(g, row, massless),
         Part::Massless | Part::Massive => tangents.rub_on(g, row, massless),
+    }
+}
+
+/// When an obstacle has the velocity that a slip is measured against: with that of the state, at the target, or in the
+/// middle of the way to it. The state is that of t.
+fn time_of_slip<T: Real>(stage: &CompiledStage<T>, clock: Clock, t: f64) -> f64 {
+    match &stage.contact {
+        None => t,
+        Some(target) if target.forecast.is_some() => clock.at(target.at),
+        Some(target) => 0.5 * (clock.at(target.at) + t),
     }
 }
 
@@ -97,15 +108,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if slips.len() < constraints.tangents().len() {
             slips.resize(constraints.tangents().len(), GapRates::default());
         }
-        let target_time = stage.contact.as_ref().map(|target| clock.at(target.at));
         let h = T::of(clock.h);
-        // The motion of the obstacle in the middle of the way.
-        let t = match target_time {
-            Some(t) if stage.contact.as_ref().is_some_and(|target| target.forecast.is_some()) => t,
-            Some(t) => 0.5 * (t + new.t),
-            None => new.t,
-        };
-        constraints.finite_slip_rates(t, &new.u, &new.v, slips)?;
+        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, slips)?;
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
             let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
@@ -156,4 +160,84 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         Ok(())
     }
+
+    /// Notes which contacts slide in a finished stage, and the slips (length/time) that say so: where contact is imposed
+    /// ahead of the state, and of dofs without mass, those of the way.
+    pub(super) fn note_slips(
+        &mut self,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, part, .. } = self;
+        let ContactWork { trial, rows, .. } = contact;
+        let ContactRowsWork { slips, curved, target, massless, .. } = rows;
+        if constraints.tangents().is_empty() {
+            return Ok(());
+        }
+        slips.resize(slips.len().max(constraints.tangents().len()), GapRates::default());
+        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, slips)?;
+        let (forces, tangents) = (curved.forces(g), constraints.tangents());
+        let (h, first) = (T::of(clock.h), tangents.all().start);
+        for row in tangents.contacts() {
+            // From where to where, and the time that takes; a target at velocity level is h times a velocity.
+            let start = past.first().filter(|_| is_static(*part, (tangents, g), massless, row));
+            let (ends, time) = match (start, &stage.contact) {
+                (Some(start), _) => ([Some(&start.u), Some(&new.u)], T::of(stage.end - stage.start) * h),
+                (None, None) => ([None, None], T::one()),
+                (None, Some(ahead)) if ahead.forecast.is_some() => ([None, Some(&*target)], h),
+                (None, Some(ahead)) => ([Some(&new.u), Some(&*target)], T::of(ahead.at - stage.end) * h),
+            };
+            let (mut length, mut noise) = (T::zero(), T::zero());
+            for k in tangents.of(row) {
+                let at = |end: Option<&Vec<T>>, dof: usize| end.map_or(T::zero(), |end| end[dof]);
+                let way = |(dof, weight): (usize, T)| weight * (at(ends[1], dof) - at(ends[0], dof));
+                let (slip, size) = match ends {
+                    // (A velocity that has vanished has the rounding of what it is the sum of.)
+                    [None, None] => {
+                        (forces.product(k, &new.v), forces.magnitude(k, &new.v) + h * forces.magnitude(k, &new.a))
+                    }
+                    _ => {
+                        let size = ends.into_iter().flatten().map(|end| forces.magnitude(k, end)).sum::<T>();
+                        (forces.row(k).map(way).sum::<T>() / time, size / time)
+                    }
+                };
+                let own = slips[k - first].rate;
+                trial.slip[k - first] = slip + own;
+                (length, noise) = (length.hypot(slip + own), noise.max(rounding(size + own.abs())));
+            }
+            let bound = T::of(tangents.friction(row)) * trial.lambda_raw[row];
+            trial.sliding[row] = slides(trial.tangential(row, &trial.lambda_raw), bound) && length > noise;
+        }
+        tangents.turn([forces, &**g], &mut trial.slip);
+        Ok(())
+    }
+}
+
+/// Notes the slips of the velocities of a state after corrections. Those of a stage that imposes contact `ahead` of its
+/// state, and of dofs without mass, are means over what was before and comes after: where a contact stops sliding, or
+/// turns back, they stay those of the way, to which its friction belongs.
+pub(super) fn note_slips_of_state<T: Real>(
+    (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
+    new: &Motion<T>,
+    ahead: Option<&ContactTarget<T>>,
+    contact: &mut ContactWork<T>,
+) -> Result<()> {
+    if constraints.tangents().is_empty() {
+        return Ok(());
+    }
+    let ContactWork { trial, rows, .. } = contact;
+    let ContactRowsWork { slips, massless, .. } = rows;
+    constraints.finite_slip_rates(new.t, &new.u, &new.v, slips)?;
+    let tangents = constraints.tangents();
+    let first = tangents.all().start;
+    for row in tangents.contacts() {
+        let slip = |k: usize| g.product(k, &new.v) + slips[k - first].rate;
+        let along = tangents.of(row).map(|k| trial.lambda[k] * slip(k)).sum::<T>();
+        let is_mean = ahead.is_some() || tangents.act_on(g, row, massless);
+        if !is_mean || trial.sliding[row] && along <= T::zero() {
+            tangents.of(row).for_each(|k| trial.slip[k - first] = slip(k));
+        }
+    }
+    Ok(())
 }

@@ -1,6 +1,6 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything as it was.
 
-use super::closing::{Booking, note_slips};
+use super::closing::Booking;
 use super::constraints::Constraints;
 use super::contact_rows::Part;
 use super::contact_step::{ContactStep, ContactWork};
@@ -11,6 +11,7 @@ use super::jumps::{jumps, note_exerting};
 use super::massless_step::difference;
 use super::program::CompiledStage;
 use super::run::Simulation;
+use super::slip::note_slips_of_state;
 use super::stage::StageSolve;
 use super::stage_vectors::predict;
 use super::stiffening::Taken;
@@ -102,9 +103,10 @@ impl<T: Real> Simulation<'_, T> {
     /// steps, gap rates are compared with the gaps.
     fn inspect(&mut self) -> Result<()> {
         const EVERY: u64 = 64;
-        let Self { constraints, g, history, work, .. } = self;
+        let Self { constraints, g, history, work, program, startup, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
-        note_slips(constraints, g, new, &mut work.contact)?;
+        let ahead = startup.as_ref().unwrap_or(program).stages.last().and_then(|stage| stage.contact.as_ref());
+        note_slips_of_state((constraints, g), new, ahead, &mut work.contact)?;
         // (Where correctors have edited the start of the step, it is the edited one.)
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
@@ -262,7 +264,13 @@ impl<T: Real> Simulation<'_, T> {
                     is_first,
                     is_last: stages_before + 1 == program.stages.len(),
                 };
-                contact.close(new, &booking, &work.massless, &mut work.correction.buffers, &mut work.contact)?;
+                contact.close(
+                    (new, past),
+                    &booking,
+                    &work.massless,
+                    &mut work.correction.buffers,
+                    &mut work.contact,
+                )?;
                 if let Some(excess) = &work.excess {
                     excess.book(stage, clock.h, &work.correction.buffers.switching, &mut work.contact.trial);
                 }

@@ -217,8 +217,13 @@ impl<T: Real> ContactState<T> {
         &self.impulse[self.tangents.of(contact)]
     }
 
-    /// Velocities along the tangents with which the bodies slide on each other at the instant of the state, after
-    /// correction (length/time). Nothing for contacts without friction.
+    /// Velocities along the tangents with which the bodies slide on each other (length/time): those to which
+    /// [`friction_forces`](Self::friction_forces) and [`status`](Self::status) belong. They are zero but for rounding
+    /// where a contact sticks, and against friction where it slides. Nothing for contacts without friction.
+    ///
+    /// They are those of the velocity of the state, after correction. Explicit schemes and dofs without mass have
+    /// velocities that are means over what was before and comes after: in the step in which such a contact stops, or
+    /// turns back, its slip is that of the way to which its force leads.
     pub fn slip(&self, contact: usize) -> &[T] {
         let (rows, gaps) = (self.tangents.of(contact), self.ids.len());
         // (Contacts without friction have an empty range anywhere.)

@@ -6,6 +6,7 @@ mod generalized;
 mod incline;
 mod laws;
 mod paths;
+mod published;
 mod random;
 mod refused;
 mod resumed;
