@@ -413,6 +413,21 @@ pub enum Error {
         /// The gap at both.
         gap: [f64; 2],
     },
+    /// The row of a contact is not the derivative of its gap, and its constraint says that rows do not change.
+    #[error(
+        "contact {contact}: between t = {:e} and {:e} displacements change its gap by {:e}, along its row of G by {:e}, \
+         and its constraint says that rows do not change; return `Candidates::Changed` from `search` and `follow` when \
+         they do, and check them with `verify::gap_jacobian`",
+        .t[0], .t[1], .change[0], .change[1]
+    )]
+    SilentTurn {
+        /// The contact.
+        contact: ContactId,
+        /// The step.
+        t: [f64; 2],
+        /// The change of its gap in the step, with obstacles held, and that along its row.
+        change: [f64; 2],
+    },
     /// The contact problem of a frame between two bodies was not solved.
     #[error("contact on the frame: {failure}; rows are nodes of the frame")]
     Frame {

@@ -15,6 +15,8 @@ pub(super) struct Part<'a, T: Real> {
     pub(super) place: (f64, Vec<T>),
     /// Whether its rows may have changed since they were read.
     pub(super) stale: bool,
+    /// The version of the rows of all constraints with which its own were read.
+    pub(super) version: u64,
     /// What it has said of its rates, once it was asked; forgotten when its rows change.
     pub(super) rates: Option<Rates>,
     /// The same of the rates of slip.

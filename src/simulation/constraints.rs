@@ -114,6 +114,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 dofs: list,
                 contacts,
                 stale: true,
+                version: 0,
                 rates: None,
                 slip_rates: None,
             });
@@ -275,6 +276,11 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.version
     }
 
+    /// Whether the constraint of a row has left its rows as they were since a version.
+    pub(crate) fn is_unchanged(&self, row: usize, since: u64) -> bool {
+        self.parts[self.ids[row].constraint].version <= since
+    }
+
     /// The names of all rows, and which version of them these are.
     pub(crate) fn named(&self) -> (&[ContactId], Names) {
         (&self.ids, self.names)
@@ -303,6 +309,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 (part.rates, part.slip_rates) = (None, None);
                 contacts.clear();
                 part.constraint.contacts(contacts);
+                part.version = self.version + 1;
             }
             for row in 0..contacts.len() {
                 let (feature, candidate) = contacts.name(row);

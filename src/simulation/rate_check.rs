@@ -1,4 +1,5 @@
-//! A comparison of gap rates with gaps: a constraint that moves must give rates that are not zero.
+//! A comparison of gap rates and rows with gaps: a constraint that moves must give rates that are not zero, and one
+//! whose gaps turn must say that its rows change.
 
 use super::constraints::Constraints;
 use crate::contact::{ContactJacobian, GapRates};
@@ -15,12 +16,14 @@ pub(super) struct RateCheck<T> {
     rates: Vec<GapRates<T>>,
     /// Whether the gap has changed at every time so far with zero rates.
     silent: Vec<bool>,
+    /// The version of the rows before the search of the step.
+    pub(super) version: u64,
 }
 
 impl<T: Real> RateCheck<T> {
     /// Memory for `rows` rows.
     pub(super) fn new(rows: usize) -> Self {
-        let mut check = Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new() };
+        let mut check = Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new(), version: 0 };
         check.make_room(rows);
         check
     }
@@ -45,7 +48,7 @@ impl<T: Real> RateCheck<T> {
         /// Times, in shares of h, so uneven that an oscillation does not have the same gap at all of them.
         const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
         let count = constraints.len();
-        let Self { before, now, rates, silent } = self;
+        let Self { before, now, rates, silent, .. } = self;
         for (row, silent) in silent[..count].iter_mut().enumerate() {
             // The force of a spring does not depend on rates.
             *silent = constraints.law(row).reads_rates();
@@ -81,5 +84,42 @@ impl<T: Real> RateCheck<T> {
                 gap: [first.value(), last.value()],
             }),
         }
+    }
+
+    /// Refuses rows of constraints that have said in this step that their rows do not change, along which gaps change
+    /// by something else than the rows between the displacements of the step.
+    pub(super) fn check_rows(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        [start, new]: [&Motion<T>; 2],
+        jacobian: &ContactJacobian<T>,
+    ) -> Result<()> {
+        /// The share of the way that a row may miss: hosts may leave out turns that do not matter.
+        const SHARE: f64 = 0.01;
+        let count = constraints.len();
+        if !(0..count).any(|row| constraints.is_unchanged(row, self.version)) {
+            return Ok(());
+        }
+        let Self { before, now, .. } = self;
+        constraints.finite_gaps(new.t, &start.u, before)?;
+        constraints.finite_gaps(new.t, &new.u, now)?;
+        for row in (0..count).filter(|&row| constraints.is_unchanged(row, self.version)) {
+            let (mut by_row, mut way, mut size) = (T::zero(), T::zero(), T::zero());
+            for (dof, weight) in jacobian.row(row) {
+                let moved = new.u[dof] - start.u[dof];
+                by_row += weight * moved;
+                (way, size) = (way.max((weight * moved).abs()), size + (weight * start.u[dof]).abs());
+            }
+            let change = now[row] - before[row];
+            let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &new.u) + size, now[row]);
+            if (change - by_row).abs() > T::of(SHARE) * way.max(change.abs()) + T::of(4.0) * rounded {
+                return Err(Error::SilentTurn {
+                    contact: constraints.ids[row],
+                    t: [start.t, new.t],
+                    change: [change.value(), by_row.value()],
+                });
+            }
+        }
+        Ok(())
     }
 }

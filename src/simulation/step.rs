@@ -38,6 +38,7 @@ impl<T: Real> Simulation<'_, T> {
     fn attempt_together(&mut self) -> Result<Verdict> {
         let Self { constraints, g, state, history, work, ledger, scheme, contact_solver, .. } = self;
         history.clock.check()?;
+        work.rate_check.version = constraints.version();
         constraints.search_for_step(&state.motion, extent(scheme.ahead(), history), g)?;
         if constraints.room() > work.rows {
             work.make_room(constraints.room(), g.entries());
@@ -112,6 +113,7 @@ impl<T: Real> Simulation<'_, T> {
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
         if history.clock.steps % EVERY == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
             work.rate_check.check(constraints, start, history.clock.h, g)?;
+            work.rate_check.check_rows(constraints, [start, new], g)?;
         }
         constraints.inspect([start, new], closed)
     }

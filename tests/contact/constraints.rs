@@ -10,6 +10,7 @@ use contact_dynamics::{
     CentralDifference, Composite, ContactStatus, Error, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
     Result, Simulation, StepControl, TimeIntegrator,
 };
+use contact_dynamics_scenes::schemes;
 
 /// Free masses.
 fn free(count: usize) -> LinearSystem<'static, f64> {
@@ -210,6 +211,48 @@ fn a_wall_that_moves_needs_no_rates() {
         Simulation::builder(free(1), Composite, 0.01).velocity(vec![1.0]).constraint(Silent(wall(0))).build().unwrap();
     run.run_until(1.0, &mut ()).unwrap();
     assert!((run.state().velocity()[0] + 0.5).abs() < 1e-9, "{:?}", run.state());
+}
+
+/// The inside of a bowl y = x², whose row follows the particle on it; whether it says so is another matter.
+struct Bowl {
+    x: f64,
+    says: Candidates,
+}
+
+impl ContactConstraint<f64> for Bowl {
+    fn dofs(&self) -> &[usize] {
+        &[0, 1]
+    }
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        contacts.push((0, 0), ContactLaw::Rigid, &[(0, -2.0 * self.x), (1, 1.0)]);
+    }
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = u[1] - u[0] * u[0];
+        Ok(())
+    }
+    fn follow(&mut self, _: f64, u: &[f64]) -> Result<Candidates> {
+        self.x = u[0];
+        Ok(self.says)
+    }
+}
+
+/// Rows that turn although their constraint says that they do not are found out, where a contact closes or within 64
+/// steps, before the run goes astray.
+#[test]
+fn rows_that_turn_in_silence_are_refused() {
+    for listed in schemes::all() {
+        let runs = [Candidates::Changed, Candidates::Unchanged].map(|says| {
+            let mut run = Simulation::builder(free(2), (listed.make)(), 0.01)
+                .velocity(vec![1.0, 0.0])
+                .constraint(Bowl { x: 0.0, says })
+                .build()?;
+            run.run_until(1.0, &mut ())?;
+            Ok::<_, Error>(run.state().velocity().to_vec())
+        });
+        let [honest, silent] = runs;
+        let refused = matches!(silent, Err(Error::SilentTurn { change: [by_gap, by_row], .. }) if by_gap != by_row);
+        assert!(honest.is_ok() && refused, "{}: {honest:?} {silent:?}", listed.name());
+    }
 }
 
 /// A floor that says that it never changes, and writes down what it is asked besides gaps.
