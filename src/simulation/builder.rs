@@ -355,7 +355,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Continues from the state and history of another run of the same system, scheme and step size, bit for bit.
+    /// Continues from the state and history of another run of the same system, scheme and
+    /// [step size](History::step_size), bit for bit. A run without [step control](Self::step_control) goes on with that
+    /// size at once, also where the other one had halved it.
     /// Initial values and start time given elsewhere are ignored. (What was saved to a file goes through
     /// `resume_from`, with the feature `serde`.)
     #[must_use]
@@ -401,7 +403,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 
         let massless = massless_dofs(&*system, together)?;
         let follows = check_massless(&scheme, massless.first())?;
-        let fits = |resumed: Resumed<T>| resumed.checked(&scheme, (self.control, h), [dofs, massless.len()]);
+        let fits = |resumed: Resumed<T>| resumed.checked(&scheme, h, [dofs, massless.len()]);
         let resumed = self.resumed.map(fits).transpose()?;
         let (begin, broken) = if let Some((state, _)) = &resumed {
             ((state.motion.t, &state.motion.u[..], &state.motion.v[..]), &state.broken[..])
@@ -485,7 +487,12 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             adjustment,
             poisoned: false,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
-        })
+        };
+        // (A run that controlled its step size may have left off between two steps of this one.)
+        if run.judge.is_none() {
+            run.set_step_size(run.history.step_size())?;
+        }
+        Ok(run)
     }
 }
 

@@ -16,9 +16,9 @@ impl<T: Real> Simulation<'_, T> {
 }
 
 impl<T: Real> SimulationBuilder<'_, T> {
-    /// Continues from a checkpoint of a run of the same system, scheme and step size (the nominal one under
-    /// [`step_control`](Self::step_control)), bit for bit. Initial values and start time given elsewhere are ignored.
-    /// With the feature `serde`.
+    /// Continues from a checkpoint of a run of the same system, scheme and
+    /// [step size](crate::History::step_size), bit for bit, as [`resume`](Self::resume) does. Initial values and start
+    /// time given elsewhere are ignored. With the feature `serde`.
     ///
     /// A checkpoint that does not fit is refused by [`build`](Self::build): [`Error::Dimension`] for another number of
     /// dofs, [`Error::Incompatible`] for another scheme, or one with other rows under the same name,

@@ -1,6 +1,5 @@
 //! What a run continues from: refused if another run has left it.
 
-use super::judge::StepControl;
 #[cfg(feature = "serde")]
 use super::resample::trail_length;
 use super::scheme::Scheme;
@@ -42,12 +41,11 @@ impl<T: Real> Resumed<T> {
         self.history.clock
     }
 
-    /// State and history, if a run of this size, scheme and step size may have left them. A run that controls its step
-    /// size may have left them with another one than that given, which is the nominal one.
+    /// State and history, if a run of this size, scheme and nominal step size may have left them.
     pub(super) fn checked(
         self,
         scheme: &Scheme<'_>,
-        (control, h): (Option<StepControl>, f64),
+        h: f64,
         [dofs, massless]: [usize; 2],
     ) -> Result<(State<T>, History<T>)> {
         let (state, history) = (self.state, self.history);
@@ -66,10 +64,7 @@ impl<T: Real> Resumed<T> {
             let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
             return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
         }
-        let own = match control {
-            Some(_) => history.pace.nominal,
-            None => history.clock.h,
-        };
+        let own = history.step_size();
         if own.to_bits() != h.to_bits() {
             return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
         }

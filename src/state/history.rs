@@ -96,9 +96,11 @@ impl<T: Real> Trail<T> {
 }
 
 impl<T: Real> History<T> {
-    /// Step size with which the states were spaced.
+    /// Step size of the run, with which one is built that goes on from here. Under
+    /// [`StepControl`](crate::StepControl) it is the nominal one, and the next step
+    /// ([`Simulation::step_size`](crate::Simulation::step_size)) may be a half of it, a quarter and so on.
     pub fn step_size(&self) -> f64 {
-        self.clock.h
+        self.pace.nominal
     }
 
     /// Number of past states known, the current one not counted.

@@ -257,14 +257,22 @@ fn a_controlled_run_is_continued_bit_for_bit() {
         assert!(run.step_size() < H);
         let bars = Bars::paper(10).delayed(0.4, H);
         let shared = Arc::new(Mutex::new(rule));
-        let system = host(bars.system(), run.time(), shared);
-        let mut resumed = Simulation::builder(system, make(), H)
-            .constraint(bars.contact())
-            .corrector(PersistencyCorrection::with_history_projection())
-            .step_control(control)
-            .resume(run.state().clone(), run.history().clone())
-            .build()
-            .unwrap();
+        let resumed = |h| {
+            let system = host(bars.system(), run.time(), Arc::clone(&shared));
+            Simulation::builder(system, make(), h)
+                .constraint(bars.contact())
+                .corrector(PersistencyCorrection::with_history_projection())
+                .resume(run.state().clone(), run.history().clone())
+        };
+        // The history says which step size it is continued with, whatever that of the next step is.
+        let h = run.history().step_size();
+        assert_eq!(h.to_bits(), H.to_bits());
+        let refused = resumed(run.step_size()).step_control(control).build();
+        assert!(matches!(refused, Err(Error::Parameter { value, .. }) if value == h));
+        // Without control that is the size of every step.
+        let uncontrolled = resumed(h).build().unwrap();
+        assert_eq!([uncontrolled.step_size(), uncontrolled.history().step_size()].map(f64::to_bits), [h.to_bits(); 2]);
+        let mut resumed = resumed(h).step_control(control).build().unwrap();
         for _ in 0..200 {
             run.step().unwrap();
             resumed.step().unwrap();

@@ -73,7 +73,7 @@ impl<'s, const D: usize> Watch<'s, D> {
         let size = places.fold(0.0_f64, |most, (x, u)| most.max(x.abs()).max(u.abs()));
         // What rounding of the gaps, in which contact problems are accepted, makes of forces: m/h² of it.
         let heaviest = self.mass.iter().fold(0.0_f64, |most, m| most.max(*m));
-        let noise = 16.0 * f64::EPSILON * size * heaviest / run.history().step_size().powi(2);
+        let noise = 16.0 * f64::EPSILON * size * heaviest / run.step_size().powi(2);
         for (row, force) in forces.iter().enumerate() {
             let rubs = contacts.friction_forces(row).iter().fold(0.0_f64, |size, f| size.hypot(*f));
             let bound = self.friction * force.max(0.0) * (1.0 + 1e-9) + 1e-9 * self.force + noise;

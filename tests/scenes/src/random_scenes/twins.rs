@@ -246,7 +246,7 @@ fn close<T: Real>(recipe: &Recipe, first: &[Trace], verdict: &mut Verdict) -> Op
     let mut shortest = f64::INFINITY;
     for (step, trace) in first.iter().enumerate() {
         // (Control has chosen the size of the next step when this one is over.)
-        let (start, mut h) = (run.run.time(), run.run.history().step_size());
+        let (start, mut h) = (run.run.time(), run.run.step_size());
         if step > 0 {
             // (What is refused by one of them is at the edge of being refused.)
             if run.advance().and(one.advance()).and(two.advance()).is_err() {

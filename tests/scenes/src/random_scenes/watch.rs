@@ -92,8 +92,8 @@ impl<'a> Watch<'a> {
         if !total.is_finite() && !overflows {
             return find("not finite", format!("energy {total}"));
         }
-        self.see(state, run.run.history().step_size());
-        let finding = self.complementarity(state, run.run.history().step_size(), step).or_else(|| self.cone(run, step));
+        self.see(state, run.run.step_size());
+        let finding = self.complementarity(state, run.run.step_size(), step).or_else(|| self.cone(run, step));
         if finding.is_some() {
             return finding;
         }
@@ -186,7 +186,7 @@ impl<'a> Watch<'a> {
         let u = run.run.state().displacement();
         let size = u.iter().fold(0.0_f64, |most, u| most.max(u.value().abs()));
         let heaviest = self.recipe.mass.iter().fold(0.0_f64, |most, m| most.max(*m)) * self.recipe.units[1];
-        let h = run.run.history().step_size();
+        let h = run.run.step_size();
         let eps = T::epsilon().value();
         let [_, mass, time] = self.recipe.units;
         let entries = self.recipe.elements.iter().flat_map(|element| &element.stiffness);
