@@ -22,7 +22,8 @@ pub enum Parts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum HistoryProjection {
-    /// The past keeps the approach.
+    /// What was before the step keeps the approach. (The states between the stages of a step are corrected as any
+    /// state.)
     #[default]
     Off,
     /// Gap, gap rate and gap acceleration of the past states that later steps read are projected to zero.
@@ -72,7 +73,9 @@ pub struct PersistencyCorrection {
 }
 
 impl PersistencyCorrection {
-    /// Velocity and acceleration, as in the paper.
+    /// Velocity and acceleration, as in the paper. Of a scheme with several stages the state of each is corrected, also
+    /// those between two steps, which the later stages of the same step read as their past. What was before the step
+    /// stays as it is.
     pub const fn new() -> Self {
         Self { parts: Parts::Both, history: HistoryProjection::Off }
     }

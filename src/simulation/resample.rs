@@ -42,8 +42,11 @@ impl<T: Real> Simulation<'_, T> {
     /// scheme's momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that
     /// goes back and forth by such factors all the time is of order 1.
     ///
-    /// Total momentum is conserved; the impulse of one contact agrees with the change of a body's momentum across a
-    /// change of h only to the order of the scheme.
+    /// The velocities of the state stay as they are. [`momentum`](Self::momentum), in which schemes may look a part p of
+    /// the step ahead, becomes that of the new step: under a force F, for instance of a contact that presses, it changes
+    /// by p (h' − h) F, which no impulse accounts for (central differences: half of it, p = ½). Without force it is
+    /// conserved. The impulse of one contact agrees with the change of a body's momentum across a change of h only to
+    /// the order of the scheme.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

@@ -150,7 +150,12 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme
-    /// conserves.
+    /// conserves: its change over a step is the sum of the impulses, to rounding.
+    ///
+    /// That is the momentum of the velocities v + p h a, up to O(h²), with a p of the scheme: 0 for the trapezoidal rule,
+    /// ½ for central differences, whose conserved velocities live half a step ahead. Where a force F acts, that of a
+    /// contact too, the value therefore depends on h: [`set_step_size`](Self::set_step_size) from h to h' changes it by
+    /// p (h' − h) F, and the state not at all.
     ///
     /// # Errors
     ///
@@ -201,6 +206,9 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Kinetic and elastic energy of the state, and the balance if the builder asked for it.
+    ///
+    /// Takes `&mut self`, as [`reactions`](Self::reactions) does, because the host evaluates its energy and its forces
+    /// with memory of its own ([`System::potential_energy`], [`System::force`]). Nothing of the run changes.
     pub fn energy(&mut self) -> Energy<T> {
         energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_ref())
     }
