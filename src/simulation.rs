@@ -23,6 +23,7 @@ mod energy;
 mod excess_forces;
 mod finite;
 mod gaps;
+mod impacts;
 mod impulses;
 mod interface;
 mod judge;

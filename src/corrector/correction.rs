@@ -80,12 +80,15 @@ pub struct Correction<'a, T: Real> {
     pub(crate) contacts: &'a mut ContactState<T>,
     /// Closed flags before this stage.
     pub(crate) was_closed: &'a [bool],
+    /// Closed flags at the start of the step.
+    pub(crate) closed_at_start: &'a [bool],
     /// Contacts that friction held before this stage; empty without friction.
     pub(crate) was_sticking: &'a [bool],
     pub(crate) massless: &'a [usize],
     pub(crate) prescribed: &'a [usize],
     pub(crate) buffers: &'a mut Buffers<T>,
-    /// Change of kinetic energy by corrections of velocity.
+    /// Change of kinetic energy by corrections of velocity, without those of contacts that close in this step: they are
+    /// part of the impact.
     pub(crate) energy: &'a mut T,
 }
 
@@ -314,7 +317,7 @@ impl<T: Real> Correction<'_, T> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
         }
-        let Self { buffers, contacts, projection, new, g, scheme, energy, .. } = self;
+        let Self { buffers, contacts, projection, new, g, scheme, energy, closed_at_start, .. } = self;
         let Buffers { jump, rates, change, .. } = &mut **buffers;
         jump.clear();
         jump.extend(rows.iter().map(|&row| g.product(row, &new.v)));
@@ -330,7 +333,10 @@ impl<T: Real> Correction<'_, T> {
                 continue;
             }
             let gain = impulse * T::of(0.5) * (before + g.product(row, &new.v));
-            **energy += gain;
+            let contact = contacts.tangents.owner(row);
+            if closed_at_start[contact] || !contacts.closed[contact] {
+                **energy += gain;
+            }
             // An obstacle that moves does work; what is lost is lost in its frame. (What friction takes is no energy of
             // an impact.)
             if !g.is_tangential(row) {

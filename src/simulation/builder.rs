@@ -256,7 +256,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Accumulates the works of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a
-    /// product with C a step, with supports one evaluation of f as well.
+    /// product with C a step, with supports one evaluation of f, with contacts their gaps and rates once more.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
         self.balance = EnergyBalance::On;
@@ -465,9 +465,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let checked = self.stability == Stability::Checked && together.is_alone();
         work.stiffening = checked.then(|| Stiffening::of(&*system, &scheme, constraints.may_press())).flatten();
         let booked = self.balance == EnergyBalance::On;
-        let ledger = booked.then(|| Ledger::new(&mut *system, together, &state, (&constraints, &g))).transpose()?;
+        let mut ledger = || {
+            let projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
+            Ledger::new(&mut *system, together, &state, (&constraints, &g), projection)
+        };
+        let ledger = booked.then(&mut ledger).transpose()?;
         let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
-        Ok(Simulation {
+        let mut run = Simulation {
             system,
             constraints,
             g,

@@ -1,9 +1,10 @@
 //! Energy of a state, the energy balance of a run, and the forces of the supports.
 
 use super::constraints::Constraints;
-use super::laws::Laws;
+use super::impacts::Impacts;
 use super::results::{Energy, Works, finite};
 use crate::contact::ContactJacobian;
+use crate::corrector::JumpProjection;
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::ranks::Together;
@@ -12,7 +13,8 @@ use crate::state::{ContactState, State};
 use crate::system::System;
 use std::ops::Range;
 
-/// Accumulates [`Works`]; costs one load, one product with C and, with supports, one evaluation of f a step.
+/// Accumulates [`Works`]; costs one load, one product with C, the gaps and their rates at the start and, with supports,
+/// one evaluation of f a step.
 #[derive(Debug)]
 pub(crate) struct Ledger<T: Real> {
     together: Together<T>,
@@ -33,6 +35,7 @@ pub(crate) struct Ledger<T: Real> {
     /// The same of friction; empty as long as there is none.
     friction: Vec<T>,
     next_friction: Vec<T>,
+    impacts: Impacts<T>,
     /// Reported forces along the rows where they act.
     forces: Vec<T>,
     /// The same of springs with dashpots; empty as long as there are none.
@@ -53,12 +56,16 @@ pub(crate) struct StepBooks<'a, T> {
     /// u, v and a at the time of the state.
     pub(crate) motion: [&'a [T]; 3],
     pub(crate) contacts: &'a ContactState<T>,
-    pub(crate) laws: &'a Laws,
     /// The rows of the gaps, and those along which the reported forces act.
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) forces: &'a ContactJacobian<T>,
     /// The fraction of the step at which those forces live.
     pub(crate) load: f64,
+    /// The closed contacts with mass that leave jumps, which contacts were closed at the start of the step, and whether
+    /// correctors remove the jumps.
+    pub(crate) closed: &'a [usize],
+    pub(crate) closed_at_start: &'a [bool],
+    pub(crate) is_corrected: bool,
     pub(crate) corrections: T,
     pub(crate) h: f64,
 }
@@ -69,6 +76,7 @@ impl<T: Real> Ledger<T> {
         together: &Together<T>,
         state: &State<T>,
         rows: Rows<'_, '_, T>,
+        projection: JumpProjection<T>,
     ) -> Result<Self> {
         let zero = || vec![T::zero(); system.dofs()];
         let [supports] = together.max(Ok([system.prescribed().len() as f64]))?;
@@ -88,6 +96,7 @@ impl<T: Real> Ledger<T> {
             next_contact: zero(),
             friction: Vec::new(),
             next_friction: Vec::new(),
+            impacts: Impacts::new(projection, rows.0.room()),
             forces: Vec::new(),
             damped: Vec::new(),
             next_damped: Vec::new(),
@@ -149,13 +158,24 @@ impl<T: Real> Ledger<T> {
         Ok(-self.together.dot(&self.residual, v)?)
     }
 
-    /// Remembers the displacements that the step starts from.
-    pub(crate) fn begin(&mut self, state: &State<T>) {
+    /// Remembers the displacements and the contacts that the step starts from; `forces` are those of the rows.
+    pub(crate) fn begin(
+        &mut self,
+        rows: (&mut Constraints<'_, T>, &ContactJacobian<T>),
+        state: &State<T>,
+        forces: &[T],
+    ) -> Result<()> {
         self.old_u.copy_from_slice(state.displacement());
+        self.impacts.begin(rows, state, forces)
     }
 
     /// Computes the works of a step before it is accepted. This may fail.
-    pub(crate) fn prepare(&mut self, system: &mut dyn System<T>, books: &StepBooks<'_, T>) -> Result<()> {
+    pub(crate) fn prepare(
+        &mut self,
+        system: &mut dyn System<T>,
+        constraints: &mut Constraints<'_, T>,
+        books: &StepBooks<'_, T>,
+    ) -> Result<()> {
         if self.is_supported {
             balance_residual(system, books.t, books.motion, &books.contacts.lambda, books.g, &mut self.residual)?;
         }
@@ -178,7 +198,7 @@ impl<T: Real> Ledger<T> {
         if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
             self.friction.resize(u.len(), T::zero());
         }
-        if books.laws.damped && self.damped.is_empty() {
+        if constraints.laws().damped && self.damped.is_empty() {
             self.damped.resize(u.len(), T::zero());
         }
         self.next_friction.resize(self.friction.len(), T::zero());
@@ -193,8 +213,8 @@ impl<T: Real> Ledger<T> {
         for (row, &force) in self.forces.iter().enumerate() {
             let forces = if books.forces.is_tangential(row) {
                 &mut self.next_friction
-            } else if books.laws[row].is_damped() {
-                stored += books.laws[row].stored(books.contacts.gap[row]);
+            } else if constraints.laws()[row].is_damped() {
+                stored += constraints.laws()[row].stored(books.contacts.gap[row]);
                 &mut self.next_damped
             } else {
                 &mut self.next_contact
@@ -214,10 +234,12 @@ impl<T: Real> Ledger<T> {
         let [by_supports, by_loads, by_contact, by_friction, by_damped] = self.together.sum(Ok(parts))?.map(T::of);
         works.supports += by_supports;
         works.load += by_loads;
+        let hidden = self.impacts.works(constraints, books, &self.forces, (&self.old_u, newest))?;
         // What springs do not store, or give back, is the dashpots'.
         let kept = stored - self.stored;
-        works.contact += by_contact - kept;
-        works.friction += by_friction;
+        works.contact += by_contact + hidden.contact - kept;
+        works.friction += by_friction + hidden.friction;
+        works.impacts += hidden.impacts;
         works.corrections += books.corrections;
         let power = self.damping_power(system, u, v)?;
         works.damping += half * (self.power + power) * T::of(books.h) + by_damped + kept;
@@ -236,8 +258,8 @@ impl<T: Real> Ledger<T> {
     }
 
     fn works(&self, total: T) -> Works<T> {
-        let Works { load, supports, damping, contact, friction, corrections, .. } = self.works;
-        let remainder = total - self.start - (load + supports + damping + contact + friction + corrections);
+        let Works { load, supports, damping, contact, friction, impacts, corrections, .. } = self.works;
+        let remainder = total - self.start - (load + supports + damping + contact + friction + impacts + corrections);
         Works { remainder, ..self.works }
     }
 }

@@ -67,10 +67,13 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Works done on the system since the start, by the trapezoidal rule over the steps. (That of contact takes the forces
-/// in the middle of the step, which is the same rule for schemes whose forces live at its end.) All but `remainder` are
-/// works of forces of the model; the remainder is the energy that the scheme itself adds (positive) or dissipates
-/// (negative).
+/// Where the energy of the system came from and went since the start: the change of the total energy is the sum of all
+/// lines.
+///
+/// Works of forces are those of the trapezoidal rule over the steps. (That of contact takes the forces in the middle of
+/// the step, which is the same rule for schemes whose forces live at its end.) `load` to `impacts` belong to the model,
+/// and are those of the exact motion as the step goes to zero; `corrections` and `remainder` belong to the time
+/// integration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -81,25 +84,37 @@ pub struct Works<T> {
     pub supports: T,
     /// Work of damping (not positive), and of the dashpots of contact laws.
     pub damping: T,
-    /// Work of the reported contact forces along the normals, but for that of dashpots.
+    /// Work of the reported contact forces along the normals: that of obstacles that move, of the springs of compliant
+    /// laws without their dashpots, and of contacts on dofs without mass. Impacts against moving obstacles are included; the closing of rigid
+    /// gaps is not work of a force, but an impact.
     pub contact: T,
-    /// Work of the reported friction forces on the bodies: not positive where obstacles do not move along themselves.
+    /// Work of the friction forces on the bodies, impulses of impacts included: not positive where obstacles do not
+    /// move along themselves.
     pub friction: T,
-    /// Change of kinetic energy by corrections of velocity.
+    /// Kinetic energy that impacts have taken (negative), in the frame of the obstacle: ½ (r' − r)ᵀ S⁻¹ (r' + r) for
+    /// contacts with mass that close with the gap rates r and go on with r', S = G M⁻¹ Gᵀ. Two rigid masses that stay
+    /// together lose ½ m r² with m = m₁ m₂/(m₁ + m₂), whatever the scheme, the step and the instant of the impact
+    /// within it; those that rebound with −e r lose (1 − e²) of that. Of an elastic body it is the energy of the contact
+    /// nodes alone, which goes to zero with the size of the elements.
+    pub impacts: T,
+    /// Change of kinetic energy by corrections of velocity of contacts that were closed at the start of the step, or
+    /// that open: what is corrected in the step in which a contact closes is part of its impact.
     pub corrections: T,
-    /// Total energy minus energy at the start minus all of the above.
+    /// Total energy minus energy at the start minus all of the above: what the scheme itself adds (positive) or
+    /// dissipates (negative).
     pub remainder: T,
 }
 
 impl<T: Real> Works<T> {
     /// Refuses works that are NaN or infinite.
     pub(super) fn check(&self, t: f64) -> Result<()> {
-        let Self { load, supports, damping, contact, friction, corrections, remainder } = *self;
+        let Self { load, supports, damping, contact, friction, impacts, corrections, remainder } = *self;
         finite(t, "the work of the load", load)?;
         finite(t, "the work of the supports", supports)?;
         finite(t, "the work of damping", damping)?;
         finite(t, "the work of contact", contact)?;
         finite(t, "the work of friction", friction)?;
+        finite(t, "the work of impacts", impacts)?;
         finite(t, "the work of corrections", corrections)?;
         finite(t, "the remainder of the works", remainder)
     }

@@ -48,7 +48,7 @@ impl<T: Real> Simulation<'_, T> {
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
         constraints.measure_from_kept(&mut work.contact.trial.gap);
         if let Some(ledger) = ledger {
-            ledger.begin(state);
+            ledger.begin((constraints, g), state, &work.contact.trial.lambda)?;
         }
         work.contact.closed_at_start.clone_from(&work.contact.trial.closed);
         let ContactWork { trial, exerting_at_start, .. } = &mut work.contact;
@@ -121,8 +121,8 @@ impl<T: Real> Simulation<'_, T> {
     /// Makes the motion in slot 0 of the history the state. After an error, or the verdict that the step is too coarse,
     /// the caller undoes the step.
     fn accept(&mut self) -> Result<Verdict> {
-        let Self { system, constraints, g, state, history, work, statistics, ledger, scheme, judge, together, .. } =
-            self;
+        let Self { system, constraints, g, correctors, state, history, work, statistics, .. } = self;
+        let Self { ledger, scheme, judge, together, .. } = self;
         let stages = work.backup.rotations;
         let flags = work.contact.trial.closed.iter().zip(&work.contact.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
@@ -167,11 +167,22 @@ impl<T: Real> Simulation<'_, T> {
         let stage = &scheme.tableau.stages[scheme.tableau.stages.len() - 1];
         let (forces, load) =
             (work.contact.rows.curved.forces(g), if self.startup.is_some() { 1.0 } else { stage.load });
-        let (contacts, h) = (&work.contact.trial, history.clock.h);
-        let laws = constraints.laws();
-        let books = StepBooks { t: new.t, motion, contacts, laws, g, forces, load, corrections, h };
+        let ContactWork { trial: contacts, closed_at_start, .. } = &work.contact;
+        let books = StepBooks {
+            t: new.t,
+            motion,
+            contacts,
+            g,
+            forces,
+            load,
+            closed: &work.correction.buffers.closed,
+            closed_at_start,
+            is_corrected: correctors.iter().any(|corrector| !corrector.corrects_massless()),
+            corrections,
+            h: history.clock.h,
+        };
         if let Some(ledger) = ledger {
-            ledger.prepare(&mut **system, &books)?;
+            ledger.prepare(&mut **system, constraints, &books)?;
         }
         system.commit(new.t, motion[0], motion[1])?;
         if let Some(ledger) = ledger {
@@ -296,6 +307,7 @@ impl<T: Real> Simulation<'_, T> {
                         backup: &mut work.backup,
                         contacts: &mut work.contact.trial,
                         was_closed: &work.contact.was_closed,
+                        closed_at_start: &work.contact.closed_at_start,
                         was_sticking: &work.contact.was_sticking,
                         massless: &work.massless,
                         prescribed: &work.vectors.supports.dofs,

@@ -73,6 +73,7 @@ impl Sheets {
             "damping",
             "contact",
             "friction",
+            "impacts",
             "corrections",
             "scheme",
         ];
@@ -115,6 +116,7 @@ impl Sheets {
             works.damping,
             works.contact,
             works.friction,
+            works.impacts,
             works.corrections,
             works.remainder,
         ];
@@ -204,7 +206,8 @@ impl Display for Summary {
             ("damping", works.damping),
             ("contact forces", works.contact),
             ("friction", works.friction),
-            ("corrections at impact", works.corrections),
+            ("impacts", works.impacts),
+            ("corrections", works.corrections),
             ("the scheme itself", works.remainder),
         ] {
             // (What is left is rounding.)

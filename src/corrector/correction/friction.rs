@@ -143,7 +143,7 @@ impl<T: Real> Correction<'_, T> {
         } else {
             self.solve_past((k, field), engaged, false)?;
         }
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, energy, .. } = self;
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, h, energy, closed_at_start, .. } = self;
         let Buffers { rubbing, rates, past_slips, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
@@ -154,7 +154,9 @@ impl<T: Real> Correction<'_, T> {
             for ((&row, &impulse), (&before, &after)) in rubbing.rows.iter().zip(&rubbing.increments).zip(jumps) {
                 let gain = impulse * T::of(0.5) * (before + after);
                 let own = if row < first { rates[row].rate } else { past_slips[row - first].rate };
-                **energy += gain - impulse * own;
+                if closed_at_start[contacts.tangents.owner(row)] {
+                    **energy += gain - impulse * own;
+                }
                 if row < first {
                     contacts.dissipated[row] -= gain;
                 }

@@ -76,7 +76,7 @@ impl<T: Real> Correction<'_, T> {
         if constraints.0.turn() {
             self.see_straight((k, field), rows)?;
         }
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, .. } = self;
+        let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, closed_at_start, .. } = self;
         let Buffers { rates, jump, tolerance: before, rebounds, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let ago = T::of(self.t - motion.t);
@@ -87,7 +87,9 @@ impl<T: Real> Correction<'_, T> {
             for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
                 let taken = multiplier * (T::of(0.5) * before + rebounds.past(row, field, ago));
                 contacts.dissipated[row] += taken;
-                **energy += multiplier * rates[row].rate - taken;
+                if closed_at_start[row] {
+                    **energy += multiplier * rates[row].rate - taken;
+                }
             }
         }
         let (values, unit) = match field {
