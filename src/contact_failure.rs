@@ -1,5 +1,6 @@
 //! Why a contact problem was not solved: plain data, which contact solvers return and errors carry.
 
+use crate::error::few;
 use crate::real::Real;
 
 /// Why a contact problem was not solved; rows count within the problem.
@@ -25,7 +26,7 @@ pub enum ContactFailure<T> {
         residual: T,
     },
     /// A contact for which friction leaves no way out (Painlevé): sliding on, every force that presses closes the gap
-    /// by more than it opens it, μ |W_nt| ≥ W_nn, and the problem was not solved.
+    /// by more than it opens it, μ |W_nt| ≥ W_nn. It is proven that no multipliers solve the problem.
     Jammed {
         /// The first row of the contact.
         row: usize,
@@ -54,15 +55,15 @@ impl<T: Real> std::fmt::Display for ContactFailure<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Contradictory { row, other, residual } => {
-                let residual = residual.value();
+                let residual = few(residual.value());
                 write!(f, "rows {row} and {other} contradict each other: {row} stays violated by {residual:e}")
             }
             Self::NotConverged { iterations, row, residual } => {
-                let residual = residual.value();
+                let residual = few(residual.value());
                 write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
             }
             Self::Jammed { row, friction, normal, coupling } => {
-                let (normal, coupling) = (normal.value(), coupling.value());
+                let (friction, normal, coupling) = (few(*friction), few(normal.value()), few(coupling.value()));
                 write!(
                     f,
                     "the contact of row {row} jams: with μ = {friction} friction moves its gap by {friction} × \

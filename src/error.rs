@@ -7,6 +7,30 @@ fn asked(bytes: Option<usize>) -> String {
     bytes.map_or_else(String::new, |bytes| format!(": {bytes} bytes were asked for"))
 }
 
+/// A number as messages print it: four significant digits.
+pub(crate) fn few(x: f64) -> f64 {
+    rounded(x, 3)
+}
+
+/// A time as messages print it: nine significant digits, which tell steps from each other.
+fn moment(t: f64) -> f64 {
+    rounded(t, 8)
+}
+
+fn rounded(x: f64, decimals: usize) -> f64 {
+    format!("{x:.decimals$e}").parse().ok().filter(|rounded: &f64| rounded.is_finite()).unwrap_or(x)
+}
+
+/// What to do about a tangent that is indefinite in this iteration.
+fn mend_tangent(iteration: usize) -> &'static str {
+    match iteration {
+        1 => {
+            "nothing has moved yet: check the sign of the tangent with `verify::tangent`; if it is right, take smaller steps"
+        }
+        _ => "the stiffness there is too negative for this step; take smaller steps",
+    }
+}
+
 #[cfg(test)]
 mod page;
 
@@ -17,8 +41,10 @@ use crate::contact_id::ContactId;
 
 /// What went wrong, where, and with which numbers.
 ///
-/// Numbers are reported as `f64` whatever the scalar of the run. A step that fails leaves state and
-/// history bit for bit as they were.
+/// Numbers are reported as `f64` whatever the scalar of the run; messages round them, the fields have all digits. The
+/// message of an error contains that of its cause, which [`source`](std::error::Error::source) does not return: each is
+/// printed once, by `{}` and by whoever prints the chain of sources. A step that fails leaves state and history bit for
+/// bit as they were.
 ///
 #[doc = include_str!("../docs/errors.md")]
 #[derive(Debug, thiserror::Error)]
@@ -85,7 +111,7 @@ pub enum Error {
         mirrored: f64,
     },
     /// A mass that must be positive is not.
-    #[error("the mass of dof {dof} is {value:e}, it must be positive")]
+    #[error("the mass of dof {dof} is {value:e}, it must be positive", value = few(*.value))]
     Mass {
         /// The degree of freedom.
         dof: usize,
@@ -195,7 +221,8 @@ pub enum Error {
     #[error(
         "{integrator} (order {order}) is zero-unstable: without stiffness and damping a step has the spectral radius \
          {radius:e}, or more than the double root 1 of rigid motion; check the rows of its tableau with \
-         `analysis::zero_stability`"
+         `analysis::zero_stability`",
+        radius = few(*.radius)
     )]
     UnstableScheme {
         /// Name of the integrator.
@@ -209,7 +236,8 @@ pub enum Error {
     #[error(
         "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system, or the rate of \
          its strongest damping, is {frequency:e} (1/time) or more, for which h may be {largest:e}; take smaller steps \
-         or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)"
+         or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)",
+        frequency = few(*.frequency)
     )]
     BeyondStability {
         /// Name of the integrator.
@@ -228,7 +256,8 @@ pub enum Error {
         "step from t = {t:e} with h = {h:e}: {} than {integrator} takes: the highest frequency is now {frequency:e} \
          (1/time) or more, and h may be about {largest:e}; take smaller steps (`StepControl` does), a softer contact \
          law, or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)",
-        .contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer"))
+        .contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer")),
+        t = moment(*.t), h = few(*.h), frequency = few(*.frequency), largest = few(*.largest)
     )]
     Stiffened {
         /// Name of the integrator.
@@ -259,7 +288,8 @@ pub enum Error {
     #[error(
         "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of \
          conjugate gradients, least of all at dof {dof}; look for a body without mass or support, or a negative \
-         stiffness"
+         stiffness",
+        curvature = few(*.curvature)
     )]
     Indefinite {
         /// pᵀAp over pᵀdiag(A)p.
@@ -270,7 +300,8 @@ pub enum Error {
     /// The iterative solution of a linear system did not converge.
     #[error(
         "{method} not converged after {iterations} iterations: relative residual {residual:e}, tolerance \
-         {tolerance:e}; take smaller steps, allow more iterations, or use `Cholesky`"
+         {tolerance:e}; take smaller steps, allow more iterations, or use `Cholesky`",
+        residual = few(*.residual), tolerance = few(*.tolerance)
     )]
     LinearNotConverged {
         /// The iteration.
@@ -286,7 +317,8 @@ pub enum Error {
     #[error(
         "mode {mode} leaves a residual of {residual:e}, tolerance {tolerance:e}; of given modes look at their order of \
          dofs, their units and their normalization (φᵀMφ = 1), of computed ones at masses or stiffnesses that differ \
-         by many powers of ten"
+         by many powers of ten",
+        residual = few(*.residual), tolerance = few(*.tolerance)
     )]
     ModeResidual {
         /// The mode, counted from 0.
@@ -299,7 +331,8 @@ pub enum Error {
     /// Not all modes below a frequency are there.
     #[error(
         "{found} modes below the circular frequency {frequency:e} (1/time) where the inertia of K − ω²M counts \
-         {expected}; give those that are missing, and rigid motions too"
+         {expected}; give those that are missing, and rigid motions too",
+        frequency = few(*.frequency)
     )]
     ModesMissed {
         /// Modes found or given.
@@ -338,7 +371,8 @@ pub enum Error {
     /// Closed contacts demand opposite things: no contact forces meet them all.
     #[error(
         "t = {t:e}: contacts {contact} and {other} contradict each other, {contact} stays violated by {violation:e} \
-         (gap units) whatever the forces; a body is squeezed between obstacles or tied twice"
+         (gap units) whatever the forces; a body is squeezed between obstacles or tied twice",
+        t = moment(*.t), violation = few(*.violation)
     )]
     ContradictoryContacts {
         /// Time of the stage.
@@ -355,7 +389,8 @@ pub enum Error {
     #[error(
         "t = {t:e}: contact {contact} jams: with μ = {friction} a unit of its force closes the gap by {friction} × \
          {coupling:e} through friction and opens it by {normal:e} only; lower μ, or give the contact compliance \
-         (`ContactLaw::Penalty`)"
+         (`ContactLaw::Penalty`)",
+        t = moment(*.t), friction = few(*.friction), coupling = few(*.coupling), normal = few(*.normal)
     )]
     Jammed {
         /// Time of the stage.
@@ -373,7 +408,8 @@ pub enum Error {
     /// is for symmetric problems.
     #[error(
         "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is \
-         not symmetric; solve contact by ActiveSet or GaussSeidel"
+         not symmetric; solve contact by ActiveSet or GaussSeidel",
+        t = moment(*.t)
     )]
     UnsymmetricContacts {
         /// Time of the stage.
@@ -386,7 +422,8 @@ pub enum Error {
     /// The contact problem was not solved.
     #[error(
         "t = {t:e}: contact problem not solved after {iterations} iterations; contact {contact} misses \
-         complementarity by {residual:e} (gap units)"
+         complementarity by {residual:e} (gap units)",
+        t = moment(*.t), residual = few(*.residual)
     )]
     Contact {
         /// Time of the stage.
@@ -398,12 +435,32 @@ pub enum Error {
         /// Its complementarity residual, in units of the gap.
         residual: f64,
     },
+    /// The rows of contact, linearized at the result of the problem that was solved with them, did not settle.
+    #[error(
+        "t = {t:e}: contact not settled after {iterations} linearizations: {what} of contact {contact} still changes \
+         by {change:e} (relative), tolerance {tolerance:e}; take smaller steps (`StepControl` does)",
+        t = moment(*.t), change = few(*.change)
+    )]
+    ContactUnsettled {
+        /// Time of the stage.
+        t: f64,
+        /// Linearizations, after each of which the problem was solved.
+        iterations: usize,
+        /// The contact that changes most.
+        contact: ContactId,
+        /// What of it: gap, slip, force or displacement.
+        what: &'static str,
+        /// Its change from one linearization to the next, relative to what contact has changed it by.
+        change: f64,
+        /// The change that would have been accepted.
+        tolerance: f64,
+    },
     /// A gap moves in time by itself, and its rates do not say so.
     #[error(
         "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its \
          rates are zero; give ∂g/∂t (`ContactConstraint::rates`, or the second entry of a moving offset or gap \
          function), and check it with `verify::gap_jacobian`",
-        .gap[0], .gap[1], .t[0], .t[1]
+        .gap[0], .gap[1], moment(.t[0]), moment(.t[1])
     )]
     SilentMotion {
         /// The contact.
@@ -432,13 +489,13 @@ pub enum Error {
     #[error("contact on the frame: {failure}; rows are nodes of the frame")]
     Frame {
         /// Why, in the numbering of the frame and the unit of its gaps.
-        #[source]
         failure: ContactFailure<f64>,
     },
     /// The initial state violates a contact constraint.
     #[error(
         "contact {contact} is violated at the start: gap {gap:e}, tolerance {tolerance:e}; start from a gap that is \
-         not negative (zero for an equality row), or say by `initial_overclosure` what becomes of it"
+         not negative (zero for an equality row), or say by `initial_overclosure` what becomes of it",
+        gap = few(*.gap), tolerance = few(*.tolerance)
     )]
     InitialViolation {
         /// The contact.
@@ -460,7 +517,7 @@ pub enum Error {
         dof: usize,
     },
     /// A step produced NaN or infinity.
-    #[error("step from t = {t:e} with h = {h:e}: {what} of dof {dof} is {value}")]
+    #[error("step from t = {t:e} with h = {h:e}: {what} of dof {dof} is {value}", t = moment(*.t), h = few(*.h))]
     StepNotFinite {
         /// Time at the start of the step.
         t: f64,
@@ -477,7 +534,8 @@ pub enum Error {
     #[error(
         "step from t = {t:e} with h = {h:e}: Newton's method not converged after {iterations} iterations; relative \
          residual {residual:e}, relative increment {increment:e}, worst dof {dof}; take smaller steps, check the \
-         tangent with `verify::tangent`, or try a line search"
+         tangent with `verify::tangent`, or try a line search",
+        t = moment(*.t), h = few(*.h), residual = few(*.residual), increment = few(*.increment)
     )]
     NewtonNotConverged {
         /// Time at the start of the step.
@@ -496,7 +554,8 @@ pub enum Error {
     /// A step is so small that it would not change the time.
     #[error(
         "step from t = {t:e}: h = {h:e} is below the resolution of times there, {resolution:e}, so that the step \
-         would not change t; count time from an origin nearer to the run, or take larger steps"
+         would not change t; count time from an origin nearer to the run, or take larger steps",
+        h = few(*.h), resolution = few(*.resolution)
     )]
     TimeNotAdvancing {
         /// Time at the start of the step.
@@ -507,7 +566,7 @@ pub enum Error {
         resolution: f64,
     },
     /// A step was refused at its size and at halves of it, down to the smallest allowed.
-    #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}")]
+    #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}", t = moment(*.t), h = few(*.h))]
     StepRefused {
         /// Time at the start of the step.
         t: f64,
@@ -516,13 +575,14 @@ pub enum Error {
         /// Attempts.
         attempts: u32,
         /// Why the last attempt failed.
-        #[source]
-        source: Box<Error>,
+        r#source: Box<Error>,
     },
     /// The effective matrix of an iteration is not positive definite.
     #[error(
         "step from t = {t:e} with h = {h:e}: the effective matrix of iteration {iteration} is not positive definite \
-         at dof {dof}: the stiffness there is too negative for this step; take smaller steps"
+         at dof {dof}: {}",
+        mend_tangent(*.iteration),
+        t = moment(*.t), h = few(*.h)
     )]
     IndefiniteTangent {
         /// Time at the start of the step.
@@ -535,7 +595,7 @@ pub enum Error {
         dof: usize,
     },
     /// A gap or a multiplier is NaN or infinite.
-    #[error("t = {t:e}: {what} of contact {contact} is {value}")]
+    #[error("t = {t:e}: {what} of contact {contact} is {value}", t = moment(*.t))]
     ContactNotFinite {
         /// Time of the stage.
         t: f64,
@@ -547,7 +607,7 @@ pub enum Error {
         value: f64,
     },
     /// An energy or a work is NaN or infinite.
-    #[error("t = {t:e}: {what} is {value}; look at the potential energy, load and damping force of the system")]
+    #[error("t = {t:e}: {what} is {value}; look at the potential energy, load and damping force of the system", t = moment(*.t))]
     EnergyNotFinite {
         /// Time of the state.
         t: f64,
@@ -557,7 +617,7 @@ pub enum Error {
         value: f64,
     },
     /// A prescribed motion is NaN or infinite.
-    #[error("t = {t:e}: the prescribed motion of dof {dof} is {value}")]
+    #[error("t = {t:e}: the prescribed motion of dof {dof} is {value}", t = moment(*.t))]
     SupportNotFinite {
         /// Time of the motion.
         t: f64,
@@ -569,7 +629,8 @@ pub enum Error {
     /// A node has left the facets that the last search found for it.
     #[error(
         "t = {t:e}: contact {contact} has left what the search at the start of the step found; take smaller steps or \
-         give the contact a larger reach"
+         give the contact a larger reach",
+        t = moment(*.t)
     )]
     ContactLost {
         /// Time of the stage.
@@ -580,7 +641,8 @@ pub enum Error {
     /// A body has passed through another one within a step, or was stopped where that one is not.
     #[error(
         "step from t = {t:e} with h = {h:e}: contact {contact} {what}; its node, at a gap of {gap:e}, went {way:e} \
-         against the surface; take smaller steps (`StepControl` does)"
+         against the surface; take smaller steps (`StepControl` does)",
+        t = moment(*.t), h = few(*.h), gap = few(*.gap), way = few(*.way)
     )]
     PassedThrough {
         /// Time at the start of the step.
@@ -602,8 +664,7 @@ pub enum Error {
         /// Which callback.
         callback: &'static str,
         /// The host's own error; from a step, one that says t and h as well, and has the host's own as its source.
-        #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        r#source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A step, or another call of all ranks, has failed on another rank and therefore on this one.
     #[error("rank {rank} has failed: {message}")]
@@ -637,8 +698,7 @@ pub enum Error {
         /// Which callback.
         callback: &'static str,
         /// The host's own error.
-        #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        r#source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
@@ -647,7 +707,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// What a host says of a state, with the step that it belongs to.
 #[derive(Debug, thiserror::Error)]
-#[error("step from t = {t:e} with h = {h:e}: {source}")]
+#[error("step from t = {t:e} with h = {h:e}: {source}", t = moment(*.t), h = few(*.h))]
 struct InStep {
     t: f64,
     h: f64,
@@ -673,6 +733,7 @@ impl Error {
         matches!(
             self,
             Self::Contact { .. }
+                | Self::ContactUnsettled { .. }
                 | Self::Frame { .. }
                 | Self::ContradictoryContacts { .. }
                 | Self::Jammed { .. }

@@ -62,7 +62,7 @@ fn short(name: &str) -> &'static str {
     match name {
         "PassedThrough" => "passed",
         "ContactLost" => "lost",
-        "Contact" => "unsolved",
+        "Contact" | "ContactUnsettled" => "unsolved",
         "InitialViolation" => "inside at first",
         "Inadmissible" | "IndefiniteTangent" | "NewtonNotConverged" => "crumpled",
         _ => "other",

@@ -379,10 +379,10 @@ pub(super) fn across<T: Real, const D: usize>(normal: [T; D]) -> [[T; D]; 2] {
     if D == 2 {
         (directions[0][0], directions[0][1]) = (normal[1], -normal[0]);
     } else if D == 3 {
-        // From an axis far from the normal. (By a factor that no symmetric place has: directions must not jump between
-        // two axes while a normal is iterated for.)
-        let size = |axis: usize| normal[axis].abs();
-        let axis = (1..D).fold(0, |far, axis| if size(axis) < T::of(0.77) * size(far) { axis } else { far });
+        // From the first axis that is far from the normal, as one of three is; how far no symmetric place decides.
+        // (Directions must not jump between two axes while a normal is iterated for: not from the one that is farthest,
+        // which of a flat surface rounding would choose.)
+        let axis = (0..D).find(|&axis| normal[axis].abs() < T::of(0.61)).unwrap_or(0);
         let mut first: [T; D] = std::array::from_fn(|k| -normal[axis] * normal[k]);
         first[axis] += T::one();
         let length = dot(first, first).sqrt();
@@ -420,4 +420,24 @@ pub(super) fn unit_or_nan<T: Real, const D: usize>(x: [T; D]) -> [T; D] {
     let scaled = x.map(|x| x / largest);
     let length = dot(scaled, scaled).sqrt();
     scaled.map(|x| x / length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::across;
+
+    /// Rounding of a flat surface's normal turns its tangents by rounding.
+    #[test]
+    fn directions_do_not_jump_where_a_normal_is_rounded() {
+        let near = |x: [f64; 3], y: [f64; 3]| x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-12);
+        for axis in 0..3 {
+            for (x, y) in [(0.0, 0.0), (1e-16, 3e-15), (-3e-15, 1e-16), (2e-15, -2e-15)] {
+                let [mut exact, mut rounded] = [[0.0; 3]; 2];
+                (exact[axis], rounded[axis]) = (1.0, 1.0);
+                (rounded[(axis + 1) % 3], rounded[(axis + 2) % 3]) = (x, y);
+                let [one, other] = [across(exact), across(rounded)];
+                assert!(near(one[0], other[0]) && near(one[1], other[1]), "{axis}: {other:?}");
+            }
+        }
+    }
 }

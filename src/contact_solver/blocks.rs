@@ -1,7 +1,7 @@
 //! Problems with cones, block by block: when they count as solved, sweeps until they are, and why they are not.
 
 use super::acceptance::nothing;
-use super::sweeps::Sweeps;
+use super::sweeps::{self, Sweeps};
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::real::Real;
 use std::ops::Range;
@@ -154,18 +154,19 @@ pub(super) fn failure<T: Real>(
     ContactFailure::NotConverged { iterations, row, residual }
 }
 
-/// The contact whose friction moves its own gap most, if by more than the normal multiplier does: with it the problem
-/// may have no solution.
+/// A contact that has no solution, whatever the others do: these move neither its gap nor its slip. (Of one that they
+/// move nothing is proven: they may push it open.)
 fn jammed<T: Real>(problem: &ContactProblem<'_, T>) -> Option<ContactFailure<T>> {
-    let excess = |(rows, set): (Range<usize>, AdmissibleSet)| {
+    let failure = |(rows, set): (Range<usize>, AdmissibleSet)| {
         let (row, friction) = (rows.start, set.friction()?);
+        let is_apart = |i: usize| {
+            let mut others = problem.row(i).iter().enumerate().filter(|(j, _)| !rows.contains(j));
+            others.all(|(_, &w)| w == T::zero())
+        };
+        let jams = rows.clone().all(is_apart) && sweeps::free_block(problem, rows.clone(), set).jams();
         let normal = problem.delassus(row, row);
         let coupling = rows.skip(1).fold(T::zero(), |size, k| size.hypot(problem.delassus(row, k)));
-        let jams = T::of(friction) * coupling >= normal && coupling > T::zero();
-        let excess = T::of(friction) * coupling / normal;
-        jams.then_some((excess, ContactFailure::Jammed { row, friction, normal, coupling }))
+        jams.then_some(ContactFailure::Jammed { row, friction, normal, coupling })
     };
-    let worst =
-        problem.blocks().filter_map(excess).reduce(|worst, other| if other.0 > worst.0 { other } else { worst });
-    worst.map(|(_, failure)| failure)
+    problem.blocks().find_map(failure)
 }

@@ -45,15 +45,7 @@ impl<T: Real> Cone<T> {
         if friction <= T::zero() {
             return [normal([T::zero(); 2]), T::zero(), T::zero()];
         }
-        // The tangential rows without the normal multiplier: S f + c.
-        let without = |i: usize, x: T, over: T| x - w[i][0] / w[0][0] * over;
-        let s = |i: usize, j: usize| without(i, w[i][j], w[0][j]);
-        let c = [without(1, b[1], b[0]), if tangents > 1 { without(2, b[2], b[0]) } else { T::zero() }];
-        let schur = match tangents {
-            // (A second direction that nothing asks for, as compliant as the first.)
-            1 => [[s(1, 1), T::zero()], [T::zero(), s(1, 1)]],
-            _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
-        };
+        let (schur, c) = self.without_normal();
         let beyond = |f: [T; 2]| norm(f) - friction * normal(f);
         if let Some(held) = hold(schur, c, noise).filter(|&held| beyond(held) <= T::zero()) {
             return [normal(held), held[0], held[1]];
@@ -71,6 +63,54 @@ impl<T: Real> Cone<T> {
         let along = w[0][1] * direction[0] + w[0][2] * direction[1];
         let p = -b[0] / (w[0][0] + friction * along);
         [p, friction * p * direction[0], friction * p * direction[1]]
+    }
+
+    /// The tangential rows without the normal multiplier: S f + c.
+    fn without_normal(&self) -> ([[T; 2]; 2], [T; 2]) {
+        let Self { delassus: w, offset: b, tangents, .. } = *self;
+        let without = |i: usize, x: T, over: T| x - w[i][0] / w[0][0] * over;
+        let s = |i: usize, j: usize| without(i, w[i][j], w[0][j]);
+        let c = [without(1, b[1], b[0]), if tangents > 1 { without(2, b[2], b[0]) } else { T::zero() }];
+        let schur = match tangents {
+            // (A second direction that nothing asks for, as compliant as the first.)
+            1 => [[s(1, 1), T::zero()], [T::zero(), s(1, 1)]],
+            _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
+        };
+        (schur, c)
+    }
+
+    /// Whether it is proven, but for rounding, that the block has no solution (Painlevé): none that sticks, and none
+    /// that slides.
+    ///
+    /// If S is definite there is one. Else S = s e eᵀ, and c has a part k d, d ⊥ e a unit vector, that no friction
+    /// stops. Where it slides f(γ) = −k d/γ − c_e e/(s + γ), and |f| − μ p ≤ −A/γ + B/(s + γ) − C with
+    /// A = −k (1 − μ w·d/W_nn), B = |c_e| − μ (w·e) c_e/W_nn, C = −μ b_n/W_nn and w = W_nt. The largest value of this
+    /// over γ is −C if B ≤ A, or else (√B − √A)²/s − C.
+    pub(super) fn jams(&self) -> bool {
+        let Self { delassus: w, offset: b, friction, noise, .. } = *self;
+        if w[0][0] <= T::zero() || b[0] >= T::zero() {
+            return false;
+        }
+        let ([[xx, xy], [yx, yy]], c) = self.without_normal();
+        let tiny = T::of(64.0) * T::epsilon();
+        let (trace, scale) = (xx + yy, w[1][1] + w[2][2]);
+        if xx * yy - xy * yx > tiny * trace * scale {
+            return false;
+        }
+        let column = if xx >= yy { [xx, yx] } else { [xy, yy] };
+        let is_zero = trace <= T::of(4.0) * tiny * scale;
+        let (s, e) = if is_zero { (T::zero(), [T::zero(); 2]) } else { (trace, column.map(|x| x / norm(column))) };
+        let along = |x: [T; 2]| x[0] * e[0] + x[1] * e[1];
+        let across = [c[0] - along(c) * e[0], c[1] - along(c) * e[1]];
+        let k = norm(across);
+        if k <= noise + tiny * norm(c) {
+            return false;
+        }
+        let coupled = [w[0][1], w[0][2]].map(|own| friction * own / w[0][0]);
+        let a = coupled[0] * across[0] + coupled[1] * across[1] - k;
+        let b = along(c).abs() - along(coupled) * along(c);
+        let rest = -friction * self.offset[0] / w[0][0];
+        a > T::zero() && (b <= a || (b.sqrt() - a.sqrt()).powi(2) < rest * s)
     }
 }
 

@@ -30,7 +30,9 @@ use crate::real::Real;
 ///
 /// A contact with friction is a block: in its turn it gets the multipliers that solve it alone, exactly. Sweeps begin
 /// at zero then, whatever the guess, and there is no theorem that they converge; on independent rows and with
-/// coefficients below 1 they have in every test, on redundant ones often not.
+/// coefficients below 1 they have in every test, on redundant ones often not. Sweeps that do not end are
+/// [`ContactFailure::NotConverged`]; [`ContactFailure::Jammed`] names a contact apart from all others which is proven
+/// to have no solution.
 ///
 /// Known weakness: convergence is linear, and the number of sweeps grows with the condition of W: stiff against soft,
 /// or long stacks, take thousands. The tolerance is one for all rows: small gaps beside large ones are less exact. A

@@ -115,26 +115,38 @@ impl<T: Real> Sweeps<T> {
     ) -> Cone<T> {
         let (first, size) = (rows.start, rows.len());
         let reads = if self.reads_half() { first } else { problem.size() };
-        let mut offset = products(problem, rows.clone(), &multipliers[..reads]);
-        let (mut delassus, mut noise, mut guess) = ([[T::zero(); 3]; 3], T::zero(), [T::zero(); 2]);
+        let others = products(problem, rows.clone(), &multipliers[..reads]);
+        let mut block = free_block(problem, rows.clone(), set);
         for (i, row) in rows.enumerate() {
-            delassus[i][..size].copy_from_slice(&problem.row(row)[first..first + size]);
-            offset[i] += problem.offset[row];
+            block.offset[i] += others[i];
             if self.reads_half() {
-                offset[i] += self.behind[row];
+                block.offset[i] += self.behind[row];
             } else {
-                for (&w, &multiplier) in delassus[i].iter().zip(&multipliers[first..first + size]) {
-                    offset[i] -= w * multiplier;
+                for (&w, &multiplier) in block.delassus[i].iter().zip(&multipliers[first..first + size]) {
+                    block.offset[i] -= w * multiplier;
                 }
             }
             if i > 0 {
-                noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
-                guess[i - 1] = multipliers[row];
+                block.guess[i - 1] = multipliers[row];
             }
         }
-        let friction = T::of(set.friction().unwrap_or(0.0));
-        Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
+        block
     }
+}
+
+/// A block while the others have no multipliers.
+pub(super) fn free_block<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, set: AdmissibleSet) -> Cone<T> {
+    let (size, friction) = (rows.len(), T::of(set.friction().unwrap_or(0.0)));
+    let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
+    for (i, row) in rows.clone().enumerate() {
+        delassus[i][..size].copy_from_slice(&problem.row(row)[rows.clone()]);
+        offset[i] = problem.offset[row];
+        if i > 0 {
+            noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
+        }
+    }
+    let guess = [T::zero(); 2];
+    Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
 }
 
 /// Rows of W times the multipliers of the first rows.

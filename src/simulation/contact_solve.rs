@@ -4,12 +4,11 @@
 use super::contact_step::{ContactStep, ContactWork};
 use super::curved_rows::{FOLLOWED, Miss, SLOW};
 use super::interface::{advance, keep, restore};
+use super::mixing::ELSEWHERE;
 use super::operator::Operator;
 use super::stage_vectors::StageVectors;
 use crate::contact::Candidates;
-use crate::contact_solver::ContactFailure;
-use crate::corrector::contact_error;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::Motion;
 use crate::system::System;
@@ -74,12 +73,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             self.foresee(needed, contact);
             if self.follow(new, vectors, contact)? == Candidates::Unchanged {
-                contact.rows.curved.miss = 0.0;
                 return self.refuse_elsewhere(pass, new.t, contact);
             }
             operator.follow(contact.rows.curved.version(self.constraints));
             let miss = self.miss(new, past, contact)?;
-            contact.rows.curved.miss = miss.largest();
             if miss.is_settled::<T>(pass + 1, before, contact.rows.curved.may_halve) {
                 return self.refuse_elsewhere(pass, new.t, contact);
             }
@@ -98,9 +95,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let mixed = rows.curved.mixing.as_ref().filter(|_| rows.curved.may_halve && pass >= SLOW);
         match mixed.and_then(|mixing| mixing.elsewhere(&interface.increment, &interface.free)) {
             None => Ok(true),
-            Some(residual) => {
-                let failure = ContactFailure::NotConverged { iterations: pass + 1, row: rows.curved.worst.0, residual };
-                Err(contact_error(t, failure, |row| self.constraints.ids[row]))
+            Some(change) => {
+                let (iterations, contact) = (pass + 1, self.constraints.ids[rows.curved.worst.row]);
+                let (what, tolerance) = ("the displacement", ELSEWHERE);
+                Err(Error::ContactUnsettled { t, iterations, contact, what, change, tolerance })
             }
         }
     }

@@ -52,6 +52,26 @@ pub(super) struct Miss {
     pub(super) force: f64,
 }
 
+/// What differs most.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Worst {
+    /// The contact.
+    pub(super) row: usize,
+    pub(super) what: &'static str,
+    /// By how much, relative, and how much is accepted where it falls no more.
+    pub(super) change: f64,
+    pub(super) tolerance: f64,
+}
+
+impl Worst {
+    pub(super) fn of(miss: Miss, (row, what): (usize, &'static str)) -> Self {
+        match miss.force > miss.gap {
+            true => Self { row, what: "the force", change: miss.force, tolerance: TIRED },
+            false => Self { row, what, change: miss.gap, tolerance: NEAR },
+        }
+    }
+}
+
 impl Miss {
     /// Before anything was solved.
     pub(super) const ALL: Self = Self { gap: f64::INFINITY, force: f64::INFINITY };
@@ -88,10 +108,8 @@ pub(super) struct CurvedRowsWork<T> {
     pub(super) gaps: Vec<T>,
     /// The gaps that the rows which were solved with foresee; one a candidate.
     pub(super) foreseen: Vec<T>,
-    /// The miss of gaps and forces after the last linearization, relative; the row that misses its gap most, and by how
-    /// much.
-    pub(super) miss: f64,
-    pub(super) worst: (usize, T),
+    /// What missed most after the last linearization.
+    pub(super) worst: Worst,
     /// What finds rest where passes come nearer slowly; there if rows may move within a step.
     pub(super) mixing: Option<Box<Mixing<T>>>,
     /// Whether a smaller step may be taken instead of this one.
@@ -106,8 +124,7 @@ impl<T: Real> CurvedRowsWork<T> {
             apart: false,
             gaps: Vec::new(),
             foreseen: Vec::new(),
-            miss: 0.0,
-            worst: (0, T::zero()),
+            worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: NEAR },
             mixing: None,
             may_halve: false,
         }

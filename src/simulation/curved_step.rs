@@ -2,7 +2,7 @@
 
 use super::contact_rows::{ContactRowsWork, Level};
 use super::contact_step::{ContactStep, ContactWork};
-use super::curved_rows::{Miss, NEAR, NOISE};
+use super::curved_rows::{Miss, NEAR, NOISE, Worst};
 use super::interface::keep;
 use super::operator::Operator;
 use super::stage_vectors::StageVectors;
@@ -160,7 +160,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { constraints, g, part, .. } = self;
         let ContactWork { rows, trial, interface, .. } = contact;
         let forces = rows.curved.forces(g);
-        let (mut worst, mut largest) = ((0, T::zero()), 0.0_f64);
+        let (mut worst, mut largest) = ((0, "the gap"), 0.0_f64);
         interface.response.fill(T::zero());
         for row in (0..constraints.len()).filter(|&row| part.takes(&rows.on_massless, row)) {
             let (law, lambda) = (constraints.law(row), trial.lambda_raw[row]);
@@ -183,10 +183,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let beyond = miss - tolerance;
             if beyond > T::zero() {
                 // (Where d moves nothing, the tolerance is the scale that is left.)
-                largest = largest.max((beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value());
-            }
-            if miss > worst.1 {
-                worst = (row, miss);
+                let share = (beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value();
+                if share > largest {
+                    (worst, largest) = ((row, "the gap"), share);
+                }
             }
         }
         for row in constraints.tangents().all() {
@@ -194,20 +194,26 @@ impl<T: Real> ContactStep<'_, '_, T> {
             forces.interface_scatter(row, lambda, &mut interface.response);
             let owner = constraints.tangents().owner(row);
             if trial.lambda_raw[owner] > T::zero() && rows.weight[row] > T::zero() {
-                let scale = rows.weight[row] * forces.interface_magnitude(row, &interface.increment);
+                // (A contact that is pressed alone has no slip but that of a normal which turns by rounding.)
+                let along = |row: usize| forces.interface_magnitude(row, &interface.increment);
+                let scale = rows.weight[row] * (along(row) + along(owner));
                 // (What sticks has a slip of nothing but the rounding of what friction has taken back.)
                 let taken = rounding(rows.weight[row] * forces.interface_magnitude(row, &interface.free));
                 let beyond = (rows.y[row] - rows.curved.foreseen[row]).abs() - rows.tolerance[row] - taken;
                 if beyond > T::zero() {
                     let noise = T::of(NOISE / NEAR) * rows.tolerance[row];
-                    largest = largest.max((beyond / (scale.max(rows.y[row].abs()) + noise)).value());
+                    let share = (beyond / (scale.max(rows.y[row].abs()) + noise)).value();
+                    if share > largest {
+                        (worst, largest) = ((owner, "the slip"), share);
+                    }
                 }
             }
         }
         let moved = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| (new - old).value().powi(2));
         let size = interface.forces.iter().map(|force| force.value().powi(2)).sum::<f64>();
         let force = if size > 0.0 { (moved.sum::<f64>() / size).sqrt() } else { 0.0 };
-        rows.curved.worst = worst;
-        Ok(Miss { gap: largest, force })
+        let miss = Miss { gap: largest, force };
+        rows.curved.worst = Worst::of(miss, worst);
+        Ok(miss)
     }
 }

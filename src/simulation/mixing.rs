@@ -21,7 +21,7 @@ const FARTHEST: f64 = 1e3;
 
 /// The share of the way by which passes have pushed that mixing may move their result where half of the step may be
 /// taken instead. (Of the rests that are those of the same solution nearly all are nearer than a hundredth.)
-const ELSEWHERE: f64 = 0.5;
+pub(super) const ELSEWHERE: f64 = 0.5;
 
 /// A difference of two passes: of r − d, and of r.
 struct Difference<T> {
@@ -77,11 +77,11 @@ impl<T: Real> Mixing<T> {
         (self.known, self.begun) = (0, false);
     }
 
-    /// How far d is from where passes were before any was mixed, if farther than a share of the way that they had
-    /// pushed it from `free`: that of another solution.
-    pub(super) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<T> {
-        let moved = square_of_way(d, &self.unmixed);
-        (moved > ELSEWHERE * ELSEWHERE * square_of_way(&self.unmixed, free)).then(|| T::of(moved.sqrt()))
+    /// How far d is from where passes were before any was mixed, over the way that they had pushed it from `free`, if
+    /// this share is that of another solution.
+    pub(super) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<f64> {
+        let share = (square_of_way(d, &self.unmixed) / square_of_way(&self.unmixed, free)).sqrt();
+        (share > ELSEWHERE).then_some(share)
     }
 
     /// Notes where the rows of the next pass are linearized.
@@ -192,7 +192,7 @@ mod tests {
         mixing.begin(&[0.0, 0.0]);
         // Half of the way of 5 that they had pushed.
         assert_eq!(mixing.elsewhere(&[2.4, 0.0], &free), None);
-        assert_eq!(mixing.elsewhere(&[0.0, -2.75], &free), Some(2.75));
+        assert_eq!(mixing.elsewhere(&[0.0, -2.75], &free), Some(0.55));
         mixing.begin(&[2.0, 4.0]);
         assert_eq!(mixing.elsewhere(&[2.0, 5.0], &free), Some(1.0));
     }

@@ -135,9 +135,6 @@ pub(super) struct NewtonWork<T> {
     /// Residual without contact forces before an iteration, and the increment of the iteration.
     pub(super) residual: Vec<T>,
     pub(super) increment: Vec<T>,
-    /// Relative difference of gaps and contact forces from those that were solved for, after the last linearization of
-    /// curved gaps.
-    pub(super) unsettled: f64,
     /// For schemes that take the force of the whole path.
     pub(super) path: Option<PathWork<T>>,
     pub(super) report: Vec<Iteration>,
@@ -154,7 +151,6 @@ impl<T: Real> NewtonWork<T> {
             d: zero(dofs),
             residual: zero(dofs),
             increment: zero(dofs),
-            unsettled: 0.0,
             path,
             report: Vec::with_capacity(settings.iterations),
             residuals: Vec::with_capacity(settings.iterations + 1),

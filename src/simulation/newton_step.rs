@@ -2,7 +2,6 @@
 
 use super::contact_rows::Part;
 use super::contact_step::ContactWork;
-use super::curved_rows::FOLLOWED;
 use super::newton::{Iteration, NewtonWork, TangentUpdate};
 use super::path::PathForm;
 use super::program::ScaledRows;
@@ -71,13 +70,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let before = Norms { residual, ..norms };
             let forces = &contact.interface.forces;
             let Some((share, found)) = self.advance(newton, new, past, vectors, forces, before)? else {
-                if settled {
-                    return Ok(());
-                }
-                // The stage is linear in all but its gaps, and rows did not fit after that many linearizations.
-                newton.report.clear();
-                newton.report.resize(FOLLOWED, Iteration { residual: newton.unsettled, increment: 0.0 });
-                break;
+                // The stage is linear in all but its gaps.
+                return self.refuse_unsettled(settled, new.t, &contact.rows.curved);
             };
             norms = found;
             // Rows were made to fit the whole increment.
@@ -292,9 +286,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if self.constraints.len() == 0 || !T::all_finite(&contact.interface.increment) {
             return Ok(true);
         }
-        let settled = self.contact(Part::All, Some(&newton.d), new, past, vectors, contact)?;
-        newton.unsettled = contact.rows.curved.miss;
-        Ok(settled)
+        self.contact(Part::All, Some(&newton.d), new, past, vectors, contact)
     }
 
     /// Moves by the increment in `vectors.increment`, or by a share of it, which is returned; the residual there takes

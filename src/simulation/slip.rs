@@ -113,12 +113,13 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
             let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
+            // (Of a motion along the normal a share of rounding is slip: so well are the directions known.)
             for k in tangents.of(row) {
                 let own = slips[k - tangents.all().start].rate;
                 (y[k], tolerance[k]) = match source {
                     Source::Velocity(scale) => {
                         let slip = forces.product(k, &new.v) + own;
-                        let size = forces.magnitude(k, &new.v) + own.abs();
+                        let size = forces.magnitude(k, &new.v) + forces.magnitude(row, &new.v) + own.abs();
                         // Velocities that are differences of displacements have the rounding of those.
                         let known = if stage.recovery.subtracts(1) { forces.magnitude(k, &new.u) } else { T::zero() };
                         let d = &interface.increment;
@@ -126,7 +127,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         (scale * slip + weight * forces.interface_product(k, d), scale * size + known + added)
                     }
                     Source::Target => {
-                        let size = forces.magnitude(k, target) + (h * own).abs();
+                        let size = forces.magnitude(k, target) + forces.magnitude(row, target) + (h * own).abs();
                         (forces.product(k, target) + h * own, size)
                     }
                     Source::WayAhead | Source::Way => {
@@ -138,19 +139,21 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         };
                         // From the terms of the scheme, which have not the rounding of displacements: what sticks must
                         // not creep by that. (Supports, and dofs that follow statically, are where they are.)
+                        let part = |dof: usize| {
+                            let free = constraints.place(dof).zip(stage.way.past_at(past, dof));
+                            let Some((place, past)) = free else {
+                                return (ends[1][dof] - ends[0][dof], ends[1][dof].abs());
+                            };
+                            let known = iterate.map_or(T::zero(), |d| d[dof]);
+                            (past + stage.way.weight * (known + interface.increment[place]), T::zero())
+                        };
                         let (mut way, mut size) = (T::zero(), T::zero());
                         for (dof, weight) in forces.row(k) {
-                            let free = constraints.place(dof).zip(stage.way.past_at(past, dof));
-                            let part = if let Some((place, past)) = free {
-                                let known = iterate.map_or(T::zero(), |d| d[dof]);
-                                past + stage.way.weight * (known + interface.increment[place])
-                            } else {
-                                size += (weight * ends[1][dof]).abs();
-                                ends[1][dof] - ends[0][dof]
-                            };
+                            let (part, known) = part(dof);
                             way += weight * part;
-                            size += (weight * part).abs();
+                            size += weight.abs() * (known + part.abs());
                         }
+                        size += forces.row(row).map(|(dof, weight)| (weight * part(dof).0).abs()).sum::<T>();
                         let terms = (time * own).abs() + weight * forces.interface_magnitude(k, &interface.increment);
                         (way + time * own, size + terms)
                     }

@@ -3,14 +3,13 @@
 use super::constraints::Constraints;
 use super::contact_rows::Part;
 use super::contact_step::{ContactStep, ContactWork};
-use super::curved_rows::{CurvedRowsWork, FOLLOWED};
+use super::curved_rows::{CurvedRowsWork, FOLLOWED, Worst};
 use super::operator::Operator;
 use super::program::CompiledStage;
 use super::results::Statistics;
 use super::stage_vectors::StageVectors;
 use crate::contact::ContactJacobian;
-use crate::contact_solver::{ContactFailure, ContactSolver};
-use crate::corrector::contact_error;
+use crate::contact_solver::ContactSolver;
 use crate::error::{Error, Result};
 use crate::ranks::Together;
 use crate::real::Real;
@@ -53,9 +52,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if settled {
             return Ok(());
         }
-        let (row, residual) = rows.worst;
-        let failure = ContactFailure::NotConverged { iterations: FOLLOWED, row, residual };
-        Err(contact_error(t, failure, |row| self.constraints.ids[row]))
+        let Worst { row, what, change, tolerance } = rows.worst;
+        let (iterations, contact) = (FOLLOWED, self.constraints.ids[row]);
+        Err(Error::ContactUnsettled { t, iterations, contact, what, change, tolerance })
     }
 
     pub(super) fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {

@@ -114,7 +114,7 @@ impl Tally {
         match result {
             Ok(()) => self.right += 1,
             // (A row that turns from one side of a body to the other and back does not stand still.)
-            Err(error @ (Error::PassedThrough { .. } | Error::ContactLost { .. } | Error::Contact { .. })) => {
+            Err(error @ (Error::PassedThrough { .. } | Error::ContactLost { .. } | Error::ContactUnsettled { .. })) => {
                 assert!(error.is_recoverable());
                 self.refused += 1;
             }

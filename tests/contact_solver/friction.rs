@@ -582,3 +582,58 @@ fn nearly_singular_blocks_do_not_depend_on_the_unit() {
         }
     }
 }
+
+/// Sweeps that end too early say that they have not converged, on problems that have a solution: a body that stands on
+/// redundant rows, whose friction moves their gaps more than their normal forces do. So does a contact that would jam
+/// alone, where another one may push it open.
+#[test]
+fn sweeps_that_do_not_end_prove_nothing() {
+    let (w, q) = boxes::problem(&pile(&[[0.0; 2]]), &[0.1, 0.0, -1.0, 0.0, 0.0, 0.0]);
+    let friction = 1.1 * w[0] / w[1].hypot(w[2]);
+    let sets = [cone(3, friction); 4];
+    check(&w, &q, &sets, &solve(&mut ActiveSet::default(), (&w, &q, &sets)).unwrap(), 1e-9, "a box");
+    let failed = solve(&mut GaussSeidel::default().sweeps(3), (&w, &q, &sets));
+    assert!(matches!(failed, Err(ContactFailure::NotConverged { .. })), "{failed:?}");
+    let w = [1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let jams = |coupling: f64| {
+        let w: Vec<_> = (0..9).map(|k| if [2, 5, 6, 7].contains(&k) { coupling } else { w[k] }).collect();
+        let sets = [cone(2, friction), AdmissibleSet::NonNegative];
+        solve(&mut GaussSeidel::default(), (&w, &[-1.0, 0.5, -1.0], &sets))
+    };
+    assert!(matches!(jams(0.0), Err(ContactFailure::Jammed { row: 0, .. })), "{:?}", jams(0.0));
+    assert!(!matches!(jams(0.1), Err(ContactFailure::Jammed { .. })), "{:?}", jams(0.1));
+}
+
+/// A contact in space whose W is of rank two, or one: where it is said to jam, no friction |f| = μ p against its slip
+/// closes the gap. f solves (W_tt − W_tn W_nt/W_nn + γ) f = −c, and the sum of both sides is scanned over γ.
+#[test]
+fn a_contact_in_space_that_jams_has_no_solution() {
+    let mut random = Congruential(83);
+    let (mut jammed, mut solved) = (0, 0);
+    for trial in 0..400 {
+        let w = semidefinite(&mut random, 3, 1 + trial % 2, 0.0);
+        let mut q = random.vector(3, 1.0);
+        q[0] = -q[0].abs();
+        let friction = 3.0;
+        match solve(&mut GaussSeidel::default().sweeps(20), (&w, &q, &[cone(3, friction)])) {
+            Ok(found) => {
+                solved += 1;
+                check(&w, &q, &[cone(3, friction)], &found, 1e-8, &format!("trial {trial}"));
+            }
+            Err(ContactFailure::Jammed { .. }) => {
+                jammed += 1;
+                let s = |i: usize, j: usize| w[3 * i + j] - w[3 * i] * w[j] / w[0];
+                let c = [1, 2].map(|i| q[i] - w[3 * i] * q[0] / w[0]);
+                for exponent in -4000..4000 {
+                    let gamma = 10.0_f64.powf(f64::from(exponent) / 500.0);
+                    let [a, b, d] = [s(1, 1) + gamma, s(1, 2), s(2, 2) + gamma];
+                    let f = [b * c[1] - d * c[0], b * c[0] - a * c[1]].map(|x| x / (a * d - b * b));
+                    let p = -(q[0] + w[1] * f[0] + w[2] * f[1]) / w[0];
+                    assert!(f[0].hypot(f[1]) < friction * p, "trial {trial}: γ = {gamma:e}");
+                }
+            }
+            Err(failure) => assert!(matches!(failure, ContactFailure::NotConverged { .. }), "{failure}"),
+        }
+    }
+    assert!(jammed > 20 && solved > 100, "{jammed} jam, {solved} are solved");
+}

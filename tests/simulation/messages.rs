@@ -2,13 +2,15 @@
 //! and what contact forces and impulses are.
 #![cfg(feature = "search")]
 
-use contact_dynamics::contact::{Facet, NodeToFacet};
+use contact_dynamics::contact::{ContactId, Facet, NodeToFacet};
+use contact_dynamics::contact_solver::ContactFailure;
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
     Composite, Error, LinearRows, LinearSystem, Mass, Newmark, PersistencyCorrection, Result, Simulation, StepControl,
     System, TangentWeights, TimeIntegrator,
 };
 use contact_dynamics_scenes::sparse::{matrix, rectangular, springs};
+use std::error::Error as _;
 
 #[derive(Debug)]
 struct Torn(f64);
@@ -66,6 +68,52 @@ fn what_a_host_does_not_admit_comes_with_its_words_and_the_step() {
     assert!(refused.contains("torn") && refused.contains("h = 1.25e-1"), "{refused}");
     let host = Error::Host { callback: "commit", source: Box::new(Torn(2.0)) }.to_string();
     assert!(host.contains("commit") && host.contains("torn"), "{host}");
+}
+
+/// What `{}` prints, and what is printed of a chain of sources.
+#[test]
+fn a_cause_is_printed_once() {
+    let torn = || Error::Inadmissible { callback: "force", source: Box::new(Torn(1.25)) };
+    let failure = ContactFailure::NotConverged { iterations: 7, row: 3, residual: 0.5 };
+    for (error, cause) in [
+        (Error::StepRefused { t: 1.0, h: 0.1, attempts: 2, source: Box::new(torn()) }, "the bar is torn"),
+        (torn(), "the bar is torn"),
+        (Error::Host { callback: "commit", source: Box::new(Torn(2.0)) }, "the bar is torn"),
+        (Error::Frame { failure }, "not solved after 7 iterations"),
+    ] {
+        let (mut chain, mut next) = (error.to_string(), error.source());
+        while let Some(source) = next {
+            chain += &format!("\nCaused by: {source}");
+            next = source.source();
+        }
+        for printed in [error.to_string(), chain] {
+            assert_eq!(printed.matches(cause).count(), 1, "{printed}");
+        }
+    }
+}
+
+/// Digits that tell nothing are not printed; those of numbers that are compared are.
+#[test]
+fn numbers_are_printed_with_few_digits() {
+    let (t, h, x, contact) = (12.0 + 1.0 / 3.0, 1e-4 / 3.0, 2e-14 / 3.0, ContactId::default());
+    for (error, words) in [
+        (Error::Contact { t, iterations: 9, contact, residual: x }, vec!["t = 1.23333333e1:", "by 6.667e-15 (gap"]),
+        (
+            Error::NewtonNotConverged { t, h, iterations: 9, residual: x, increment: 1.0, dof: 0 },
+            vec!["t = 1.23333333e1 with h = 3.333e-5:", "residual 6.667e-15, relative increment 1e0,"],
+        ),
+        (Error::PassedThrough { t, h, contact, what: "went", way: -x, gap: 0.5 }, vec!["of 5e-1, went -6.667e-15 "]),
+        (Error::Mass { dof: 0, value: -f64::MAX }, vec!["is -1.7976931348623157e308,"]),
+        (
+            Error::Asymmetric { matrix: "mass", row: 1, column: 0, value: 1.0, mirrored: 1.0 + 4.0 * f64::EPSILON },
+            vec!["is 1e0, entry", "is 1.0000000000000009e0;"],
+        ),
+    ] {
+        let message = error.to_string();
+        assert!(words.iter().all(|words| message.contains(words)), "{message}");
+    }
+    let failure = ContactFailure::NotConverged { iterations: 9, row: 0, residual: 2.0_f32 / 3.0 };
+    assert!(failure.to_string().ends_with("by 6.667e-1"), "{failure}");
 }
 
 #[test]

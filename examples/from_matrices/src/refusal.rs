@@ -50,6 +50,7 @@ fn contact_of(error: &Error) -> Option<ContactId> {
         | Error::ContradictoryContacts { contact, .. }
         | Error::Jammed { contact, .. }
         | Error::Contact { contact, .. }
+        | Error::ContactUnsettled { contact, .. }
         | Error::InitialViolation { contact, .. }
         | Error::ContactNotFinite { contact, .. } => Some(*contact),
         _ => None,
