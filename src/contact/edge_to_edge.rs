@@ -6,7 +6,7 @@ mod pairs;
 mod passage;
 mod rows;
 
-use super::surface::{Facet, Kin, Neighborhood, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
+use super::surface::{Facet, Material, Neighborhood, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
 use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -199,7 +199,7 @@ impl<T: Real> EdgeToEdge<T> {
         let nodes = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, 3, &nodes.coordinates)?;
         let mut contact = Self::between(nodes, [surface.clone(), surface]);
-        contact.vicinity.meet_itself(&contact.surfaces[0], &contact.nodes.coordinates);
+        contact.vicinity = Vicinity::of_itself(contact.surfaces[0].typical());
         contact.find_edges(SHARP)?;
         Ok(contact)
     }
@@ -227,7 +227,7 @@ impl<T: Real> EdgeToEdge<T> {
     /// [its own surface](Self::of_itself), as [`NodeToFacet::rings`](super::NodeToFacet::rings). By default 1.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
-        self.vicinity.set_rings(rings, &self.surfaces[0], &self.nodes.coordinates);
+        self.vicinity.set_rings(rings);
         self
     }
 
@@ -260,7 +260,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.vicinity.set_offsets(offsets, &self.surfaces[0], &self.nodes.coordinates)?;
+        self.vicinity.set_offsets(offsets, self.nodes.coordinates.len())?;
         Ok(self)
     }
 
@@ -270,7 +270,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.vicinity.set_ramp((times, factors), &self.surfaces[0], &self.nodes.coordinates)?;
+        self.vicinity.set_ramp(times, factors)?;
         Ok(self)
     }
 
@@ -296,7 +296,7 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.vicinity.set_least(reach, &self.surfaces[0], &self.nodes.coordinates)?;
+        self.vicinity.set_least(reach)?;
         Ok(self)
     }
 
@@ -345,9 +345,9 @@ impl<T: Real> EdgeToEdge<T> {
             body.sort_unstable();
             body.dedup();
         }
-        match (&self.vicinity.kin, bodies) {
-            (None, bodies) => nodes.read_bodies(bodies)?,
-            (Some(_), [body, _]) => nodes.read_body(body),
+        match (self.vicinity.is_of_itself(), bodies) {
+            (false, bodies) => nodes.read_bodies(bodies)?,
+            (true, [body, _]) => nodes.read_body(body),
         }
         self.acts.clear();
         self.acts.resize(nodes.dofs().len(), false);
@@ -355,15 +355,15 @@ impl<T: Real> EdgeToEdge<T> {
         for &[from, to] in self.ends_of.iter().flatten() {
             nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
         }
-        self.vicinity.reach.forget();
+        self.vicinity.forget();
         self.rows.clear();
         Ok(())
     }
 
     /// The edges at t.
     fn sides(&self, t: f64) -> Sides<'_> {
-        let Self { edges, surfaces, vicinity: Vicinity { kin, thickness, .. }, .. } = self;
-        Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) }
+        let Self { edges, surfaces, vicinity, .. } = self;
+        Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) }
     }
 
     /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
@@ -377,8 +377,8 @@ impl<T: Real> EdgeToEdge<T> {
 
     fn find_rows(&mut self, (t, u, v): (f64, &[T], &[T]), ahead: f64) {
         let Self { nodes, edges, surfaces, vicinity, neighborhood, found, .. } = self;
-        let Vicinity { kin, thickness, reach, .. } = &*vicinity;
-        let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
+        let Vicinity { thickness, reach, .. } = &*vicinity;
+        let sides = Sides { edges, surfaces, vicinity, offsets: thickness.at(t) };
         let [thick, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
         let at = |node: usize| nodes.positions[node];
         let velocity = |node: usize| nodes.vector(node, v);
@@ -406,27 +406,31 @@ impl<T: Real> EdgeToEdge<T> {
 struct Sides<'a> {
     edges: &'a [Vec<Edge>; 2],
     surfaces: &'a [Surface; 2],
-    kin: Option<&'a Kin>,
+    vicinity: &'a Vicinity,
     offsets: Offsets<'a>,
 }
 
 impl<'a> Sides<'a> {
     fn pair(&self, [first, second]: [usize; 2]) -> Pair<'a> {
         let (edges, surfaces) = ([&self.edges[0][first], &self.edges[1][second]], self.surfaces.each_ref());
-        let depth = self.kin.map_or(f64::INFINITY, |kin| {
-            let toward = |[one, other]: [&Edge; 2]| {
-                let [facet, _] = other.facets();
-                one.nodes.map(|node| kin.depth(surfaces[0].place(node), facet))
-            };
-            let depths = [edges, [edges[1], edges[0]]].into_iter().flat_map(toward);
-            depths.fold(f64::INFINITY, f64::min)
-        });
-        Pair { edges, surfaces, offsets: self.offsets, depth }
+        Pair { edges, surfaces, offsets: self.offsets, depth: self.depth(edges) }
+    }
+
+    /// How deep two edges may lie in each other and be in contact, for the material behind both.
+    fn depth(&self, edges: [&Edge; 2]) -> f64 {
+        let material = &self.vicinity.material[..];
+        let ([one, .., other] | [one @ other]) = material else { return f64::INFINITY };
+        let places = [0, 1].map(|k| edges[k].nodes.map(|node| self.surfaces[k].place(node)));
+        let behind = |material: &Material, [from, to]: [usize; 2]| material.behind(from).min(material.behind(to));
+        let [behind, beyond] = [behind(one, places[0]), behind(other, places[1])];
+        let [facet, _] = edges[1].facets();
+        let is_one_body = self.vicinity.is_of_itself() && one.is_of_one_body(&self.surfaces[0], places[0][0], facet);
+        if is_one_body { behind.min(beyond) } else { behind + beyond }
     }
 
     /// Two edges that may meet: of one surface each pair once, and none whose facets are near each other on it.
     fn meeting(&self, [first, second]: [usize; 2]) -> Option<Pair<'a>> {
-        let apart = self.kin.is_none_or(|kin| {
+        let apart = self.vicinity.kin.as_ref().is_none_or(|kin| {
             let keeps = |one: &Edge, other: &Edge| {
                 let places = one.nodes.map(|node| self.surfaces[0].place(node));
                 other.facets().iter().any(|&facet| places.iter().any(|&place| kin.keeps_apart(place, facet)))
@@ -478,6 +482,8 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
         if self.edges.iter().all(|edges| !edges.is_empty()) {
+            let Self { vicinity, surfaces: [one, other], nodes, .. } = self;
+            vicinity.prepare(&[one, other], nodes.bodies(), &nodes.coordinates);
             let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
             let range = self.vicinity.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
@@ -498,8 +504,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             return Ok(Candidates::Unchanged);
         }
         let Self { nodes, edges, surfaces, vicinity, rows, found, .. } = self;
-        let Vicinity { kin, thickness, .. } = &*vicinity;
-        let sides = Sides { edges, surfaces, kin: kin.as_ref(), offsets: thickness.at(t) };
+        let sides = Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) };
         let at = |node: usize| nodes.positions[node];
         found.clear();
         for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {

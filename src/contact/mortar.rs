@@ -11,7 +11,7 @@ mod rates;
 mod rows;
 mod second_order;
 
-use super::surface::{Behind, Bounds, Facet, Nodes, Point, RECOVERY, Ramp, Reach, Surface, Thickness, sub};
+use super::surface::{Bounds, Facet, Material, Nodes, Point, RECOVERY, Ramp, Reach, Surface, Thickness, sub};
 use super::{
     BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
 };
@@ -70,8 +70,9 @@ const BEYOND: f64 = 0.25;
 /// into or through the other surface by more than a tenth of its way, or half of the [reach](Self::reach), is refused
 /// ([`Error::PassedThrough`], which a smaller step mends). Geometry is computed in `f64` in every run.
 ///
-/// Facets that look toward each other through the material of both bodies do not meet, so that bodies beside each other
-/// may be thinner than the [reach](Self::reach): give the whole surfaces of thin bodies.
+/// Facets that are in each other by more than half of the material behind both, in the reference configuration, look
+/// toward each other through the bodies, and do not meet. So bodies beside each other may be thinner than the
+/// [reach](Self::reach): give the whole surfaces of thin bodies.
 ///
 /// # Known failure
 ///
@@ -118,7 +119,7 @@ pub struct Mortar<T: Real> {
     multiplier: Multiplier,
     pairs: Pairs,
     /// The material behind the facets of both surfaces, once it was asked for.
-    behind: Option<[Behind; 2]>,
+    material: Option<[Material; 2]>,
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
     integrals: Integrals,
@@ -167,7 +168,7 @@ impl<T: Real> Mortar<T> {
             bonds: None,
             multiplier: Multiplier::default(),
             pairs: Pairs::default(),
-            behind: None,
+            material: None,
             searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
             known: None,
@@ -278,7 +279,7 @@ impl<T: Real> Mortar<T> {
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         self.thickness.set(offsets, self.nodes.coordinates.len())?;
         self.reach.forget();
-        self.behind = None;
+        self.material = None;
         self.known = None;
         self.with_fitting_bonds()
     }
@@ -296,7 +297,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.thickness.ramp = Ramp::new(times, factors)?;
-        self.behind = None;
+        self.material = None;
         self.known = None;
         Ok(self)
     }
@@ -361,7 +362,7 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
         self.reach.set_least(reach)?;
-        self.behind = None;
+        self.material = None;
         Ok(self)
     }
 
@@ -411,30 +412,26 @@ impl<T: Real> Mortar<T> {
         self.reach.least() - self.thickest(t)[0]
     }
 
-    /// Finds the material behind facets, if that was not done before: as far as surfaces that meet are in each other.
-    fn find_behind(&mut self) {
-        if self.behind.is_none() {
-            let surfaces = [&self.slave, &self.master];
-            let positions = &self.nodes.coordinates;
-            let facets = surfaces.into_iter().flat_map(Surface::facets);
-            let largest = facets.map(|facet| facet.shape(positions).size()).fold(0.0, f64::max);
-            let deepest = self.reach.least() + self.thickness.overlap(self.nodes.bodies());
-            // (Of what meets one corner is no deeper than that.)
-            self.behind = Some(surfaces.map(|surface| Behind::new(surface, positions, deepest + largest)));
+    /// Finds the material behind facets, if that was not done before.
+    fn find_material(&mut self) {
+        if self.material.is_none() {
+            let known = (self.reach.least(), self.thickness.overlap(self.nodes.bodies()));
+            let of = |surface: &Surface| Material::of(surface, &self.nodes.coordinates, known);
+            self.material = Some([of(&self.slave), of(&self.master)]);
         }
     }
 
     /// Pairs of facets within `range`, of those that the surfaces make now, at t.
     fn find_pairs(&mut self, t: f64, range: f64) {
         let depth = self.depth(t);
-        self.find_behind();
+        self.find_material();
         let surfaces = [&self.slave, &self.master];
         let motions = self.reach.motions(&self.nodes);
         if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
             self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
-        if let Some(behind) = &self.behind
-            && self.pairs.take_near(surfaces, behind, &self.nodes.positions, (range, depth))
+        if let Some(material) = &self.material
+            && self.pairs.take_near(surfaces, material, &self.nodes.positions, (range, depth))
         {
             self.known = None;
         }

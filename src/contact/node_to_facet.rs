@@ -87,7 +87,10 @@ impl Pass {
 /// instance, comes out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
 ///
 /// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
-/// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing).
+/// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing). Where the
+/// surface of the nodes is known, a node is in contact with a facet that it is behind of only up to half of the
+/// material that may lie between, of its body and of the other one, as thick as they are in the reference
+/// configuration: thin bodies do not meet through each other. Give their whole surfaces.
 ///
 /// # Identity
 ///
@@ -261,11 +264,11 @@ impl<T: Real> NodeToFacet<T> {
     /// fold, and for several bodies whose surfaces are given as one.
     ///
     /// Of the facets of its own body a node does not meet those within one [ring](Self::rings), and those behind it by
-    /// more than half of the material there: how thick that is is found in the reference configuration, as far as the
-    /// [`reach`](Self::reach). So nothing may be inside of itself there. Nor does it meet those that do not face it:
-    /// normals within 60° of each other, as of two surfaces; of facets beside it in the reference configuration, by two
-    /// reaches or two facets, within 102°, but where the node is in front of them. Facets that share no node with its
-    /// body, nor with one another through others, are another body. Of two nodes that stand on each other the sharper
+    /// more than half of the material there, as it is thick in the reference configuration. So no body may be inside of
+    /// itself there. Nor does it meet those that do not face it: normals within 60° of each other, as of two surfaces;
+    /// of facets beside it in the reference configuration, by two reaches or two facets, within 102°, but where the
+    /// node is in front of them. Facets that share nodes, with one another or through others, are those of one body,
+    /// and so are the hollows in it: closed parts whose normals point into them. Of two nodes that stand on each other the sharper
     /// one has a row, or else that with the smaller number. A search reaches as far as any two nodes of the surface
     /// move against each other within the step: a body that spins fast looks farther than it must.
     ///
@@ -299,8 +302,8 @@ impl<T: Real> NodeToFacet<T> {
         let mesh = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
         let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone());
+        contact.vicinity = Vicinity::of_itself(surface.typical());
         contact.own_surface = Some(surface);
-        contact.vicinity.meet_itself(&contact.surface, &contact.nodes.coordinates);
         contact.prepare()?;
         Ok(contact)
     }
@@ -321,14 +324,14 @@ impl<T: Real> NodeToFacet<T> {
         body.extend(self.own_surface.iter().flat_map(Surface::nodes));
         body.sort_unstable();
         body.dedup();
-        match self.vicinity.kin {
-            None => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
-            Some(_) => self.nodes.read_body(body),
+        match self.vicinity.is_of_itself() {
+            false => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
+            true => self.nodes.read_body(body),
         }
         let (rows, entries) = self.most();
         self.rows = Rows::with_capacity(rows, entries);
         self.found = Rows::with_capacity(rows, entries);
-        self.vicinity.reach.forget();
+        self.vicinity.forget();
         Ok(())
     }
 

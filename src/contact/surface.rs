@@ -1,6 +1,5 @@
 //! A surface of facets: its facets and nodes, what is beside and around them, and closest points.
 
-mod behind;
 mod closed;
 mod cones;
 mod connect;
@@ -8,6 +7,7 @@ mod dent;
 mod exact;
 mod facet;
 mod kin;
+mod material;
 mod nearest_first;
 mod nodes;
 mod normals;
@@ -27,10 +27,9 @@ mod sharp;
 mod slide;
 mod vicinity;
 
-pub(crate) use behind::{Behind, Side, is_far_side};
 pub(crate) use cones::Cones;
 pub use facet::Facet;
-pub(crate) use kin::Kin;
+pub(crate) use material::Material;
 pub(crate) use nearest_first::{Kept, NearestFirst};
 pub(crate) use nodes::Nodes;
 pub(crate) use offsets::{Offsets, Thickness};

@@ -31,3 +31,4 @@ mod surfaces;
 mod ties;
 mod turning;
 mod two_bodies;
+mod walls;

@@ -39,7 +39,7 @@ pub(super) struct Pair<'a> {
     pub(super) surfaces: [&'a Surface; 2],
     /// By how much the edges are rounded.
     pub(super) offsets: Offsets<'a>,
-    /// How deep the edges may lie in each other where they are those of one body.
+    /// How deep the edges may lie in each other and be in contact.
     pub(super) depth: f64,
 }
 

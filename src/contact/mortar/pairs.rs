@@ -1,6 +1,6 @@
 //! Which facets of two surfaces may meet: lists kept over many steps, and those of them that are near now.
 
-use crate::contact::surface::{Base, Behind, Bounds, Neighborhood, Point, Side, Surface, is_far_side};
+use crate::contact::surface::{Base, Bounds, Material, Neighborhood, Point, Surface};
 
 /// For each slave facet the master facets near it.
 #[derive(Debug, Default)]
@@ -29,12 +29,12 @@ impl Pairs {
     }
 
     /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// do not belong to facets behind sharp edges, and are no far sides of both bodies; says whether they are others
-    /// than before. (The result does not depend on the age of the lists.)
+    /// do not belong to facets behind sharp edges, and do not see each other through both bodies; says whether they are
+    /// others than before. (The result does not depend on the age of the lists.)
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
-        behind: &[Behind; 2],
+        [own, other]: &[Material; 2],
         positions: &[Point],
         (range, depth): (f64, f64),
     ) -> bool {
@@ -52,16 +52,16 @@ impl Pairs {
             if let Some(mut base) = Base::new(facet, positions).filter(|_| !listed.is_empty()) {
                 base.see_beside(slave, index, (positions, normals));
                 let around = Bounds::of_corners(&base.shape).inflated(range);
-                let own = Side { surface: slave, behind: &behind[0], facet: index };
+                let behind = own.behind_facet(slave, index);
                 near.extend(listed.iter().copied().filter(|&partner| {
                     let (bounds, normal) = &masters[partner];
-                    let other = Side { surface: master, behind: &behind[1], facet: partner };
+                    let between = behind + other.behind_facet(master, partner);
                     let facet = &master.facets()[partner];
                     let meets = |normal| base.may_meet(normal, facet, positions, depth);
                     around.intersects(bounds)
                         && normal.is_some_and(meets)
                         && !base.has_beside(facet, positions)
-                        && !is_far_side(own, other, &base, positions)
+                        && !base.is_deeper(facet, positions, between)
                 }));
             }
             starts.push(near.len());

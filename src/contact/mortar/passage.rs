@@ -34,7 +34,7 @@ impl<T: Real> Mortar<T> {
         if way <= FINE * finest {
             return Ok(());
         }
-        self.find_behind();
+        self.find_material();
         let mut look = std::mem::take(&mut self.look);
         let result = self.look_along(step, way, FINE * finest, &mut look);
         self.look = look;
@@ -72,8 +72,8 @@ impl<T: Real> Mortar<T> {
             for &node in self.nodes.bodies().iter().flatten() {
                 positions[node] = add_scaled(ends[0][node], share, sub(ends[1][node], ends[0][node]));
             }
-            if let Some(behind) = &self.behind {
-                pairs.take_near(surfaces, behind, positions, (reach, depth));
+            if let Some(material) = &self.material {
+                pairs.take_near(surfaces, material, positions, (reach, depth));
             }
             let offsets = self.thickness.at(step.t[0] + share * (step.t[1] - step.t[0]));
             integrals.sum(surfaces, positions, offsets, self.multiplier, pairs);

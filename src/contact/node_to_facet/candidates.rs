@@ -3,7 +3,7 @@
 use super::rows::Rows;
 use super::{NodeToFacet, Pass};
 use crate::contact::ContactId;
-use crate::contact::surface::{Bounds, Ground, Kept, Kin, Offsets, Point, Stand, Surface, Vicinity};
+use crate::contact::surface::{Bounds, Ground, Kept, Offsets, Point, Stand, Surface, Vicinity};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
@@ -12,7 +12,8 @@ impl<T: Real> NodeToFacet<T> {
     /// as `range`.
     pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
         let positions = &self.nodes.positions;
-        let surfaces = [Some(&self.surface), self.own_surface.as_ref().filter(|_| self.vicinity.kin.is_none())];
+        let own = self.own_surface.as_ref().filter(|_| !self.vicinity.is_of_itself());
+        let surfaces = [Some(&self.surface), own];
         for (cones, surface) in self.cones.iter_mut().zip(surfaces.into_iter().flatten()) {
             cones.find(surface, positions);
         }
@@ -53,13 +54,13 @@ impl<T: Real> NodeToFacet<T> {
         let Vicinity { kin, reach, thickness, .. } = &*vicinity;
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
-        let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+        let surfaces = (&*surface, own_surface.as_ref());
         let [_, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
         let [thick, _] = thickness.sizes(nodes.bodies(), [t; 2]);
         let motions = reach.motions(nodes);
         let ground_of = |pass: usize| {
             let kept = Kept { reach, motion: motions[1 - pass], thick };
-            let ground = ground(pass, passes, surfaces, places, kept, Self::rounding())?;
+            let ground = ground((pass, passes), surfaces, vicinity, places, kept, Self::rounding())?;
             let of = |other: usize| if kin.is_some() { Some(&cones[0]) } else { cones.get(other) };
             Some(Ground { boxes: Some(&passes[pass].boxes), cones: [of(pass), of(1 - pass)], ..ground })
         };
@@ -110,12 +111,12 @@ impl<T: Real> NodeToFacet<T> {
         /// Gap, in shares of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
         let Self { surface, own_surface, nodes, passes, vicinity, rows, found, .. } = self;
-        let Vicinity { kin, reach, thickness, .. } = &*vicinity;
+        let Vicinity { reach, thickness, .. } = &*vicinity;
         let motions = reach.motions(nodes);
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
         let [thick, _] = thickness.sizes(nodes.bodies(), [t; 2]);
-        let surfaces = (&*surface, own_surface.as_ref(), kin.as_ref());
+        let surfaces = (&*surface, own_surface.as_ref());
         let mut next = 0;
         for group in rows.identities.chunk_by(|x, y| (x.0, pass_of(x.1)) == (y.0, pass_of(y.1))) {
             let (node, pass) = (group[0].0, pass_of(group[0].1));
@@ -123,7 +124,7 @@ impl<T: Real> NodeToFacet<T> {
             next += group.len();
             let stands = &rows.stands[first..next];
             let kept = Kept { reach, motion: motions[1 - pass], thick };
-            let ground = ground(pass, passes, surfaces, places, kept, Self::rounding());
+            let ground = ground((pass, passes), surfaces, vicinity, places, kept, Self::rounding());
             // The list of the node has all facets whose surface is as near as this.
             let known = reach.known_around(node, positions[node], &motions[1 - pass]) - thick;
             let ground = ground.filter(|_| known > 0.0);
@@ -177,9 +178,9 @@ pub(super) fn pass_of(candidate: usize) -> usize {
 
 /// What the nodes of a pass stand on.
 fn ground<'a>(
-    pass: usize,
-    passes: &'a [Pass],
-    (surface, own_surface, kin): (&'a Surface, Option<&'a Surface>, Option<&'a Kin>),
+    (pass, passes): (usize, &'a [Pass]),
+    (surface, own_surface): (&'a Surface, Option<&'a Surface>),
+    vicinity: &'a Vicinity,
     (positions, offsets): (&'a [Point], Offsets<'a>),
     kept: Kept<'a>,
     rounding: f64,
@@ -187,5 +188,6 @@ fn ground<'a>(
     let Pass { nodes, lists, .. } = passes.get(pass)?;
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
     let (lists, kept, cones) = (Some(lists), Some(kept), [None; 2]);
-    Some(Ground { nodes, lists, kept, surface, boxes: None, cones, own, kin, positions, offsets, rounding })
+    let (kin, material) = (vicinity.kin.as_ref(), vicinity.material_of(pass));
+    Some(Ground { nodes, lists, kept, surface, boxes: None, cones, own, kin, material, positions, offsets, rounding })
 }

@@ -3,7 +3,7 @@
 use super::NodeToFacet;
 use super::candidates::{gap_of, pass_of};
 use super::rows::Rows;
-use crate::contact::surface::{Shape, overhang};
+use crate::contact::surface::{Shape, Surface, overhang};
 use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::Result;
 use crate::real::Real;
@@ -42,6 +42,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
         let boxes = self.nodes.move_to(u)?;
+        let surfaces: &[&Surface] = match &self.own_surface {
+            Some(own) => &[&self.surface, own],
+            None => &[&self.surface],
+        };
+        self.vicinity.prepare(surfaces, self.nodes.bodies(), &self.nodes.coordinates);
         let motions = self.vicinity.reach.motions(&self.nodes);
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();

@@ -77,6 +77,7 @@ impl<T: Real> NodeToFacet<T> {
                     cones: [None; 2],
                     own,
                     kin: self.vicinity.kin.as_ref(),
+                    material: self.vicinity.material_of(pass),
                     positions: &ends[k],
                     offsets: self.vicinity.thickness.at(step.t[k]),
                     rounding: Self::rounding(),

@@ -14,7 +14,7 @@ impl<T: Real> NodeToFacet<T> {
     /// two surfaces.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
-        self.vicinity.set_rings(rings, &self.surface, &self.nodes.coordinates);
+        self.vicinity.set_rings(rings);
         self
     }
 
@@ -81,7 +81,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.vicinity.set_offsets(offsets, &self.surface, &self.nodes.coordinates)?;
+        self.vicinity.set_offsets(offsets, self.nodes.coordinates.len())?;
         Ok(self)
     }
 
@@ -93,7 +93,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless all are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.vicinity.set_ramp((times, factors), &self.surface, &self.nodes.coordinates)?;
+        self.vicinity.set_ramp(times, factors)?;
         Ok(self)
     }
 
@@ -104,7 +104,7 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.vicinity.set_least(reach, &self.surface, &self.nodes.coordinates)?;
+        self.vicinity.set_least(reach)?;
         Ok(self)
     }
 
@@ -122,7 +122,8 @@ impl<T: Real> NodeToFacet<T> {
     /// Tells the facets that the nodes belong to: a node then meets only facets turned against its own normal, which is
     /// the mean of its facets' normals (refused: an angle of less than 60° between the two).
     ///
-    /// This keeps a node from the far side of a thin body, and from facets that it comes to from behind.
+    /// This keeps a node from the far side of a thin body, and from facets that it comes to from behind; of the whole
+    /// surface of its body also from facets that it could meet only through that body.
     ///
     /// # Errors
     ///

@@ -1,7 +1,7 @@
-//! Whether a surface encloses a volume, and how large that is.
+//! Whether a surface encloses a volume, how large that is, and which parts of it enclose the same body.
 
 use super::Surface;
-use super::shape::{Point, cross, dot, sub};
+use super::shape::{Foot, Point, Shape, cross, dot, sub};
 
 impl Surface {
     /// A facet at which the surface ends.
@@ -35,16 +35,94 @@ impl Surface {
         count
     }
 
-    /// The volume that segments or triangles without rim enclose (an area in the plane), negative if their normals
-    /// point into it.
+    /// The volume that the surface encloses if it has no rim (an area in the plane), negative if its normals point
+    /// into it.
     pub(crate) fn volume(&self, positions: &[Point]) -> f64 {
+        self.volume_of(0..self.facets.len(), positions)
+    }
+
+    /// The same of some of its facets.
+    fn volume_of(&self, facets: impl IntoIterator<Item = usize>, positions: &[Point]) -> f64 {
         let Some(&start) = self.nodes.first() else { return 0.0 };
         let at = |node: usize| sub(positions[node], positions[start]);
-        let part = |nodes: &[usize]| match *nodes {
+        let triangle = |[a, b, c]: [usize; 3]| dot(at(a), cross(at(b), at(c))) / 6.0;
+        let part = |facet: usize| match *self.facets[facet].nodes() {
             [a, b] => 0.5 * cross(at(a), at(b))[2],
-            [a, b, c] => dot(at(a), cross(at(b), at(c))) / 6.0,
+            [a, b, c] => triangle([a, b, c]),
+            [a, b, c, d] => triangle([a, b, c]) + triangle([a, c, d]),
             _ => f64::NAN,
         };
-        self.facets.iter().map(|facet| part(facet.nodes())).sum()
+        facets.into_iter().map(part).sum()
+    }
+
+    /// The body that each facet belongs to, by the number of one of its facets. Facets that share nodes, with one
+    /// another or through others, are a part of the surface of one body, and so are the hollows in it: closed parts
+    /// whose normals point into them.
+    pub(crate) fn bodies(&self, positions: &[Point]) -> Vec<usize> {
+        let mut bodies = self.parts();
+        let mut parts: Vec<Vec<usize>> = vec![Vec::new(); bodies.len()];
+        bodies.iter().enumerate().for_each(|(facet, &part)| parts[part].push(facet));
+        let is_closed = |part: &&Vec<usize>| {
+            let has_rim = |&facet: &usize| self.rims[facet].sides[..self.facets[facet].nodes().len()].contains(&true);
+            !part.is_empty() && !part.iter().any(has_rim)
+        };
+        let sized = |part: Vec<usize>| (self.volume_of(part.iter().copied(), positions), part);
+        let closed: Vec<_> = parts.into_iter().filter(|part| is_closed(&part)).map(sized).collect();
+        let (mut hollows, solids): (Vec<_>, Vec<_>) = closed.into_iter().partition(|(volume, _)| *volume < 0.0);
+        // From the outside to the inside. Of solids in each other, as before a press fit, the larger one has the hollow.
+        hollows.sort_by(|one, other| one.0.total_cmp(&other.0));
+        for (k, (volume, hollow)) in hollows.iter().enumerate() {
+            let x = positions[self.facets[hollow[0]].nodes[0]];
+            let is_in_hollow_of = |body: usize| {
+                let mut outer = hollows[..k].iter().filter(|(_, outer)| bodies[outer[0]] == body);
+                outer.any(|(_, outer)| self.height_over(outer, x, positions) > 0.0)
+            };
+            let around = solids.iter().filter(|(other, solid)| {
+                let may_hold = *other > -volume && !is_in_hollow_of(bodies[solid[0]]);
+                may_hold && self.height_over(solid, x, positions) < 0.0
+            });
+            let largest = around.max_by(|one, other| one.0.total_cmp(&other.0));
+            if let Some(body) = largest.map(|(_, solid)| bodies[solid[0]]) {
+                hollow.iter().for_each(|&facet| bodies[facet] = body);
+            }
+        }
+        bodies
+    }
+
+    /// The signed distance of a point from some facets, positive in front of them.
+    fn height_over(&self, facets: &[usize], x: Point, positions: &[Point]) -> f64 {
+        let mut best: Option<(usize, (Shape, Foot))> = None;
+        for &facet in facets {
+            let Some(found) = self.project(facet, x, positions) else { continue };
+            if best.as_ref().is_none_or(|(_, (_, foot))| found.1.is_better_than(foot)) {
+                best = Some((facet, found));
+            }
+        }
+        let height = best.and_then(|(facet, found)| self.direction(facet, x, &found, (0.0, &|_| true), positions));
+        height.map_or(f64::INFINITY, |(_, height)| height)
+    }
+
+    /// The parts of the surface that share no node, by facet: the number of the first facet of each.
+    fn parts(&self) -> Vec<usize> {
+        let mut parts = vec![usize::MAX; self.facets.len()];
+        let mut reached = Vec::new();
+        for first in 0..parts.len() {
+            if parts[first] != usize::MAX {
+                continue;
+            }
+            parts[first] = first;
+            reached.push(first);
+            while let Some(facet) = reached.pop() {
+                for k in 0..self.facets[facet].nodes().len() {
+                    for other in self.facets_at(facet, k) {
+                        if parts[other] == usize::MAX {
+                            parts[other] = first;
+                            reached.push(other);
+                        }
+                    }
+                }
+            }
+        }
+        parts
     }
 }

@@ -141,6 +141,19 @@ impl Base {
             .all(|(&node, gap)| self.is_beside(positions[node], gap))
     }
 
+    /// Whether most of what a master facet covers is deeper behind this one than `depth`.
+    pub(crate) fn is_deeper(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
+        if self.lowest(facet, positions) >= -depth {
+            return false;
+        }
+        let (mut deep, mut all) = (0.0, 0.0);
+        self.each_sample(facet, positions, &mut |sample| {
+            all += sample.area;
+            deep += if -sample.gap > depth { sample.area } else { 0.0 };
+        });
+        2.0 * deep > all
+    }
+
     #[inline]
     fn in_plane(&self, x: Point) -> [f64; 2] {
         let r = sub(x, self.shape.corner(0));

@@ -3,6 +3,7 @@
 use super::Surface;
 use super::cones::Cones;
 use super::kin::{FACING, Kin};
+use super::material::Material;
 use super::nearest_first::{Kept, NearestFirst};
 use super::offsets::Offsets;
 use super::search::{Bounds, overhang};
@@ -71,6 +72,8 @@ pub(crate) struct Ground<'a> {
     pub(crate) own: Option<&'a Surface>,
     /// What nodes do not meet of it, if it is the same surface.
     pub(crate) kin: Option<&'a Kin>,
+    /// The material behind the nodes of that surface and of the other one, if both are known.
+    pub(crate) material: Option<[&'a Material; 2]>,
     pub(crate) positions: &'a [Point],
     pub(crate) offsets: Offsets<'a>,
     /// Shares of a facet below which closeness to a side or a vertex is rounding.
@@ -119,12 +122,25 @@ impl Ground<'_> {
 
     /// Whether a facet is beside a node on its own body.
     fn is_kin(&self, place: usize, facet: usize) -> bool {
-        self.kin.is_some_and(|kin| kin.is_beside(place, facet))
+        self.is_of_one_body(place, facet) && self.kin.is_some_and(|kin| kin.is_beside(place, facet))
     }
 
-    /// Whether a facet is behind a node of its own body by more than there can be of it inside. (By the normal that the
-    /// gap would have: on a side or a vertex a node may be in front of the one facet and behind the other. Where it
-    /// looks along that normal itself there is its own body on the way, whose flanks bulge.)
+    fn is_of_one_body(&self, place: usize, facet: usize) -> bool {
+        let of_own = |[own, _]: [&Material; 2]| own.is_of_one_body(self.surface, place, facet);
+        self.kin.is_some() && self.material.is_some_and(of_own)
+    }
+
+    /// How deep behind a facet a node may be in contact with it; none if its own surface is not known.
+    fn depth(&self, place: usize, facet: usize) -> Option<f64> {
+        let ([own, other], surface) = self.material.zip(self.own)?;
+        let own_place = surface.nodes().binary_search(&self.nodes[place]).ok()?;
+        let behind = if self.is_of_one_body(place, facet) { 0.0 } else { other.behind_facet(self.surface, facet) };
+        Some(own.behind(own_place) + behind)
+    }
+
+    /// Whether a node is behind a facet by so much that there is material of both bodies between them, or of its own
+    /// one. (By the normal that the gap would have: on a side or a vertex a node may be in front of the one facet and
+    /// behind the other. Where it looks along that normal itself there is its own body on the way, whose flanks bulge.)
     fn is_beyond(
         &self,
         place: usize,
@@ -132,13 +148,11 @@ impl Ground<'_> {
         projected: &(Shape, Foot),
         own_normal: &impl Fn() -> Option<Point>,
     ) -> bool {
-        self.kin.is_some_and(|kin| {
-            let p = self.positions[self.nodes[place]];
-            let direction = || self.direction(place, facet, p, projected);
-            let is_behind =
-                |(normal, gap): (Point, f64)| gap < 0.0 || !self.meets((place, facet), normal, own_normal());
-            projected.1.distance > kin.depth(place, facet) && direction().is_some_and(is_behind)
-        })
+        let p = self.positions[self.nodes[place]];
+        let looks_away = |normal: Point| own_normal().is_some_and(|own| dot(own, normal) > FACING);
+        let is_behind = |(normal, gap): (Point, f64)| gap < 0.0 || looks_away(normal);
+        self.depth(place, facet).is_some_and(|depth| projected.1.distance > depth)
+            && self.direction(place, facet, p, projected).is_some_and(is_behind)
     }
 
     /// The closest facet of the node at a place of the list, if its surface is within `reach`; none beyond the rim.

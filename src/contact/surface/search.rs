@@ -128,24 +128,6 @@ impl Neighborhood {
         }
     }
 
-    /// Keeps of each list what is wanted, by the number of its box and its own.
-    pub(crate) fn retain(&mut self, is_wanted: impl Fn(usize, usize) -> bool) {
-        let (mut kept, mut begin) = (0, 0);
-        for k in 0..self.starts.len().saturating_sub(1) {
-            let end = self.starts[k + 1];
-            for place in begin..end {
-                let facet = self.facets[place];
-                if is_wanted(k, facet) {
-                    self.facets[kept] = facet;
-                    kept += 1;
-                }
-            }
-            (begin, self.starts[k + 1]) = (end, kept);
-        }
-        self.facets.truncate(kept);
-        self.facets.shrink_to_fit();
-    }
-
     /// Lists anew, for each box, which of the others are within `range` of it.
     pub(crate) fn build(
         &mut self,

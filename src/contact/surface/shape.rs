@@ -128,22 +128,6 @@ impl Shape {
         self.project(p, rim).is_some_and(|foot| foot.location == Location::Inside)
     }
 
-    /// How far along a ray from x the facet is, if the ray goes through it from the back to the front; a quadrilateral
-    /// is taken as two triangles.
-    pub(crate) fn left_by(&self, x: Point, direction: Point) -> Option<f64> {
-        let [a, b, c, d] = self.corners;
-        let halves = match self.count {
-            4 => [Self::new([a, b, c, c], 3), Self::new([a, c, d, d], 3)],
-            _ => [*self; 2],
-        };
-        halves[..if self.count == 4 { 2 } else { 1 }].iter().find_map(|half| {
-            let normal = half.normal(&[0.0; 4])?;
-            let way = dot(normal, sub(half.corners[0], x)) / dot(normal, direction);
-            let leaves = dot(normal, direction) > 0.0 && way >= 0.0;
-            (leaves && half.holds(add_scaled(x, way, direction))).then_some(way)
-        })
-    }
-
     /// Length of the longest side.
     #[inline]
     pub(crate) fn size(&self) -> f64 {
