@@ -375,7 +375,12 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     pub fn build(self) -> Result<Simulation<'a, T>> {
         let together = Together::new(self.system.ranks());
         let run = self.over_ranks(&together).and_then(|builder| builder.build_together(&together));
-        together.finish(run)
+        let mut run = together.finish(run)?;
+        // (A run that controlled its step size may have left off between two steps of this one.)
+        if run.judge.is_none() {
+            run.set_step_size(run.history.step_size())?;
+        }
+        Ok(run)
     }
 
     /// Puts the ranks, if there are any, between the run and the parts of the host that they are spread over.
@@ -465,13 +470,10 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let checked = self.stability == Stability::Checked && together.is_alone();
         work.stiffening = checked.then(|| Stiffening::of(&*system, &scheme, constraints.may_press())).flatten();
         let booked = self.balance == EnergyBalance::On;
-        let mut ledger = || {
-            let projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
-            Ledger::new(&mut *system, together, &state, (&constraints, &g), projection)
-        };
-        let ledger = booked.then(&mut ledger).transpose()?;
+        let parts = (together, &*self.linear_solver);
+        let ledger = booked.then(|| Ledger::new(&mut *system, parts, &state, (&constraints, &g))).transpose()?;
         let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
-        let mut run = Simulation {
+        Ok(Simulation {
             system,
             constraints,
             g,
@@ -491,12 +493,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             adjustment,
             poisoned: false,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
-        };
-        // (A run that controlled its step size may have left off between two steps of this one.)
-        if run.judge.is_none() {
-            run.set_step_size(run.history.step_size())?;
-        }
-        Ok(run)
+        })
     }
 }
 

@@ -3,9 +3,10 @@
 use super::constraints::Constraints;
 use super::impacts::Impacts;
 use super::results::{Energy, Works, finite};
+use super::start;
 use crate::contact::ContactJacobian;
-use crate::corrector::JumpProjection;
 use crate::error::Result;
+use crate::linear_solver::LinearSolver;
 use crate::mass::Mass;
 use crate::ranks::Together;
 use crate::real::Real;
@@ -35,7 +36,7 @@ pub(crate) struct Ledger<T: Real> {
     /// The same of friction; empty as long as there is none.
     friction: Vec<T>,
     next_friction: Vec<T>,
-    impacts: Impacts<T>,
+    impacts: Box<Impacts<T>>,
     /// Reported forces along the rows where they act.
     forces: Vec<T>,
     /// The same of springs with dashpots; empty as long as there are none.
@@ -73,11 +74,11 @@ pub(crate) struct StepBooks<'a, T> {
 impl<T: Real> Ledger<T> {
     pub(crate) fn new(
         system: &mut dyn System<T>,
-        together: &Together<T>,
+        (together, solver): (&Together<T>, &dyn LinearSolver<T>),
         state: &State<T>,
         rows: Rows<'_, '_, T>,
-        projection: JumpProjection<T>,
     ) -> Result<Self> {
+        let projection = start::projection(system, rows.0, (together, solver))?;
         let zero = || vec![T::zero(); system.dofs()];
         let [supports] = together.max(Ok([system.prescribed().len() as f64]))?;
         let mut ledger = Self {
@@ -96,7 +97,7 @@ impl<T: Real> Ledger<T> {
             next_contact: zero(),
             friction: Vec::new(),
             next_friction: Vec::new(),
-            impacts: Impacts::new(projection, rows.0.room()),
+            impacts: Box::new(Impacts::new(projection, rows.0.room())),
             forces: Vec::new(),
             damped: Vec::new(),
             next_damped: Vec::new(),

@@ -195,15 +195,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
             for k in tangents.of(row) {
                 let at = |end: Option<&Vec<T>>, dof: usize| end.map_or(T::zero(), |end| end[dof]);
                 let way = |(dof, weight): (usize, T)| weight * (at(ends[1], dof) - at(ends[0], dof));
-                let (slip, size) = match ends {
-                    // (A velocity that has vanished has the rounding of what it is the sum of.)
-                    [None, None] => {
-                        (forces.product(k, &new.v), forces.magnitude(k, &new.v) + h * forces.magnitude(k, &new.a))
-                    }
-                    _ => {
-                        let size = ends.into_iter().flatten().map(|end| forces.magnitude(k, end)).sum::<T>();
-                        (forces.row(k).map(way).sum::<T>() / time, size / time)
-                    }
+                // (A velocity that has vanished has the rounding of what it is the sum of.)
+                let (slip, size) = if let [None, None] = ends {
+                    (forces.product(k, &new.v), forces.magnitude(k, &new.v) + h * forces.magnitude(k, &new.a))
+                } else {
+                    let size = ends.into_iter().flatten().map(|end| forces.magnitude(k, end)).sum::<T>();
+                    (forces.row(k).map(way).sum::<T>() / time, size / time)
                 };
                 let own = slips[k - first].rate;
                 trial.slip[k - first] = slip + own;
