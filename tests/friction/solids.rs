@@ -193,8 +193,8 @@ fn contact_of_blocks_thrown_on_one_another_settles() {
     for (k, scheme) in schemes.iter().enumerate() {
         for contact in 0..4 {
             let material = Material { young: [1e3, 1e5][(k + contact) % 2], ..MATERIAL };
-            let block = |size: f64, cells: usize| Solid::block([size, size, 1.0], [cells, cells, 1], material);
-            let blocks = [block(1.0, 4), block(0.9, 6).moved([0.053, 0.031, 0.0])];
+            let block = |size: f64, cells: usize| Solid::block([size, size, 1.0], [cells, cells, 2], material);
+            let blocks = [block(1.0, 4), block(0.7, 6).moved([0.15, 0.15, 0.0])];
             let stack = Stack::new(blocks, 1.37 * speed * h, |x| x);
             let constraints: Vec<Box<dyn ContactConstraint<f64>>> = match contact {
                 0 => vec![Box::new(stack.mortar(true).unwrap().dual().unwrap().friction(0.3))],
@@ -209,11 +209,12 @@ fn contact_of_blocks_thrown_on_one_another_settles() {
                 .constraints(constraints)
                 .build()
                 .unwrap();
-            for step in 0..4 {
+            for step in 0..3 {
                 let before = run.statistics().contact_solves;
                 run.step().unwrap_or_else(|error| panic!("{}, {contact}, step {step}: {error}", scheme().name()));
                 let solves = run.statistics().contact_solves - before;
-                assert!(solves <= 8 * stages, "{}, {contact}, step {step}: {solves}", scheme().name());
+                // (Nodes on an edge of facets may alternate between their normals for a while.)
+                assert!(solves <= 16 * stages, "{}, {contact}, step {step}: {solves}", scheme().name());
             }
             assert!(run.state().contacts().raw_forces().iter().any(|&force| force > 0.0));
         }

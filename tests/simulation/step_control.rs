@@ -186,12 +186,11 @@ fn giving_up_tells_the_story_and_leaves_no_trace() {
         let before = seen(&run);
         for _ in 0..2 {
             match run.step() {
-                Err(error @ Error::StepRefused { t, h, attempts: 4, .. }) => {
+                Err(ref error @ Error::StepRefused { t, h, attempts: 4, source: ref reason }) => {
                     assert!((t - 0.2).abs() < 1e-12 && h == H / 8.0);
                     assert!(!error.is_recoverable());
                     let text = error.to_string();
                     assert!(text.contains("refused 4 times") && text.contains("1.25e-4"), "{text}");
-                    let reason = std::error::Error::source(&error).unwrap();
                     assert!(reason.to_string().contains("force"), "{reason}");
                 }
                 other => panic!("{other:?}"),
