@@ -46,7 +46,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
                 if self.slows(law) {
                     // (Its gap is known: it says whether there is a force.)
-                    rows.enabled[row] = gap < -rows.tolerance[row];
+                    rows.enabled[row] = gap < T::zero();
                     rows.y[row] = -T::of(clock.h) * rows.approach[row];
                     rows.tolerance[row] = rounding(T::of(clock.h) * g.magnitude(row, &new.v));
                     presses = rows.enabled[row];

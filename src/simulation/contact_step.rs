@@ -251,7 +251,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if !self.constraints.laws().damped {
             return Ok(());
         }
-        let [_, by_v, _] = self.stage.balanced().weights();
+        let [by_u, by_v, _] = self.stage.balanced().weights();
         let (t, motion) = self.balanced(new, vectors.balance.as_ref());
         let Self { constraints, g, .. } = self;
         let ContactWork { interface, rows, .. } = contact;
@@ -259,6 +259,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let forces = rows.curved.forces(g);
         for row in (0..constraints.len()).filter(|&row| constraints.law(row).is_damped()) {
             let moved = by_v * forces.interface_product(row, &interface.increment);
+            let gap = rows.balance_gap[row];
+            if by_u == T::zero() && -gap <= constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap) {
+                // (A dashpot begins with all of its force: rounding is no depth.)
+                rows.balance_gap[row] = gap.max(T::zero());
+            }
             rows.approach[row] = -(forces.product(row, &motion.v) + moved + rows.rates[row].rate);
         }
         Ok(())

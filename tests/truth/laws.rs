@@ -15,7 +15,7 @@ const LAWS: [ContactLaw; 10] = [
     ContactLaw::Bipenalty { stiffness: 1.5, mass: 0.25 },
     ContactLaw::StabilizedBipenalty { stiffness: 1.5 },
     ContactLaw::AugmentedLagrangian { stiffness: 1.5, augmentations: 2 },
-    ContactLaw::KelvinVoigt { stiffness: 1.0, damping: 2.0 },
+    ContactLaw::KelvinVoigt { stiffness: 1.0, damping: 1.0 },
     ContactLaw::HuntCrossley { stiffness: 1.0, exponent: 1.5, dissipation: 0.3 },
 ];
 

@@ -274,7 +274,8 @@ impl Stage<'_> {
             }
             _ => (0.0, 0.0),
         };
-        if depth <= 0.0 {
+        // (Rounding is no depth.)
+        if depth <= gap.noise {
             return Form { enabled: false, ..gap };
         }
         if by_rate.abs() > 0.0 {
