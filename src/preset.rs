@@ -73,6 +73,7 @@ impl Preset {
 
     /// The cheapest step: central differences on a lumped mass, whose contact dofs have none: they follow the others
     /// statically, so that nothing is stopped at first touch and impact costs no energy, at any Courant number up to 1.
+    /// The force overshoots the more the nearer that is to 1 (`docs/corrections.md` has figures): 0.9 is a good choice.
     /// Nothing is factorized but the stiffness of the contact dofs among themselves, once. For linear systems whose
     /// damping does not act on the contact dofs (proportional to mass); contact dofs with mass take [`CdLagrange`] on
     /// [`mass::lump`] alone.

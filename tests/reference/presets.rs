@@ -72,13 +72,13 @@ fn sweep(n: usize, load: f64, run: impl Fn(&Bars) -> Record) -> Sweep {
 }
 
 /// The bars with the mass, scheme and corrections of a preset.
-fn by_preset(preset: Preset, bars: &Bars) -> Record {
+fn by_preset(preset: Preset, bars: &Bars, h: f64) -> Record {
     let (m, k) = (bars.consistent_mass::<f64>(), bars.stiffness::<f64>());
     let contact = bars.contact_dofs();
-    let courant = mass::courant(Mass::Consistent(m.as_ref()), k.as_ref(), H).unwrap()[contact[0]];
+    let courant = mass::courant(Mass::Consistent(m.as_ref()), k.as_ref(), h).unwrap()[contact[0]];
     let groups: Vec<usize> = (0..bars.dofs()).map(|dof| usize::from(dof >= contact[1])).collect();
     let m = preset.mass(m.as_ref(), k.symbolic(), &contact, &groups, courant).unwrap();
-    let mut run = Simulation::builder(LinearSystem::new(m, k).unwrap(), preset.integrator(), H)
+    let mut run = Simulation::builder(LinearSystem::new(m, k).unwrap(), preset.integrator(), h)
         .velocity(bars.velocities())
         .constraint(bars.contact())
         .correctors(preset.correctors())
@@ -94,7 +94,7 @@ fn load(preset: Preset) -> f64 {
 #[test]
 fn the_smooth_preset_meets_its_figures() {
     let preset = Preset::smooth();
-    let found = sweep(100, load(preset), |bars| by_preset(preset, bars));
+    let found = sweep(100, load(preset), |bars| by_preset(preset, bars, H));
     assert!(found.mean[MAX] < 1.05 && found.mean[VARIATION] < 2.2 && found.mean[L2] < 0.065, "{:?}", found.mean);
     assert!(found.worst[L2] < 0.08, "{:?}", found.worst);
 }
@@ -102,7 +102,7 @@ fn the_smooth_preset_meets_its_figures() {
 #[test]
 fn the_conservative_preset_meets_both_sets_of_figures() {
     let preset = Preset::conservative();
-    let found = sweep(100, 1.0, |bars| by_preset(preset, bars));
+    let found = sweep(100, 1.0, |bars| by_preset(preset, bars, H));
     assert!(found.mean[LOSS].abs() < 0.0015 && found.mean[VELOCITY] < 0.2, "{:?}", found.mean);
     assert!(found.mean[MAX] < 1.05 && found.mean[VARIATION] < 2.2 && found.mean[L2] < 0.065, "{:?}", found.mean);
     assert!(found.worst[L2] < 0.08, "{:?}", found.worst);
@@ -111,7 +111,7 @@ fn the_conservative_preset_meets_both_sets_of_figures() {
 #[test]
 fn the_courant_number_is_all_that_the_conservative_preset_needs() {
     for (n, error, overshoot) in [(20, 0.03, 1.05), (100, 0.008, 1.05), (400, 0.006, 1.12)] {
-        let found = sweep(n, 1.0, |bars| by_preset(Preset::conservative(), bars));
+        let found = sweep(n, 1.0, |bars| by_preset(Preset::conservative(), bars, H));
         assert!(found.mean[L1] < error && found.mean[MAX] < overshoot, "{n}: {:?}", found.mean);
     }
 }
@@ -128,7 +128,7 @@ fn presets_beat_the_corrected_lumped_mass() {
         record_run(bars, &mut run, 0.4)
     });
     for preset in [Preset::smooth(), Preset::conservative()] {
-        let found = sweep(100, load(preset), |bars| by_preset(preset, bars));
+        let found = sweep(100, load(preset), |bars| by_preset(preset, bars, H));
         for figure in [L2, L1, MAX, VARIATION, LOSS] {
             assert!(found.mean[figure] < plain.mean[figure], "{preset:?} {figure}: {:?} {:?}", found.mean, plain.mean);
         }
@@ -154,9 +154,30 @@ fn central_differences_are_exact_at_courant_one() {
 fn the_explicit_preset_takes_any_courant_number() {
     // 0.1, 0.2, 0.5 and the limit.
     for (n, error) in [(10, 0.08), (20, 0.04), (50, 0.02), (100, 0.006)] {
-        let found = sweep(n, 1.0, |bars| by_preset(Preset::explicit(), bars));
+        let found = sweep(n, 1.0, |bars| by_preset(Preset::explicit(), bars, H));
         assert!(found.mean[L1] < error && found.worst[MAX] < 1.12, "{n}: {:?} {:?}", found.mean, found.worst);
         assert!(found.mean[LOSS].abs() < 0.002 && found.mean[VARIATION] < 3.2, "{n}: {:?}", found.mean);
+    }
+}
+
+/// The overshoot grows with the Courant number, and the energy by what central differences conserve instead of it.
+#[test]
+fn the_explicit_preset_overshoots_most_at_courant_one() {
+    for (n, overshoots) in [(10, [1.09, 1.09, 1.09, 1.10, 1.12]), (20, [1.07, 1.075, 1.075, 1.09, 1.11])] {
+        for (courant, most) in [0.5, 0.8, 0.9, 0.95, 1.0].into_iter().zip(overshoots) {
+            let h = courant * 0.1 / f64::from(n);
+            let (mut largest, mut energy) = (0.0_f64, 0.0);
+            for phase in 0..10 {
+                let bars = Bars::paper(n as usize).delayed(0.05 + 0.1 * f64::from(phase), h);
+                let record = by_preset(Preset::explicit(), &bars, h);
+                largest = record.force.iter().fold(largest, |a, &b| a.max(b / F0));
+                energy += 0.1 * record.energy(record.t.len() - 1) / record.start_energy;
+            }
+            println!(
+                "{n} elements, Courant number {courant}: largest force {largest:.3} F₀, energy after it {energy:.4}"
+            );
+            assert!(largest < most && (0.9999..1.0135).contains(&energy), "{n}, {courant}: {largest} {energy}");
+        }
     }
 }
 
