@@ -105,6 +105,10 @@ pub(crate) struct Scheme<'a> {
     pub(crate) covector: &'a [[f64; 3]],
     /// Which entries of the past later rows read.
     pub(crate) read: &'a [[bool; 3]],
+    /// Whether the next stage starts from a.
+    pub(crate) reads_acceleration: bool,
+    /// Whether the balance holds at the state, and u follows from velocities alone.
+    pub(crate) keeps_balance: bool,
     /// This stage, from 0, and the number of stages of a step.
     pub(crate) stage: usize,
     pub(crate) stages: usize,
@@ -289,14 +293,17 @@ impl<T: Real> Correction<'_, T> {
     /// dissipated by these.
     ///
     /// ```text
-    /// a ← a − M⁻¹ C δv               by schemes that read no a: the balance holds at the corrected state
+    /// a ← a − M⁻¹ C δv               by schemes that read no a, and one-step ones whose balance holds at the state
+    ///                                and whose u follows from velocities: it holds at the corrected state
     /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others, and in systems with damped dofs without mass: it holds to order h
     /// ```
     ///
     /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of
     /// δv at this instant; with h C large beside M it changes v by many times δv, though the damping would have stopped
-    /// the bodies by then. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for
-    /// large ones; momentum is conserved as before. It costs a solve where v changes.
+    /// the bodies by then. The trapezoidal rule and Bathe's schemes take it back within that step, since their damping
+    /// answers to the mean velocity of the step, by which u moves. In other schemes u, or the balance, is moved by a
+    /// itself. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for large ones;
+    /// momentum is conserved as before. It costs a solve where v changes.
     ///
     /// # Errors
     ///
@@ -362,10 +369,16 @@ impl<T: Real> Correction<'_, T> {
 
     /// [`damp_change`](Self::damp_change) of the change in the buffer for it, which is not kept.
     fn damp(&mut self) -> Result<()> {
+        if self.evaluate_damping()? { self.accelerate_by_damping() } else { Ok(()) }
+    }
+
+    /// Evaluates the damping forces that the velocities in the buffer for changes have, or have as a part of v, into
+    /// that for damping. Says whether there is damping.
+    fn evaluate_damping(&mut self) -> Result<bool> {
         let Self { buffers, new, system, .. } = self;
         let Buffers { change, damping, before, .. } = &mut **buffers;
         let linearity = system.0.linearity();
-        let Some(force) = system.0.damping_force() else { return Ok(()) };
+        let Some(force) = system.0.damping_force() else { return Ok(false) };
         match linearity {
             Linearity::Linear => force.evaluate(&new.u, change, damping)?,
             // Forces that are not linear in v are asked for twice.
@@ -378,7 +391,7 @@ impl<T: Real> Correction<'_, T> {
                 T::axpy(-T::one(), before, damping);
             }
         }
-        self.accelerate_by_damping()
+        Ok(true)
     }
 
     /// Adds to a what the change of damping forces in `damping` makes.
@@ -386,8 +399,7 @@ impl<T: Real> Correction<'_, T> {
         let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
         let Buffers { damping: change, damps_massless, .. } = &mut **buffers;
         // (Not asked of this change: where it reaches them by rounding, or hardly, either answer must be the same.)
-        if !*damps_massless && !scheme.read.iter().any(|[.., a]| *a) {
-            // No step starts from a.
+        if !*damps_massless && (scheme.keeps_balance || !scheme.reads_acceleration) {
             projection.apply_inverse(change)?;
             T::axpy(-T::one(), change, &mut new.a);
             return Ok(());
@@ -425,6 +437,13 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
     ///
+    /// Where bodies have damping, and M⁻¹ C δv is what [`apply_impulses`](Self::apply_impulses) changes a by although
+    /// steps start from a, they take back what raw multipliers have given, and their
+    /// rest y is reduced to (s/(s + d))² y, by row, where s is the acceleration that y makes along the row and
+    /// d that of the damping force of the velocity that y makes in a step. A step that resolves the damping has all of
+    /// it but for a share of order h; one that does not would let a force act for a part of the next step that belongs
+    /// to velocities which are gone by then (theory, section 7.1).
+    ///
     /// # Errors
     ///
     /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
@@ -433,21 +452,61 @@ impl<T: Real> Correction<'_, T> {
             return self.push_rubbing_acceleration();
         }
         let rows = std::mem::take(&mut self.buffers.engaged);
-        let forces = std::mem::take(&mut self.buffers.forces);
-        let result = self.push_forces(&rows, &forces);
+        let mut forces = std::mem::take(&mut self.buffers.forces);
+        let result = self.push_forces(&rows, &mut forces);
         (self.buffers.engaged, self.buffers.forces) = (rows, forces);
         result
     }
 
-    /// Adds forces that remove jumps to a, to the reported forces and to the impulses.
-    fn push_forces(&mut self, rows: &[usize], forces: &[T]) -> Result<()> {
+    /// Adds forces that remove jumps, as far as damping lets them, to a, to the reported forces and to the impulses.
+    fn push_forces(&mut self, rows: &[usize], forces: &mut [T]) -> Result<()> {
+        self.limit_forces(rows, forces, T::of(self.scheme.acceleration / self.scheme.balance))?;
         let Self { contacts, projection, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
         projection.push(g, (rows, forces), T::one(), &mut new.a)?;
-        for (&row, &force) in rows.iter().zip(forces) {
+        for (&row, &mut force) in rows.iter().zip(forces) {
             contacts.lambda[row] += share * force;
             contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;
             contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
+        }
+        Ok(())
+    }
+
+    /// Reduces the forces that remove jumps of acceleration by what damping would not let them do within a step; what
+    /// takes back `given` times the raw multipliers stays.
+    pub(super) fn limit_forces(&mut self, rows: &[usize], forces: &mut [T], given: T) -> Result<()> {
+        if self.buffers.change.is_empty() || !(self.scheme.reads_acceleration && self.scheme.keeps_balance) {
+            return Ok(());
+        }
+        let Self { buffers, contacts, projection, g, scheme, h, .. } = self;
+        let Buffers { change, straight: rest, by_straight: moved, .. } = &mut **buffers;
+        rest.clear();
+        rest.extend(rows.iter().zip(&*forces).map(|(&row, &force)| {
+            let raw = given * contacts.lambda_raw[row];
+            force + if force < T::zero() { raw.max(T::zero()).min(-force) } else { raw.min(T::zero()).max(-force) }
+        }));
+        if rest.iter().all(|&rest| rest == T::zero()) {
+            return Ok(());
+        }
+        // The change of velocity that goes with one of acceleration in a step, and the damping of it.
+        let [_, by_v, by_a] = scheme.response;
+        let time = T::of(*h * by_v / by_a);
+        change.fill(T::zero());
+        projection.push(g, (rows, rest), time, change)?;
+        moved.clear();
+        moved.extend(rows.iter().map(|&row| (g.product(row, change) / time).abs()));
+        if !self.evaluate_damping()? {
+            return Ok(());
+        }
+        let Self { buffers, projection, g, .. } = self;
+        let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
+        projection.apply_inverse(damping)?;
+        for (((&row, force), &rest), &moved) in rows.iter().zip(forces).zip(&*rest).zip(&*moved) {
+            let resisted = g.product(row, damping).abs();
+            if resisted > T::zero() {
+                let part = moved / (moved + resisted);
+                *force -= (T::one() - part * part) * rest;
+            }
         }
         Ok(())
     }

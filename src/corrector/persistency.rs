@@ -41,7 +41,8 @@ pub enum HistoryProjection {
 /// p' = p − (w_ā/w_a) S⁻¹ (G a − γ_a)
 /// ```
 ///
-/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses). p' is the reported force;
+/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses), and what it leaves of λ_v
+/// where a step does not resolve it, at [`push_acceleration`](Correction::push_acceleration). p' is the reported force;
 /// the raw p keeps deciding release. Rows that touch without pressure are corrected on approach only. Linear momentum
 /// is conserved, and the correction never raises the kinetic energy: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n)
 /// of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed

@@ -217,6 +217,10 @@ pub(crate) struct CompiledStage<T> {
     /// Momentum covector after the stage.
     pub(crate) covector: Vec<[f64; 3]>,
     pub(crate) read: Vec<[bool; 3]>,
+    /// Whether the next stage starts from a.
+    pub(crate) reads_acceleration: bool,
+    /// Whether the balance holds at the state, no row of a velocity reads an acceleration, and none the step before.
+    pub(crate) keeps_balance: bool,
 }
 
 impl<T: Real> CompiledStage<T> {
@@ -238,6 +242,8 @@ impl<T: Real> CompiledStage<T> {
             response: [1.0, 0.0, 0.0],
             covector: Vec::new(),
             read: Vec::new(),
+            reads_acceleration: false,
+            keeps_balance: false,
         }
     }
 
@@ -306,21 +312,24 @@ impl<T: Real> Compiler<'_, T> {
     pub(crate) fn compile(&mut self, tableau: &Tableau) -> Result<Program<T>> {
         let momentum = tableau.momentum();
         let books = |s: usize| Ok((momentum.after_stage(s)?.to_vec(), tableau.read_after(s)?));
-        self.stages(&tableau.stages, books)
+        self.stages(tableau, books)
     }
 
     /// Compiles the one-step scheme `start` whose first steps make the past of the multistep scheme `reader`. Its
     /// momentum covectors change from step to step and are not part of the program.
     pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
-        self.stages(&start.stages, |_| Ok((Vec::new(), reader.reads_after(reader.stages.len() - 1))))
+        self.stages(start, |_| Ok((Vec::new(), reader.reads_after(reader.stages.len() - 1))))
     }
 
     fn stages(
         &mut self,
-        stages: &[Stage],
+        tableau: &Tableau,
         books: impl Fn(usize) -> Result<(Vec<[f64; 3]>, Vec<[bool; 3]>)>,
     ) -> Result<Program<T>> {
         let mut program = Program { stages: Vec::new(), operators: Vec::new() };
+        let stages = &tableau.stages;
+        let reads_no_a = |stage: &Stage| stage.recovery.v.a.iter().all(|a| a.abs() < 1e-12);
+        let by_velocities = tableau.depth() == 1 && stages.iter().all(reads_no_a);
         for (s, stage) in stages.iter().enumerate() {
             let weights = stage.balance.each().map(|row| row.z);
             let shared = program.operators.iter().position(|operator| operator.serves(weights));
@@ -351,6 +360,8 @@ impl<T: Real> Compiler<'_, T> {
                 response: stage.response(),
                 covector,
                 read,
+                reads_acceleration: tableau.reads_after(s).iter().any(|[.., a]| *a),
+                keeps_balance: by_velocities && stage.is_collocated(),
             });
         }
         Ok(program)

@@ -392,6 +392,8 @@ fn numbers<'s, T: Real>(
         balance: stage.balance_acceleration,
         covector,
         read: &stage.read,
+        reads_acceleration: stage.reads_acceleration,
+        keeps_balance: stage.keeps_balance,
         stage: place,
         stages,
         length: stage.end - stage.start,

@@ -143,6 +143,13 @@ impl<T: Real> Correction<'_, T> {
         } else {
             self.solve_past((k, field), engaged, false)?;
         }
+        if field == 2 {
+            let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
+            let (rows, mut increments) = (std::mem::take(rows), std::mem::take(increments));
+            let result = self.limit_forces(&rows, &mut increments, T::zero());
+            (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
+            result?;
+        }
         let Self { past, constraints, buffers, projection, g, contacts, scheme, h, energy, closed_at_start, .. } = self;
         let Buffers { rubbing, rates, past_slips, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
@@ -251,8 +258,8 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces found along gaps and tangents.
     pub(super) fn push_rubbing_acceleration(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
-        let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
-        let result = self.push_forces(&rows, &increments);
+        let (rows, mut increments) = (std::mem::take(rows), std::mem::take(increments));
+        let result = self.push_forces(&rows, &mut increments);
         (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
         result
     }

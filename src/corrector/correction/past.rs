@@ -76,6 +76,12 @@ impl<T: Real> Correction<'_, T> {
         if constraints.0.turn() {
             self.see_straight((k, field), rows)?;
         }
+        if field == 2 {
+            let mut forces = std::mem::take(&mut self.buffers.jump);
+            let result = self.limit_forces(rows, &mut forces, T::zero());
+            self.buffers.jump = forces;
+            result?;
+        }
         let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, closed_at_start, .. } = self;
         let Buffers { rates, jump, tolerance: before, rebounds, .. } = &mut **buffers;
         let motion = &mut past[k - 1];

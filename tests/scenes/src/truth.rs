@@ -70,6 +70,10 @@ struct Place<'p> {
     stage: &'p Stage,
     /// What later rows read of the past behind it.
     reads: &'p Reads,
+    /// Whether no row of a velocity of the scheme reads an acceleration, and none the step before.
+    by_velocities: bool,
+    /// Whether the trapezoidal rule makes the past of another scheme.
+    starts: bool,
     t: f64,
     is_first: bool,
     is_last: bool,
@@ -112,6 +116,8 @@ impl Truth {
         // already that of the scheme itself.
         let tableau = if starts { Newmark::trapezoidal().tableau() } else { self.tableau.clone() };
         let stages = tableau.stages.len();
+        let by_velocities = history::depth(&tableau) == 1
+            && tableau.stages.iter().all(|stage| stage.recovery.v.a.iter().all(|a| a.abs() < 1e-12));
         let closed_at_start = self.contacts.closed.clone();
         let before = self.contacts.forces.clone();
         let mut reported = before[..self.scene.rows.len()].to_vec();
@@ -122,6 +128,8 @@ impl Truth {
             let place = Place {
                 stage,
                 reads: &reads,
+                by_velocities,
+                starts,
                 t: self.since + f64::from(self.steps) * self.scene.h,
                 is_first: s == 0,
                 is_last: s + 1 == stages,

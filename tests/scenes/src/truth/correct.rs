@@ -138,7 +138,7 @@ impl Step<'_> {
         }
         let rows = self.engaged.clone();
         let y = self.jumps(&rows, Jump::Acceleration, true);
-        for &(axis, y) in &y {
+        for (axis, y) in self.limit(y, 1.0 / share) {
             add(&mut self.past[0].a, y, &self.responses[axis]);
             self.contacts.forces[axis] += share * y;
         }
@@ -235,6 +235,37 @@ impl Step<'_> {
         [ago * (0.5 * ago * acceleration - rate), rate - ago * acceleration, acceleration][field]
     }
 
+    /// Whether a step starts from a.
+    fn reads_acceleration(&self) -> bool {
+        self.place.starts || self.place.reads.iter().any(|[.., a]| *a)
+    }
+
+    fn keeps_balance(&self) -> bool {
+        self.place.by_velocities && self.place.stage.is_collocated()
+    }
+
+    /// What damping leaves of the forces that remove jumps of acceleration, beyond what takes back so much of the raw
+    /// multipliers.
+    fn limit(&self, forces: Vec<(usize, f64)>, given: f64) -> Vec<(usize, f64)> {
+        let scene = self.scene;
+        let Some(damping) = scene.damping.as_ref().filter(|_| self.reads_acceleration() && self.keeps_balance()) else {
+            return forces;
+        };
+        let rest = |&(axis, y): &(usize, f64)| {
+            let most = given * self.contacts.raw[axis];
+            if y * most < 0.0 { y - y.signum() * y.abs().min(most.abs()) } else { y }
+        };
+        let mut by_rest = vec![0.0; scene.dofs()];
+        forces.iter().for_each(|force| add(&mut by_rest, rest(force), &self.responses[force.0]));
+        let time = self.h() * self.response[1] / self.response[2];
+        let resisted: Vec<f64> = scene.accelerate(&product(damping, &by_rest)).iter().map(|a| time * a).collect();
+        let part = |axis: usize| {
+            let [s, d] = [&by_rest, &resisted].map(|a| dot(scene.axes()[axis], a).abs());
+            if d > 0.0 { (s / (s + d)).powi(2) } else { 1.0 }
+        };
+        forces.iter().map(|force| (force.0, force.1 - (1.0 - part(force.0)) * rest(force))).collect()
+    }
+
     /// w_ā/w_a.
     fn share(&self) -> f64 {
         self.place.stage.balance.a.z / self.place.stage.recovery.a.z
@@ -306,6 +337,8 @@ impl Step<'_> {
         for &(axis, x) in impulses {
             add(&mut change, x, &self.responses[axis]);
         }
+        // Where u follows from velocities alone, and the balance holds at the state, damping takes back what it gives.
+        let effective = self.reads_acceleration() && !self.keeps_balance() || scene.damps_massless();
         let new = &mut self.past[0];
         let before = new.v.clone();
         add(&mut new.v, 1.0, &change);
@@ -318,7 +351,7 @@ impl Step<'_> {
         }
         let Some(damping) = scene.damping.as_ref().filter(|_| change.iter().any(|x| x.abs() > 0.0)) else { return };
         let mut force = product(damping, &change);
-        if self.place.reads.iter().any(|[.., a]| *a) || scene.damps_massless() {
+        if effective {
             let mut matrix = self.before.matrix.clone();
             scene.hold(&mut matrix, &mut force);
             let mut response = solve(matrix, force).expect("an effective matrix that is regular");
@@ -414,12 +447,16 @@ impl Step<'_> {
                 self.contacts.taken[i] -= multipliers[place] * mean;
             }
         }
+        let mut multipliers: Vec<_> = axes.into_iter().zip(multipliers).collect();
+        if field == 2 {
+            multipliers = self.limit(multipliers, 0.0);
+        }
         let old = &mut self.past[k];
         let values = [&mut old.u, &mut old.v, &mut old.a];
         for (value, place) in values.into_iter().zip(0..).filter(|(_, place)| *place == field) {
             let _ = place;
-            for (&axis, m) in axes.iter().zip(&multipliers) {
-                add(value, *m, &self.responses[axis]);
+            for (axis, m) in &multipliers {
+                add(value, *m, &self.responses[*axis]);
             }
         }
     }
