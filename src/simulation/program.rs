@@ -345,6 +345,11 @@ impl<T: Real> Compiler<'_, T> {
             }
             let increment = stage.increment();
             let (covector, read) = books(s)?;
+            let own = tableau.reads_after(s);
+            let reads_a = |read: &[[bool; 3]]| read.iter().any(|[.., a]| *a);
+            // (What a multistep scheme that reads a starts with is corrected as its own steps are.)
+            let is_own = own.len() == read.len() || !reads_a(&read[..]);
+            let keeps_balance = is_own && by_velocities && stage.is_collocated();
             program.stages.push(CompiledStage {
                 recovery: ScaledRows::new(&increment.recovery, self.h),
                 balance: (!stage.is_collocated()).then(|| ScaledRows::new(&increment.balance, self.h)),
@@ -359,9 +364,9 @@ impl<T: Real> Compiler<'_, T> {
                 balance_acceleration: stage.balance.a.z,
                 response: stage.response(),
                 covector,
+                reads_acceleration: reads_a(&own[..]) || reads_a(&read[..]),
                 read,
-                reads_acceleration: tableau.reads_after(s).iter().any(|[.., a]| *a),
-                keeps_balance: by_velocities && stage.is_collocated(),
+                keeps_balance,
             });
         }
         Ok(program)
