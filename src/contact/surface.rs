@@ -56,21 +56,21 @@ pub(crate) const RECOVERY: f64 = 1e-4;
 /// serves all, and its output.
 ///
 /// ```
-/// use contact_dynamics::contact::{Mortar, Surface};
+/// use contact_dynamics::contact::{BodyContact, Surface};
 ///
 /// // Two unit squares, the second one 0.1 above the first.
 /// let coordinates = [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0., 1.1], [1., 1.1], [1., 2.1], [0., 2.1]];
 /// let dofs: Vec<[usize; 2]> = (0..8).map(|node| [2 * node, 2 * node + 1]).collect();
 /// let lower = Surface::of_cells(&coordinates, [[0, 1, 2, 3]])?;
 /// let upper = Surface::of_cells(&coordinates, [[4, 5, 6, 7]])?;
-/// let contact = Mortar::new(&coordinates, &dofs, &upper, &lower)?;
+/// let contact = BodyContact::new(&coordinates, &dofs, &upper, &lower)?;
 ///
-/// // Of a force of 3 on the node (1, 1) of the lower square, downward: half of both sides that meet there is its own.
+/// // The upper side of the lower square bears 3 on each of its nodes, downward, of which half of the side is their own.
 /// let mut forces = [[0.0; 2]; 8];
-/// forces[2] = [0.0, -3.0];
+/// (forces[2], forces[3]) = ([0.0, -3.0], [0.0, -3.0]);
 /// let pressures = lower.pressures(&coordinates, &forces)?;
 /// let corner = lower.nodes().iter().position(|&node| node == 2).ok_or("a node of the surface")?;
-/// assert!((pressures[corner] - 3.0_f64).abs() < 1e-14);
+/// assert!((pressures[corner] - 6.0_f64).abs() < 1e-14);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -190,6 +190,31 @@ fn areas_and_normals_of_a_ball_converge() {
 }
 
 #[test]
+fn the_pressure_of_one_side_is_that_of_its_rim_and_corners() {
+    // A block whose lower side bears a pressure of 3, with friction up to 0.4 of it in any direction.
+    let block = Solid::block([1.0, 2.0, 1.0], [3, 2, 2], MATERIAL).mapped(|[x, y, z]| [x * (1.0 + 0.2 * y), y, z]);
+    let surface = Surface::of_cells(&block.nodes, &block.elements).unwrap();
+    let is_below = |node: &usize| block.nodes[*node][2] == 0.0;
+    let below = block.boundary().into_iter().filter(|facet| facet.iter().all(is_below));
+    let below = Surface::new(&block.nodes, below.map(|f| Facet::from([f[0], f[1], f[2], f[3]]))).unwrap();
+    let areas = below.areas(&block.nodes).unwrap();
+    for (slip, direction) in [(0.0, 0.0), (0.4, 0.3), (0.4, 2.0), (0.4, -2.4)] {
+        let mut forces = vec![[0.0; 3]; block.nodes.len()];
+        let (s, c) = f64::sin_cos(direction);
+        for (&node, area) in below.nodes().iter().zip(&areas) {
+            forces[node] = [slip * c, slip * s, 1.0].map(|share| 3.0 * share * area);
+        }
+        let pressures = surface.pressures(&block.nodes, &forces).unwrap();
+        let shears = surface.shears(&block.nodes, &forces).unwrap();
+        for ((&node, pressure), shear) in surface.nodes().iter().zip(pressures).zip(shears) {
+            let expected = if is_below(&node) { [3.0, 3.0 * slip * c, 3.0 * slip * s] } else { [0.0; 3] };
+            let found = [pressure, shear[0], shear[1]];
+            assert!(found.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{slip} {node}: {found:?}");
+        }
+    }
+}
+
+#[test]
 fn a_pressure_comes_out_as_it_went_in() {
     // Skewed bilinear facets, edges and corners: the forces of a pressure of 3 by its potential, the volume.
     let block = Solid::block([1.0; 3], [2; 3], MATERIAL).mapped(|[x, y, z]| [x + 0.3 * y * z, y - 0.2 * x * x, z + x]);

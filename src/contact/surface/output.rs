@@ -40,9 +40,13 @@ impl Surface {
     }
 
     /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make:
-    /// −f·A/|A|² with A = ∫ N n dA, n outward. A pressure that is the same all over the surface comes out as it is, at
-    /// edges and corners too; what it leaves of the forces is [`shears`](Self::shears). On facets of second order,
-    /// whose nodes in the middle bear most of a pressure, f is what their linear parts would have of it.
+    /// −f·A/|A|² with A = ∫ N n dA, n outward, of the face that the node is on; what it leaves of the force is
+    /// [`shears`](Self::shears). A face is what facets make that meet at less than 37°. At edges and corners those faces
+    /// count that have a facet there all of whose nodes bear a force (if none has, all), and pressures p_k ≥ 0 on them
+    /// make up the force best, f ≈ −Σ p_k A_k: that of the face that bears most is the node's. So the pressure on one
+    /// side of a body is that of its rim and corners too, and a pressure that is the same all over a body comes out as
+    /// it is. On facets of second order, whose nodes in the middle bear most of a pressure, f is what their linear parts
+    /// would have of it.
     ///
     /// `positions` and `forces` are those of all nodes of the mesh: contact forces are those of
     /// [`contact_forces`](crate::Simulation::contact_forces). At the border of a contact that ends inside of a facet
@@ -69,34 +73,81 @@ impl Surface {
 
     /// Pressure and shear stress at each node; zero where facets cancel each other.
     fn tractions<T: Real, const D: usize>(&self, positions: &[[T; D]], forces: &[[T; D]]) -> Result<Vec<(f64, Point)>> {
-        let (positions, forces) = (self.points(positions)?, self.on_parts(self.points(forces)?));
-        let mut areas = vec![[0.0; 3]; self.nodes.len()];
-        self.integrate(&positions, |place, share, area| areas[place] = add_scaled(areas[place], share, area));
-        let traction = |(&node, area): (&usize, Point)| {
-            let (force, square) = (forces[node], dot(area, area));
-            if square <= 0.0 {
-                return (0.0, [0.0; 3]);
-            }
-            let pressure = -dot(force, area) / square;
-            (pressure, add_scaled(force, pressure, area).map(|f| f / square.sqrt()))
+        let (positions, forces) = (self.points(positions)?, self.points(forces)?);
+        let loaded = self.loaded(&forces);
+        let forces = self.on_parts(forces, &loaded, &positions);
+        let traction = |(place, &node): (usize, &usize)| {
+            let faces = self.faces(place, &loaded, &positions);
+            let (pressures, rest) = pressures_of(forces[node], &faces);
+            let bears = |k: &usize| pressures[*k].abs() * norm(faces[*k].area);
+            let most = (0..faces.len()).max_by(|one, other| bears(one).total_cmp(&bears(other)));
+            most.map_or((0.0, [0.0; 3]), |most| {
+                let area = norm(faces[most].area);
+                if area > 0.0 { (pressures[most], rest.map(|f| f / area)) } else { (0.0, [0.0; 3]) }
+            })
         };
-        Ok(self.nodes.iter().zip(areas).map(traction).collect())
+        Ok(self.nodes.iter().enumerate().map(traction).collect())
+    }
+
+    /// Whether all nodes of each facet bear a force. (Of a facet of second order some bear none of a constant
+    /// pressure.)
+    fn loaded(&self, forces: &[Point]) -> Vec<bool> {
+        let bears = |node: &usize| forces[*node] != [0.0; 3];
+        self.facets.iter().map(|facet| facet.whole.is_some() || facet.nodes().iter().all(bears)).collect()
+    }
+
+    /// The faces around a node that have a loaded facet there, or all of them if none has.
+    fn faces(&self, place: usize, loaded: &[bool], positions: &[Point]) -> Vec<Face> {
+        /// Cosine between the normals of facets of one face at least: 37°.
+        const SMOOTH: f64 = 0.8;
+        let mut faces: Vec<Face> = Vec::new();
+        for &(index, corner) in self.corners_at(place) {
+            let facet = &self.facets[index];
+            let points = quadrature(facet, &facet.shape(positions)).into_iter();
+            let area = points.fold([0.0; 3], |sum, (weights, area)| add_scaled(sum, weights[corner], area));
+            let mut face = Face { area, facets: vec![index] };
+            faces.retain(|other| {
+                let joins = dot(area, other.area) > SMOOTH * norm(area) * norm(other.area);
+                if joins {
+                    face.area = add_scaled(face.area, 1.0, other.area);
+                    face.facets.extend(&other.facets);
+                }
+                !joins
+            });
+            faces.push(face);
+        }
+        let is_loaded = |face: &Face| face.facets.iter().any(|&facet| loaded[facet]);
+        if faces.iter().any(is_loaded) {
+            faces.retain(is_loaded);
+        }
+        faces
     }
 
     /// Forces as linear parts of facets of second order would have them, which have the same sum.
-    fn on_parts(&self, forces: Vec<Point>) -> Vec<Point> {
+    fn on_parts(&self, forces: Vec<Point>, loaded: &[bool], positions: &[Point]) -> Vec<Point> {
         if self.facets.iter().all(|facet| facet.whole.is_none()) {
             return forces;
         }
-        // By place how many facets a node has: each hands on its part of the force.
-        let mut facets = vec![0.0; self.nodes.len()];
-        let own = self.facets.iter().flat_map(Facet::nodes);
-        own.for_each(|&node| facets[self.place(node)] += 1.0);
+        // By place, the facets there with their parts of the force: each hands on its own.
+        let parts = |(place, &node): (usize, &usize)| -> Vec<(usize, Point)> {
+            let faces = self.faces(place, loaded, positions);
+            let (pressures, rest) = pressures_of(forces[node], &faces);
+            let largest = pressures.iter().fold(0.0, |most: f64, p| most.max(p.abs()));
+            let bearing = pressures.iter().filter(|p| p.abs() >= largest).count();
+            let part = |(face, pressure): (&Face, f64)| {
+                let rest = if pressure.abs() >= largest { rest.map(|f| f / bearing as f64) } else { [0.0; 3] };
+                let force = add_scaled(rest, -pressure, face.area).map(|f| f / face.facets.len() as f64);
+                face.facets.iter().map(|&facet| (facet, force)).collect::<Vec<_>>()
+            };
+            faces.iter().zip(pressures).flat_map(part).collect()
+        };
+        let parts: Vec<_> = self.nodes.iter().enumerate().map(parts).collect();
         let mut moved = forces.clone();
-        for facet in &self.facets {
+        for (index, facet) in self.facets.iter().enumerate() {
             let Some(whole) = &facet.whole else { continue };
             for (corner, &node) in facet.nodes().iter().enumerate() {
-                let force = forces[node].map(|f| f / facets[self.place(node)]);
+                let part = parts[self.place(node)].iter().find(|(facet, _)| *facet == index);
+                let Some(&(_, force)) = part else { continue };
                 for (other, share) in facet.all_nodes().zip(whole.given(corner)) {
                     // (A part alone keeps what the others would get.)
                     if self.nodes.binary_search(&other).is_ok() {
@@ -133,6 +184,33 @@ impl Surface {
         }
         points(of_nodes)
     }
+}
+
+/// Facets around a node that meet smoothly, and their ∫ N n dA.
+struct Face {
+    area: Point,
+    facets: Vec<usize>,
+}
+
+/// The pressures of some faces of a node that make up its force best, all of one sign, and what they leave of it.
+fn pressures_of(force: Point, faces: &[Face]) -> (Vec<f64>, Point) {
+    const SWEEPS: usize = 200;
+    let all = faces.iter().fold([0.0; 3], |sum, face| add_scaled(sum, 1.0, face.area));
+    let sign = if dot(force, all) > 0.0 { -1.0 } else { 1.0 };
+    let (mut pressures, mut rest) = (vec![0.0; faces.len()], force);
+    // (Projected Gauss–Seidel sweeps of least squares: one for one face, and where faces are at right angles.)
+    for _ in 0..if faces.len() > 1 { SWEEPS } else { 1 } {
+        for (pressure, face) in pressures.iter_mut().zip(faces) {
+            let square = dot(face.area, face.area);
+            if square > 0.0 {
+                let next = *pressure - dot(rest, face.area) / square;
+                let next = if faces.len() > 1 { sign * (sign * next).max(0.0) } else { next };
+                rest = add_scaled(rest, next - *pressure, face.area);
+                *pressure = next;
+            }
+        }
+    }
+    (pressures, rest)
 }
 
 /// Shape functions at some points of a facet, with the area times the normal that belongs to each.
