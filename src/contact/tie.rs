@@ -45,7 +45,6 @@ const REACH: f64 = 0.1;
 ///
 /// # Known failure
 ///
-/// - Over quadrilaterals that are no parallelograms integrals are those of a quadrature (1e-7 in the patch test).
 /// - Rates of rows that turn are differences of gaps along the motion.
 /// - Facets that see each other at more than 60° are not tied.
 ///
