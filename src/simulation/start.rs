@@ -227,10 +227,10 @@ impl<T: Real> Start<'_, T> {
         if constraints.laws().damped {
             constraints.finite_rates(t, &motion.u, &motion.v, &mut rates)?;
         }
-        for row in 0..constraints.len() {
+        for (row, own) in rates.iter().enumerate() {
             let law = constraints.law(row);
             if law.is_spring() {
-                let force = law.force(contacts.gap[row], -(g.product(row, &motion.v) + rates[row].rate));
+                let force = law.force(contacts.gap[row], -(g.product(row, &motion.v) + own.rate));
                 if force > T::zero() {
                     projection.push(g, (&[row], &[force]), T::one(), &mut motion.a)?;
                 }

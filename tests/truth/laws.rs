@@ -16,7 +16,7 @@ const LAWS: [ContactLaw; 10] = [
     ContactLaw::StabilizedBipenalty { stiffness: 1.5 },
     ContactLaw::AugmentedLagrangian { stiffness: 1.5, augmentations: 2 },
     ContactLaw::KelvinVoigt { stiffness: 1.0, damping: 1.0 },
-    ContactLaw::HuntCrossley { stiffness: 1.0, exponent: 1.5, dissipation: 0.3 },
+    ContactLaw::HuntCrossley { stiffness: 0.5, exponent: 1.5, dissipation: 0.01 },
 ];
 
 const CORRECTIONS: [Correction; 3] = [Correction::None, Correction::History, Correction::Splitting];
