@@ -103,7 +103,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     continue;
                 }
                 let law = self.constraints.law(row);
-                if law.is_nonlinear() {
+                // (Of a known gap the force is linear in the rate.)
+                if law.is_nonlinear() && !self.slows(&law) {
                     let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
                     let course = course(self.stage, self.clock.h, [gaps[row], approach[row]]);

@@ -58,40 +58,40 @@ const TABLE: &str = "\
 ... ... ... +.. +.. +.. ... +.. +.. +.. Noh–Bathe(0.5858)
 ";
 
-/// The same of the laws that admit friction.
+/// The same of laws that admit friction.
 const RUBBING: &str = "\
-.+. ++. ++. ++. ++. ++. composite
-.+. +++ +++ +++ +++ +++ Newmark(0.25, 0.5)
-.+. ++u ++u ++u ++u ++u Newmark(0.3025, 0.6)
-.+. +++ +++ +++ +++ +++ Newmark(0.5, 1)
-.+. ++u ++u ++u ++u ++u HHT-α(0.5)
-.+. ++u ++u ++u ++u ++u WBZ-α(0.5)
-.+. ++u ++u ++u ++u ++u Chung–Hulbert(0.9)
-.+. ++u ++u ++u ++u ++u Chung–Hulbert(0.8)
-.+. ++u ++u ++u ++u ++u Chung–Hulbert(0.5)
-.+. ++u ++u ++u ++u ++u Chung–Hulbert(0)
-.+. ++u ++u ++u ++u ++u GSSSS-U0(0.8, 0.8, 0.8)
-.+. +++ +++ +++ +++ +++ GSSSS-U0(1, 1, 0)
-.+. ++. ++. ++. ++. ++. Houbolt
-.+. ++. ++. ++. ++. ++. Park
-.+. ++. ++. ++. ++. ++. BDF2
-.+. ++. ++. ++. ++. ++. OALTS(0.5)
-.+. ++. ++. ++. ++. ++. Bathe
-.+. ++. ++. ++. ++. ++. Bathe(γ = 0.5)
-.+. ++. ++. ++. ++. ++. ρ∞-Bathe(0.5)
-.+. ++. ++. ++. ++. ++. ρ∞-Bathe(0.9)
-.+. ++. ++. ++. ++. ++. ρ∞-Bathe(1)
-+.. +.. +.. +.. +.. +.. Moreau–Jean(0.5)
-+.. +.. +.. +.. +.. +.. Moreau–Jean(1)
-.+. +++ +++ +++ +++ +++ energy–momentum
-... +.. +.. +.. +.. +.. central difference
-+.. +.. +.. +.. +.. +.. CD-Lagrange
-... ... ... ... ... ... Tchamwa–Wielgosz(1.033)
-.+. ++u ++u ++u ++u ++u Chung–Lee(1.0370)
-.+. ++u ++u ++u ++u ++u Hulbert–Chung(0.8)
-.+. ++u ++u ++u ++u ++u Hulbert–Chung(0.5)
-... +.. +.. +.. +.. +.. Noh–Bathe(0.5400)
-... +.. +.. +.. +.. +.. Noh–Bathe(0.5858)
+.+. ++. ++. ++. ++. composite
+.+. +++ +++ +++ +++ Newmark(0.25, 0.5)
+.+. ++u ++u ++u ++u Newmark(0.3025, 0.6)
+.+. +++ +++ +++ +++ Newmark(0.5, 1)
+.+. ++u ++u ++u ++u HHT-α(0.5)
+.+. ++u ++u ++u ++u WBZ-α(0.5)
+.+. ++u ++u ++u ++u Chung–Hulbert(0.9)
+.+. ++u ++u ++u ++u Chung–Hulbert(0.8)
+.+. ++u ++u ++u ++u Chung–Hulbert(0.5)
+.+. ++u ++u ++u ++u Chung–Hulbert(0)
+.+. ++u ++u ++u ++u GSSSS-U0(0.8, 0.8, 0.8)
+.+. +++ +++ +++ +++ GSSSS-U0(1, 1, 0)
+.+. ++. ++. ++. ++. Houbolt
+.+. ++. ++. ++. ++. Park
+.+. ++. ++. ++. ++. BDF2
+.+. ++. ++. ++. ++. OALTS(0.5)
+.+. ++. ++. ++. ++. Bathe
+.+. ++. ++. ++. ++. Bathe(γ = 0.5)
+.+. ++. ++. ++. ++. ρ∞-Bathe(0.5)
+.+. ++. ++. ++. ++. ρ∞-Bathe(0.9)
+.+. ++. ++. ++. ++. ρ∞-Bathe(1)
++.. +.. +.. +.. +.. Moreau–Jean(0.5)
++.. +.. +.. +.. +.. Moreau–Jean(1)
+.+. +++ +++ +++ +++ energy–momentum
+... +.. +.. +.. +.. central difference
++.. +.. +.. +.. +.. CD-Lagrange
+... ... ... ... ... Tchamwa–Wielgosz(1.033)
+.+. ++u ++u ++u ++u Chung–Lee(1.0370)
+.+. ++u ++u ++u ++u Hulbert–Chung(0.8)
+.+. ++u ++u ++u ++u Hulbert–Chung(0.5)
+... +.. +.. +.. +.. Noh–Bathe(0.5400)
+... +.. +.. +.. +.. Noh–Bathe(0.5858)
 ";
 
 fn table(laws: &[ContactLaw], rubs: bool) -> String {
@@ -137,7 +137,7 @@ fn runs_with_other_laws_are_those_of_the_truth() {
 
 #[test]
 fn runs_with_other_laws_and_friction_are_those_of_the_truth() {
-    let rubbing: Vec<ContactLaw> = [0, 3, 4, 7, 8, 9].map(|law| LAWS[law]).to_vec();
+    let rubbing: Vec<ContactLaw> = [0, 3, 4, 7, 8].map(|law| LAWS[law]).to_vec();
     let found = table(&rubbing, true);
     println!("{found}");
     assert_eq!(found, RUBBING);
