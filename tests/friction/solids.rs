@@ -213,8 +213,8 @@ fn contact_of_blocks_thrown_on_one_another_settles() {
                 let before = run.statistics().contact_solves;
                 run.step().unwrap_or_else(|error| panic!("{}, {contact}, step {step}: {error}", scheme().name()));
                 let solves = run.statistics().contact_solves - before;
-                // (Nodes on an edge of facets may alternate between their normals for a while.)
-                assert!(solves <= 16 * stages, "{}, {contact}, step {step}: {solves}", scheme().name());
+                // (Nodes on an edge of facets may alternate between their normals for up to 18; 48 are the limit.)
+                assert!(solves <= 24 * stages, "{}, {contact}, step {step}: {solves}", scheme().name());
             }
             assert!(run.state().contacts().raw_forces().iter().any(|&force| force > 0.0));
         }
