@@ -81,12 +81,12 @@ fn a_cause_is_printed_once() {
         (Error::Host { callback: "commit", source: Box::new(Torn(2.0)) }, "the bar is torn"),
         (Error::Frame { failure }, "not solved after 7 iterations"),
     ] {
-        let (mut chain, mut next) = (error.to_string(), error.source());
+        let (mut chain, mut next) = (vec![error.to_string()], error.source());
         while let Some(source) = next {
-            chain += &format!("\nCaused by: {source}");
+            chain.push(source.to_string());
             next = source.source();
         }
-        for printed in [error.to_string(), chain] {
+        for printed in [error.to_string(), chain.join("\nCaused by: ")] {
             assert_eq!(printed.matches(cause).count(), 1, "{printed}");
         }
     }
