@@ -437,12 +437,11 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
     ///
-    /// Where bodies have damping, and M⁻¹ C δv is what [`apply_impulses`](Self::apply_impulses) changes a by although
-    /// steps start from a, they take back what raw multipliers have given, and their
-    /// rest y is reduced to (s/(s + d))² y, by row, where s is the acceleration that y makes along the row and
-    /// d that of the damping force of the velocity that y makes in a step. A step that resolves the damping has all of
-    /// it but for a share of order h; one that does not would let a force act for a part of the next step that belongs
-    /// to velocities which are gone by then (theory, section 7.1).
+    /// Where bodies have damping, steps start from a and [`apply_impulses`](Self::apply_impulses) changes a by M⁻¹ C δv,
+    /// the forces take back what raw multipliers have given, and the rest y of them is reduced to min(1, s/d)² y, by
+    /// row: s is the acceleration that y makes along the row, d that of the damping force of the velocity that y makes
+    /// in a step. A step that resolves the damping has all of it. In one that does not, y would act for a part of the
+    /// next step although it belongs to velocities that are gone by then (theory, section 7.1).
     ///
     /// # Errors
     ///
@@ -498,13 +497,17 @@ impl<T: Real> Correction<'_, T> {
         if !self.evaluate_damping()? {
             return Ok(());
         }
-        let Self { buffers, projection, g, .. } = self;
+        let Self { buffers, projection, g, new, h, .. } = self;
         let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
         projection.apply_inverse(damping)?;
         for (((&row, force), &rest), &moved) in rows.iter().zip(forces).zip(&*rest).zip(&*moved) {
             let resisted = g.product(row, damping).abs();
-            if resisted > T::zero() {
-                let part = moved / (moved + resisted);
+            if !resisted.is_finite() {
+                let (what, dof) = ("the damping force", g.row(row).next().map_or(0, |(dof, _)| dof));
+                return Err(Error::StepNotFinite { t: new.t - *h, h: *h, what, dof, value: resisted.value() });
+            }
+            if resisted > moved {
+                let part = moved / resisted;
                 *force -= (T::one() - part * part) * rest;
             }
         }

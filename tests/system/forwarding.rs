@@ -265,6 +265,10 @@ impl Corrector<f64> for Remedy {
         self.0.note("check_switch");
         Ok(())
     }
+    fn check_restitution(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
+        self.0.note("check_restitution");
+        Ok(())
+    }
     fn leaves_smooth_motion(&self) -> bool {
         self.0.note("leaves_smooth_motion");
         true

@@ -147,11 +147,12 @@ fn a_block_slides_down_a_slope_as_coulomb_says() {
     assert!((along / normal + 0.3).abs() < 1e-3, "{along} {normal}");
     let weight = 1100.0 * 1e-6 * 9.81;
     assert!((normal / (weight * c) - 1.0).abs() < 0.05, "{normal} {}", weight * c);
-    // Energy that the motion has lost is what friction has taken, but for what the scheme damps.
+    // Energy that the motion has lost is what friction has taken, but for what the scheme damps. (The work of friction is
+    // that of the trapezoidal rule, and of the impulses in steps in which nodes come down again: of order h.)
     let total = |row: &[f64]| row[5] + row[6] + row[7];
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let lost = total(first) - total(last);
-    assert!(last[8] > 0.0 && lost >= last[8] * (1.0 - 1e-9), "{lost} {}", last[8]);
+    assert!(last[8] > 0.0 && lost >= last[8] * (1.0 - 1e-3), "{lost} {}", last[8]);
 }
 
 #[test]

@@ -261,7 +261,7 @@ impl Step<'_> {
         let resisted: Vec<f64> = scene.accelerate(&product(damping, &by_rest)).iter().map(|a| time * a).collect();
         let part = |axis: usize| {
             let [s, d] = [&by_rest, &resisted].map(|a| dot(scene.axes()[axis], a).abs());
-            if d > 0.0 { (s / (s + d)).powi(2) } else { 1.0 }
+            if d > s { (s / d).powi(2) } else { 1.0 }
         };
         forces.iter().map(|force| (force.0, force.1 - (1.0 - part(force.0)) * rest(force))).collect()
     }
