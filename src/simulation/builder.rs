@@ -471,7 +471,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         work.stiffening = checked.then(|| Stiffening::of(&*system, &scheme, constraints.may_press())).flatten();
         let booked = self.balance == EnergyBalance::On;
         let parts = (together, &*self.linear_solver);
-        let ledger = booked.then(|| Ledger::new(&mut *system, parts, &state, (&constraints, &g))).transpose()?;
+        let ledger =
+            booked.then(|| Ledger::new(&mut *system, parts, &state, (&constraints, &g))).transpose()?.map(Box::new);
         let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
         Ok(Simulation {
             system,

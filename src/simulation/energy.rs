@@ -36,7 +36,7 @@ pub(crate) struct Ledger<T: Real> {
     /// The same of friction; empty as long as there is none.
     friction: Vec<T>,
     next_friction: Vec<T>,
-    impacts: Box<Impacts<T>>,
+    impacts: Impacts<T>,
     /// Reported forces along the rows where they act.
     forces: Vec<T>,
     /// The same of springs with dashpots; empty as long as there are none.
@@ -97,7 +97,7 @@ impl<T: Real> Ledger<T> {
             next_contact: zero(),
             friction: Vec::new(),
             next_friction: Vec::new(),
-            impacts: Box::new(Impacts::new(projection, rows.0.room())),
+            impacts: Impacts::new(projection, rows.0.room()),
             forces: Vec::new(),
             damped: Vec::new(),
             next_damped: Vec::new(),

@@ -58,7 +58,7 @@ pub struct Simulation<'a, T: Real> {
     pub(super) state: State<T>,
     pub(super) history: History<T>,
     pub(super) work: Workspace<T>,
-    pub(super) ledger: Option<Ledger<T>>,
+    pub(super) ledger: Option<Box<Ledger<T>>>,
     /// For runs that control their step size.
     pub(super) judge: Option<Judge<T>>,
     pub(super) adjustment: Option<StartAdjustment<T>>,
@@ -210,7 +210,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Takes `&mut self`, as [`reactions`](Self::reactions) does, because the host evaluates its energy and its forces
     /// with memory of its own ([`System::potential_energy`], [`System::force`]). Nothing of the run changes.
     pub fn energy(&mut self) -> Energy<T> {
-        energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_ref())
+        energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_deref())
     }
 
     /// Forces of the supports on the system, one a prescribed dof: R = M a − f(t, u, v) − Gᵀ λ.

@@ -27,7 +27,7 @@ fn a_dashpot_in_compression_is_one_of_the_system() {
             .constraint(LinearRows::new().row(law, &[(0, 1.0)], 0.0))
             .build()
             .unwrap();
-        let damping = matrix(3, [(0, 0, 4.0), (1, 1, 0.0), (2, 2, 0.0)].into_iter());
+        let damping = matrix(3, [(0, 0, 4.0), (1, 1, 0.0), (2, 2, 0.0)]);
         let system = chain(&mass, &[50.0, 30.0, 10.0], 60.0).damping(damping).unwrap().load(load);
         // (Some explicit schemes refuse damping of the system altogether.)
         let Ok(mut alone) = Simulation::builder(system, (listed.make)(), h).displacement(start.clone()).build() else {

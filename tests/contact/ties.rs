@@ -261,7 +261,7 @@ fn the_patch_test_on_skewed_quadrilaterals() {
         for seed in 0..10 {
             for (lower, upper) in [([3, 3, 1], [2, 2, 1]), ([2, 3, 1], [4, 1, 1]), ([3, 4, 1], [4, 5, 1])] {
                 let bodies = [lower, upper].map(|cells| {
-                    let phase = f64::from(seed + 50 * cells[0] as i32);
+                    let phase = f64::from(seed) + 50.0 * cells[0] as f64;
                     let moved = |x: f64, y: f64, n: usize| {
                         let inside = x > 1e-9 && x < 1.0 - 1e-9;
                         if inside { skew * (91.0 * x + 57.0 * y + phase).sin() / n as f64 } else { 0.0 }

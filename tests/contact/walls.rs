@@ -138,11 +138,11 @@ fn grid_3d(cells: usize) -> Solid<3> {
 }
 
 fn graded(x: f64, cells: usize) -> f64 {
-    let k = (x * (cells + 2) as f64).round() as usize;
-    match k {
-        0 => -1.0,
-        k if k == cells + 2 => 1.0,
-        k => 0.8 * (2.0 * (k - 1) as f64 / cells as f64 - 1.0),
+    let inside = (x * (cells + 2) as f64 - 1.0) / cells as f64;
+    match inside {
+        ..-1e-9 => -1.0,
+        ..1.000_000_001 => 0.8 * (2.0 * inside - 1.0),
+        _ => 1.0,
     }
 }
 

@@ -49,7 +49,7 @@ fn an_elastic_ball_keeps_its_apex() {
                 bounces += usize::from(rises && falls);
                 falls = !rises;
                 let miss = apex(&run, height) - 1.0;
-                assert!(miss.abs() < 1e-9 * f64::from(bounces.max(1) as u32), "{}, {bounces}: {miss:e}", listed.name());
+                assert!(miss.abs() < 1e-9 * bounces.max(1) as f64, "{}, {bounces}: {miss:e}", listed.name());
                 assert!(run.time() < 120.0, "{}: {bounces} bounces", listed.name());
             }
         }

@@ -163,12 +163,12 @@ fn the_explicit_preset_takes_any_courant_number() {
 /// The overshoot grows with the Courant number, and the energy by what central differences conserve instead of it.
 #[test]
 fn the_explicit_preset_overshoots_most_at_courant_one() {
-    for (n, overshoots) in [(10, [1.09, 1.09, 1.09, 1.10, 1.12]), (20, [1.07, 1.075, 1.075, 1.09, 1.11])] {
+    for (n, overshoots) in [(10_u32, [1.09, 1.09, 1.09, 1.10, 1.12]), (20, [1.07, 1.075, 1.075, 1.09, 1.11])] {
         for (courant, most) in [0.5, 0.8, 0.9, 0.95, 1.0].into_iter().zip(overshoots) {
             let h = courant * 0.1 / f64::from(n);
             let (mut largest, mut energy) = (0.0_f64, 0.0);
             for phase in 0..10 {
-                let bars = Bars::paper(n as usize).delayed(0.05 + 0.1 * f64::from(phase), h);
+                let bars = Bars::paper(n.try_into().unwrap()).delayed(0.05 + 0.1 * f64::from(phase), h);
                 let record = by_preset(Preset::explicit(), &bars, h);
                 largest = record.force.iter().fold(largest, |a, &b| a.max(b / F0));
                 energy += 0.1 * record.energy(record.t.len() - 1) / record.start_energy;

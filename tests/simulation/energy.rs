@@ -20,13 +20,13 @@ fn corrected<'a>(bars: &Bars, scheme: impl TimeIntegrator + 'a, h: f64) -> Simul
 }
 
 /// Masses without springs under a contact, with books.
-fn masses<'a>(
+fn masses(
     mass: Vec<f64>,
     velocity: Vec<f64>,
-    rows: LinearRows<'a, f64>,
+    rows: LinearRows<'_, f64>,
     scheme: Box<dyn TimeIntegrator>,
     h: f64,
-) -> Simulation<'a, f64> {
+) -> Simulation<'_, f64> {
     let none = diagonal(&vec![0.0; mass.len()]);
     let system = LinearSystem::lumped(mass, none).unwrap();
     Simulation::builder(system, scheme, h).velocity(velocity).constraint(rows).energy_balance().build().unwrap()

@@ -83,7 +83,9 @@ impl Surface {
             });
             let largest = around.max_by(|one, other| one.0.total_cmp(&other.0));
             if let Some(body) = largest.map(|(_, solid)| bodies[solid[0]]) {
-                hollow.iter().for_each(|&facet| bodies[facet] = body);
+                for &facet in hollow {
+                    bodies[facet] = body;
+                }
             }
         }
         bodies

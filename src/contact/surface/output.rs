@@ -92,7 +92,7 @@ impl Surface {
     /// Whether all nodes of each facet bear a force. (Of a facet of second order some bear none of a constant
     /// pressure.)
     fn loaded(&self, forces: &[Point]) -> Vec<bool> {
-        let bears = |node: &usize| forces[*node] != [0.0; 3];
+        let bears = |node: &usize| forces[*node].iter().any(|&force| force != 0.0);
         self.facets.iter().map(|facet| facet.whole.is_some() || facet.nodes().iter().all(bears)).collect()
     }
 
