@@ -129,7 +129,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             // Newton's method ends where a pass that follows a small miss makes it no smaller: what is left is that of
             // a solver that iterates, as for friction.
-            let ends = worst.1 <= T::epsilon().sqrt() * deepest && worst.1 > T::of(0.25) * before;
+            let ends = worst.1 <= T::epsilon().sqrt() * deepest && worst.1 > T::of(0.75) * before;
             before = worst.1;
             let met = worst.1 == T::zero() || ends;
             if met && !augments {
