@@ -437,11 +437,11 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
     ///
-    /// Where bodies have damping, steps start from a and [`apply_impulses`](Self::apply_impulses) changes a by M⁻¹ C δv,
-    /// the forces take back what raw multipliers have given, and the rest y of them is reduced to min(1, s/d)² y, by
-    /// row: s is the acceleration that y makes along the row, d that of the damping force of the velocity that y makes
-    /// in a step. A step that resolves the damping has all of it. In one that does not, y would act for a part of the
-    /// next step although it belongs to velocities that are gone by then (theory, section 7.1).
+    /// Where bodies have damping and steps start from a, the forces take back what raw multipliers have given, and the
+    /// rest y of them is reduced to min(1, s/d)² y, with one factor for all rows that S couples: s = yᵀ S y is the power
+    /// of inertia, d that of the damping force of the velocity that y makes in a step. A step that resolves the damping
+    /// keeps all of y. In a longer step y would act for a part of the next step although it belongs to velocities that
+    /// are gone by then (theory, section 7.1).
     ///
     /// # Errors
     ///
@@ -452,18 +452,24 @@ impl<T: Real> Correction<'_, T> {
         }
         let rows = std::mem::take(&mut self.buffers.engaged);
         let mut forces = std::mem::take(&mut self.buffers.forces);
-        let result = self.push_forces(&rows, &mut forces);
+        let result = self.push_limited_forces(&rows, &mut forces);
         (self.buffers.engaged, self.buffers.forces) = (rows, forces);
         result
     }
 
-    /// Adds forces that remove jumps, as far as damping lets them, to a, to the reported forces and to the impulses.
-    fn push_forces(&mut self, rows: &[usize], forces: &mut [T]) -> Result<()> {
+    /// [`push_forces`](Self::push_forces) of what [`limit_forces`](Self::limit_forces) leaves of the forces of the
+    /// problem just solved.
+    fn push_limited_forces(&mut self, rows: &[usize], forces: &mut [T]) -> Result<()> {
         self.limit_forces(rows, forces, T::of(self.scheme.acceleration / self.scheme.balance))?;
+        self.push_forces(rows, forces)
+    }
+
+    /// Adds forces to a, to the reported forces and to the impulses.
+    fn push_forces(&mut self, rows: &[usize], forces: &[T]) -> Result<()> {
         let Self { contacts, projection, new, g, scheme, h, .. } = self;
         let share = T::of(scheme.balance / scheme.acceleration);
         projection.push(g, (rows, forces), T::one(), &mut new.a)?;
-        for (&row, &mut force) in rows.iter().zip(forces) {
+        for (&row, &force) in rows.iter().zip(forces) {
             contacts.lambda[row] += share * force;
             contacts.lambda_v[row] = T::of(*h / scheme.acceleration) * force;
             contacts.impulse[row] += T::of(scheme.covector[0][2] * *h) * force;
@@ -471,47 +477,81 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Reduces the forces that remove jumps of acceleration by what damping would not let them do within a step; what
+    /// Reduces the forces that remove jumps of acceleration where the step does not resolve the damping; the part that
     /// takes back `given` times the raw multipliers stays.
+    ///
+    /// The groups of rows that S couples are judged together. Those that pass are set aside and the others judged again
+    /// without them: damping that a step resolves then reduces nothing, whatever groups it couples.
     pub(super) fn limit_forces(&mut self, rows: &[usize], forces: &mut [T], given: T) -> Result<()> {
-        if self.buffers.change.is_empty() || !(self.scheme.reads_acceleration && self.scheme.keeps_balance) {
+        if self.buffers.change.is_empty() || !self.scheme.reads_acceleration {
             return Ok(());
         }
-        let Self { buffers, contacts, projection, g, scheme, h, .. } = self;
-        let Buffers { change, straight: rest, by_straight: moved, .. } = &mut **buffers;
+        let Self { buffers, contacts, .. } = self;
+        let rest = &mut buffers.straight;
         rest.clear();
         rest.extend(rows.iter().zip(&*forces).map(|(&row, &force)| {
             let raw = given * contacts.lambda_raw[row];
             force + if force < T::zero() { raw.max(T::zero()).min(-force) } else { raw.min(T::zero()).max(-force) }
         }));
-        if rest.iter().all(|&rest| rest == T::zero()) {
-            return Ok(());
-        }
-        // The change of velocity that goes with one of acceleration in a step, and the damping of it.
-        let [_, by_v, by_a] = scheme.response;
-        let time = T::of(*h * by_v / by_a);
-        change.fill(T::zero());
-        projection.push(g, (rows, rest), time, change)?;
-        moved.clear();
-        moved.extend(rows.iter().map(|&row| (g.product(row, change) / time).abs()));
-        if !self.evaluate_damping()? {
-            return Ok(());
-        }
-        let Self { buffers, projection, g, new, h, .. } = self;
-        let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
-        projection.apply_inverse(damping)?;
-        for (((&row, force), &rest), &moved) in rows.iter().zip(forces).zip(&*rest).zip(&*moved) {
-            let resisted = g.product(row, damping).abs();
-            if !resisted.is_finite() {
-                let (what, dof) = ("the damping force", g.row(row).next().map_or(0, |(dof, _)| dof));
-                return Err(Error::StepNotFinite { t: new.t - *h, h: *h, what, dof, value: resisted.value() });
+        // The change of velocity that goes with one of acceleration in a step.
+        let [_, by_v, by_a] = self.scheme.response;
+        let time = T::of(self.h * by_v / by_a);
+        while self.buffers.straight.iter().any(|&rest| rest != T::zero()) {
+            let Self { buffers, projection, g, .. } = self;
+            let Buffers { change, straight: rest, by_straight: moved, .. } = &mut **buffers;
+            change.fill(T::zero());
+            projection.push(g, (rows, rest), time, change)?;
+            moved.clear();
+            moved.extend(rows.iter().map(|&row| g.product(row, change) / time));
+            if !self.evaluate_damping()? {
+                return Ok(());
             }
-            if resisted > moved {
-                let part = moved / resisted;
-                *force -= (T::one() - part * part) * rest;
+            if !self.set_aside_resolved(rows)? {
+                let Buffers { straight: rest, by_straight: part, .. } = &*self.buffers;
+                for ((force, &rest), &part) in forces.iter_mut().zip(rest).zip(part) {
+                    *force -= (T::one() - part * part) * rest;
+                }
+                return Ok(());
             }
         }
         Ok(())
+    }
+
+    /// Sets the forces of those groups to zero whose inertia is not below the resistance of their damping, and says
+    /// whether there are any. The others get the quotient of both in place of the accelerations of their rows.
+    fn set_aside_resolved(&mut self, rows: &[usize]) -> Result<bool> {
+        let Self { buffers, projection, g, new, h, .. } = self;
+        let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
+        projection.apply_inverse(damping)?;
+        let mut found = false;
+        // (The groups are those of the problem that gave the forces.)
+        let groups = projection.groups();
+        for group in (0..groups.len()).map(|group| groups.group(group)) {
+            let largest = group.iter().fold(T::zero(), |largest, &position| rest[position].abs().max(largest));
+            if largest == T::zero() {
+                group.iter().for_each(|&position| moved[position] = T::one());
+                continue;
+            }
+            let [mut inertia, mut resistance] = [T::zero(); 2];
+            for &position in group {
+                let resisted = g.product(rows[position], damping);
+                if !resisted.is_finite() {
+                    let (what, dof) = ("the damping force", g.row(rows[position]).next().map_or(0, |(dof, _)| dof));
+                    return Err(Error::StepNotFinite { t: new.t - *h, h: *h, what, dof, value: resisted.value() });
+                }
+                inertia += rest[position] / largest * moved[position];
+                resistance += rest[position] / largest * resisted;
+            }
+            let is_resolved = resistance <= inertia;
+            found |= is_resolved;
+            for &position in group {
+                if is_resolved {
+                    rest[position] = T::zero();
+                }
+                moved[position] = inertia.max(T::zero()) / resistance;
+            }
+        }
+        Ok(found)
     }
 
     /// Applies forces to a along rows, a ← a + M⁻¹ Gᵀ forces, and books their impulses. Reported forces are left as

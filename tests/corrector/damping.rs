@@ -2,7 +2,6 @@
 #![allow(clippy::float_cmp)] // forces that are exactly zero
 
 use contact_dynamics::corrector::{ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release};
-use contact_dynamics::tableau::Stage;
 use contact_dynamics::{
     Composite, Corrector, Error, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, PersistencyCorrection,
     Simulation, TimeIntegrator,
@@ -106,7 +105,7 @@ fn no_step_is_too_large_for_a_correction() {
                     let found = worst(correctors);
                     runs += u32::from(found > 0.0);
                     // Where damping ties the masses together, the raw scheme too throws off what falls as one.
-                    let bound = if x < 500.0 { 1.0_f64.max(raw) } else { 4.0 * 1.0_f64.max(raw) };
+                    let bound = if x < 500.0 { 1.0_f64.max(raw) } else { 5.0 * 1.0_f64.max(raw) };
                     assert!(found < bound * (1.0 + 1e-2), "{name}, {}, {damped:?} {x}: {found} {raw}", listed.name());
                 }
             }
@@ -141,13 +140,7 @@ fn highest_of_two(listed: &Listed, correctors: Correctors, c: f64, velocity: [f6
 #[test]
 fn an_unresolved_damper_gives_no_energy() {
     let mut runs = 0;
-    // One-step schemes whose balance holds at the state, and whose u follows from velocities.
-    let keeps = |listed: &&Listed| {
-        let by_velocities = |stage: &Stage| stage.is_collocated() && stage.recovery.v.a.iter().all(|a| *a == 0.0);
-        let tableau = (listed.make)().tableau();
-        listed.takes_corrections() && tableau.depth() == 1 && tableau.stages.iter().all(by_velocities)
-    };
-    for listed in all().iter().filter(|listed| listed.critical.is_none()).filter(keeps) {
+    for listed in all().iter().filter(|listed| listed.critical.is_none() && listed.takes_corrections()) {
         for c in [0.1, 10.0, 100.0, 1e3, 1e6] {
             let worst = |correctors: fn() -> Correctors| {
                 let velocities = [[1.0, -0.5], [1.0, 1.0], [0.2, 1.0], [1.0, -1.5]];
@@ -229,8 +222,8 @@ fn accelerations_change_by_what_damping_does_in_a_step() {
             let most = before.contacts().raw_forces()[0] * stage.recovery.a.z / a;
             let rest = if needed < 0.0 { needed + most.min(-needed) } else { needed };
             let time = h * stage.recovery.v.z / stage.recovery.a.z;
-            let part = (1.0 / (1.0 + time * c / 0.5)).powi(2);
-            let left = if make().name() == Newmark::trapezoidal().name() { -(1.0 - part) * rest / 0.5 } else { 0.0 };
+            let part = (0.5 / (time * c)).min(1.0).powi(2);
+            let left = if make().name() == Composite.name() { 0.0 } else { -(1.0 - part) * rest / 0.5 };
             let off = after.stored_acceleration()[0] - left;
             assert!(off.abs() < 1e-9 * found.abs().max(1.0), "{}, {c}: {off} {left}", make().name());
         }

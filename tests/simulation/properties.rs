@@ -103,8 +103,8 @@ impl Scene {
         system.unwrap().rayleigh(self.damping.0, self.damping.1).unwrap()
     }
 
-    /// Whether corrections are known to leave accelerations without jumps: without damping, or with damping that a step
-    /// resolves along a single row (theory, section 7.1), which Gershgorin's bound on M⁻¹C of lumped masses tells.
+    /// Whether a step resolves the damping, so that corrections leave accelerations without jumps (theory, section 7.1).
+    /// Gershgorin's circles bound the damping rates of lumped masses.
     fn resolves_damping(&self) -> bool {
         let (by_mass, by_stiffness) = self.damping;
         let stiffest = |(dof, mass): (usize, &f64)| {
@@ -112,8 +112,7 @@ impl Scene {
             own.map(|(_, _, k)| 2.0 * k / mass).sum::<f64>()
         };
         let most = self.masses.iter().enumerate().map(stiffest).fold(0.0, f64::max);
-        let is_bounded = self.rows.len() == 1 && self.coupling.is_none();
-        self.damping == (0.0, 0.0) || is_bounded && self.h * (by_mass + by_stiffness * most) <= 1.0
+        self.damping == (0.0, 0.0) || self.coupling.is_none() && self.h * (by_mass + by_stiffness * most) <= 1.0
     }
 
     fn contact(&self) -> LinearRows<'static, f64> {

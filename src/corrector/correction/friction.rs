@@ -259,7 +259,7 @@ impl<T: Real> Correction<'_, T> {
     pub(super) fn push_rubbing_acceleration(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, mut increments) = (std::mem::take(rows), std::mem::take(increments));
-        let result = self.push_forces(&rows, &mut increments);
+        let result = self.push_limited_forces(&rows, &mut increments);
         (self.buffers.rubbing.rows, self.buffers.rubbing.increments) = (rows, increments);
         result
     }

@@ -195,7 +195,7 @@ impl<T: Real> Correction<'_, T> {
         let (rows, mut forces) = (std::mem::take(leaving), std::mem::take(forces));
         forces.clear();
         forces.extend(rows.iter().map(|&row| -self.contacts.lambda_raw[row] / share));
-        let result = self.push_forces(&rows, &mut forces);
+        let result = self.push_forces(&rows, &forces);
         for &row in &rows {
             self.contacts.lambda[row] = T::zero();
         }

@@ -248,22 +248,44 @@ impl Step<'_> {
     /// multipliers.
     fn limit(&self, forces: Vec<(usize, f64)>, given: f64) -> Vec<(usize, f64)> {
         let scene = self.scene;
-        let Some(damping) = scene.damping.as_ref().filter(|_| self.reads_acceleration() && self.keeps_balance()) else {
+        let Some(damping) = scene.damping.as_ref().filter(|_| self.reads_acceleration()) else {
             return forces;
         };
         let rest = |&(axis, y): &(usize, f64)| {
             let most = given * self.contacts.raw[axis];
             if y * most < 0.0 { y - y.signum() * y.abs().min(most.abs()) } else { y }
         };
-        let mut by_rest = vec![0.0; scene.dofs()];
-        forces.iter().for_each(|force| add(&mut by_rest, rest(force), &self.responses[force.0]));
+        // Axes that S couples, directly or through others, are judged as one.
+        let mut group: Vec<usize> = (0..forces.len()).collect();
+        for (i, j) in (0..forces.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            if self.s(forces[i].0, forces[j].0) != 0.0 {
+                let (old, new) = (group[i], group[j]);
+                group.iter_mut().filter(|own| **own == old).for_each(|own| *own = new);
+            }
+        }
         let time = self.h() * self.response[1] / self.response[2];
-        let resisted: Vec<f64> = scene.accelerate(&product(damping, &by_rest)).iter().map(|a| time * a).collect();
-        let part = |axis: usize| {
-            let [s, d] = [&by_rest, &resisted].map(|a| dot(scene.axes()[axis], a).abs());
-            if d > s { (s / d).powi(2) } else { 1.0 }
-        };
-        forces.iter().map(|force| (force.0, force.1 - (1.0 - part(force.0)) * rest(force))).collect()
+        let mut rests: Vec<f64> = forces.iter().map(rest).collect();
+        loop {
+            let mut by_rest = vec![0.0; scene.dofs()];
+            forces.iter().zip(&rests).for_each(|(force, &rest)| add(&mut by_rest, rest, &self.responses[force.0]));
+            let resisted: Vec<f64> = scene.accelerate(&product(damping, &by_rest)).iter().map(|a| time * a).collect();
+            let part = |of: usize| {
+                let [s, d] = [&by_rest, &resisted].map(|a| {
+                    let own = (0..forces.len()).filter(|&k| group[k] == of);
+                    own.map(|k| rests[k] * dot(scene.axes()[forces[k].0], a)).sum::<f64>()
+                });
+                if d > s { (s / d).powi(2) } else { 1.0 }
+            };
+            let parts: Vec<f64> = group.iter().map(|&of| part(of)).collect();
+            // Those that the step resolves keep all of it, and the others are judged without them.
+            let left: Vec<f64> =
+                rests.iter().zip(&parts).map(|(&rest, &part)| if part < 1.0 { rest } else { 0.0 }).collect();
+            if left == rests {
+                let limited = forces.iter().zip(rests.iter().zip(&parts));
+                return limited.map(|(force, (rest, part))| (force.0, force.1 - (1.0 - part) * rest)).collect();
+            }
+            rests = left;
+        }
     }
 
     /// w_ā/w_a.
