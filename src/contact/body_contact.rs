@@ -10,9 +10,10 @@ use crate::real::Real;
 /// and of bodies that fold ([`of_itself`](Self::of_itself)): what
 /// [`SimulationBuilder::constraints`](crate::SimulationBuilder::constraints) takes.
 ///
-/// Weighted gaps spread contact over faces, but see none where facets stand at more than 60° to each other: a
-/// [`Mortar`] alone lets corners and edges in, and throws them out later with energy that was not there. So this is a
-/// list of constraints, of which a body has those that its shape asks for:
+/// Weighted gaps spread contact over faces, but facets at more than 60° to each other do not meet: alone they would let
+/// corners and edges penetrate, and the bodies could gain energy when these come out again. A [`Mortar`] alone
+/// therefore refuses surfaces with corners. This is a list of constraints, of which a body has those that its shape
+/// asks for:
 ///
 /// 1. [`Mortar`] of the whole surfaces;
 /// 2. [`NodeToFacet`] of the slave's nodes at sharp edges (in two dimensions: at sharp corners) with the master's
@@ -94,7 +95,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     ///
     /// # Errors
     ///
-    /// Those of [`Mortar::new`].
+    /// Those of [`Mortar::new`], except that corners and edges are accepted.
     pub fn new<F: Into<Facet>, G: Into<Facet>>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -266,7 +267,8 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
             let nodes = NodeToFacet::of_itself(coordinates, dofs, of(0))?.rings(rings);
             constraints.push(Box::new(self.given(nodes)?));
         } else {
-            constraints.push(Box::new(self.given(Mortar::new(coordinates, dofs, of(0), of(1))?)?));
+            let faces = Mortar::without_corner_check(coordinates, dofs, of(0), of(1))?;
+            constraints.push(Box::new(self.given(faces)?));
             for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
                 let corners = NodeToFacet::one_pass(coordinates, dofs, nodes, of(1 - body))?.facing(of(body))?;
                 constraints.push(Box::new(self.given(corners)?));

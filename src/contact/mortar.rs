@@ -23,6 +23,10 @@ use integrals::Integrals;
 use pairs::Pairs;
 use rows::{Made, Rows};
 
+/// The largest angle (radians) by which a surface may turn around a convex side: 60°, and 0.6° for rounding, so that a
+/// circle of six segments is accepted in both precisions.
+const CORNER: f64 = std::f64::consts::FRAC_PI_3 + 0.01;
+
 /// Share of the reach above which a row that nothing lies over any more is open.
 const OPEN: f64 = 0.01;
 
@@ -72,13 +76,16 @@ const BEYOND: f64 = 0.25;
 ///
 /// Facets that are in each other by more than half of the material behind both, in the reference configuration, look
 /// toward each other through the bodies, and do not meet. So bodies beside each other may be thinner than the
-/// [reach](Self::reach): give the whole surfaces of thin bodies.
+/// [reach](Self::reach) if their whole surfaces are given. [`BodyContact`](super::BodyContact) takes those of thin
+/// bodies, which have edges.
 ///
 /// # Known failure
 ///
-/// - Facets that see each other at more than 60° do not meet: corners and edges of bodies go in, and come out later, by
-///   1e-4 of the smallest facet a step ([`Contact::recovery`](super::Contact::recovery)).
-///   [`BodyContact`](super::BodyContact) has rows for these as well.
+/// - Facets at more than 60° to each other do not meet. A surface with convex corners or edges is therefore refused;
+///   [`BodyContact`](super::BodyContact) takes it, and has rows for corners and edges as well.
+/// - The rim of an open surface is no corner, for nothing is known of what lies behind it. A body given by one side may
+///   penetrate with its rim. It is then pushed out by 1e-4 of the smallest facet a step
+///   ([`Contact::recovery`](super::Contact::recovery)).
 /// - Of two layers of a master that lie behind each other within the reach both are met.
 /// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
 ///   not exact to rounding (`docs/contact.md`): their areas are those of the parts.
@@ -149,8 +156,30 @@ impl<T: Real> Mortar<T> {
     /// [`Error::Dimension`] if the dimension is not 2 or 3, if the lists differ in length, if a facet does not fit, or
     /// if a node does not exist; [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without
     /// facets; [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
-    /// [`Error::Incompatible`] at a branch of a surface, and for nodes that both surfaces have.
+    /// [`Error::Incompatible`] at a branch of a surface, for nodes that both surfaces have, and at a convex edge (in
+    /// two dimensions a corner) around which a surface turns by more than 60°.
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
+        coordinates: &[[T; D]],
+        dofs: &[[usize; D]],
+        slave: impl IntoIterator<Item = F>,
+        master: impl IntoIterator<Item = G>,
+    ) -> Result<Self> {
+        let contact = Self::without_corner_check(coordinates, dofs, slave, master)?;
+        for surface in [&contact.slave, &contact.master] {
+            if let Some(node) = surface.sharp_nodes(CORNER, &contact.nodes.coordinates).first() {
+                let reason = "weighted gaps alone let corners and edges penetrate, and the bodies may then gain \
+                              energy; use BodyContact, or give only the sides that face each other";
+                return Err(Error::Incompatible {
+                    part: format!("the corner or edge at node {node} of a surface of Mortar"),
+                    reason,
+                });
+            }
+        }
+        Ok(contact)
+    }
+
+    /// As [`new`](Self::new), for surfaces that may have corners and edges, to which other constraints give rows.
+    pub(crate) fn without_corner_check<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
         slave: impl IntoIterator<Item = F>,

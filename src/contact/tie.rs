@@ -98,8 +98,8 @@ impl<T: Real> Tie<T> {
     ///
     /// # Errors
     ///
-    /// Those of [`Mortar::new`](super::Mortar::new). That nothing is within reach is an error of the first search
-    /// ([`Error::Empty`]).
+    /// Those of [`Mortar::new`](super::Mortar::new), except that corners and edges are accepted. That nothing is within
+    /// reach is an error of the first search ([`Error::Empty`]).
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],

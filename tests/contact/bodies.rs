@@ -186,7 +186,7 @@ fn fall_in_the_plane(angle: f64, beside: f64, bodies: bool) -> [f64; 3] {
         .step_control(StepControl::halving(h / 256.0).unwrap());
     let builder = match bodies {
         true => builder.constraints(stack.bodies(true).unwrap().constraints().unwrap()),
-        false => builder.constraint(stack.mortar(true).unwrap()),
+        false => builder.constraints([stack.weighted(true, 0.25).unwrap()]),
     };
     let mut run = builder.build().unwrap();
     let start = run.energy().total();

@@ -1,7 +1,7 @@
 //! Weighted gaps: patch tests, derivatives, momentum, impacts, what is covered in part, what is refused.
 
 use super::two_bodies::check_impact;
-use contact_dynamics::contact::{Candidates, ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
+use contact_dynamics::contact::{BodyContact, Candidates, ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
 use contact_dynamics::{Composite, Error, Real, Simulation, StepControl, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::xorshift;
@@ -180,10 +180,10 @@ fn impacts_of_blocks_keep_momentum_and_gain_no_energy() {
 
 /// Gaps by node.
 fn gaps<const D: usize>(stack: &Stack<D>, upper: bool, reach: f64) -> Vec<(usize, f64)> {
-    let mut contact = stack.mortar(upper).unwrap().reach(reach).unwrap();
+    let mut contact = stack.weighted(upper, reach).unwrap();
     let still = vec![0.0; contact.dofs().len()];
     contact.search(0.0, &still, &still, 0.0).unwrap();
-    let contacts = Contacts::of(&contact);
+    let contacts = Contacts::of(&*contact);
     let mut gaps = vec![0.0; contacts.len()];
     contact.gaps(0.0, &still, &mut gaps).unwrap();
     gaps.iter().enumerate().map(|(row, &gap)| (contacts.name(row).0, gap)).collect()
@@ -360,8 +360,9 @@ fn a_step_into_the_other_surface_is_refused_and_mended() {
             stack.solid.boundary().iter().filter(|facet| inside(facet)).map(|facet| Stack::<2>::facet(facet)).collect()
         };
         let (slave, master): (Vec<_>, Vec<_>) = (facets(false), facets(true));
-        let contact = Mortar::new(&stack.solid.nodes, &stack.solid.node_dofs(), slave, master).unwrap();
-        Simulation::builder(stack.solid.system::<f64>(), Composite, 0.05).velocity(v.collect()).constraint(contact)
+        let contact = BodyContact::new(&stack.solid.nodes, &stack.solid.node_dofs(), slave, master).unwrap();
+        let weighted = contact.constraints().unwrap().remove(0);
+        Simulation::builder(stack.solid.system::<f64>(), Composite, 0.05).velocity(v.collect()).constraints([weighted])
     };
     let mut run = build(100.0).build().unwrap();
     let failed = (0..10).find_map(|_| run.step().err());
@@ -602,6 +603,43 @@ fn what_cannot_be_a_surface_is_refused() {
     assert!(matches!(build(&[[0, 4]], &[[2, 3]]), Error::Dimension { .. }));
     let contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[1, 0]]).unwrap();
     assert!(matches!(contact.reach(-1.0), Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn surfaces_with_corners_are_refused_in_favor_of_body_contact() {
+    let whole = |bodies: [Solid<2>; 2]| Stack::of_whole_surfaces(bodies);
+    let floor = || Solid::rectangle([3.0, 1.0], [3, 1], MATERIAL).moved([-1.0, -1.0]);
+    let square = whole([floor(), Solid::rectangle([1.0; 2], [2; 2], MATERIAL)]);
+    for upper in [true, false] {
+        let error = square.mortar(upper).unwrap_err();
+        assert!(matches!(error, Error::Incompatible { .. }) && error.to_string().contains("BodyContact"), "{error}");
+        assert!(square.bodies(upper).is_ok());
+        assert!(square.tie(upper).is_ok());
+    }
+    let cubes = [0.0, 1.1].map(|z| Solid::block([1.0; 3], [2; 3], MATERIAL).moved([0.0, 0.0, z]));
+    assert!(matches!(Stack::of_whole_surfaces(cubes).mortar(true), Err(Error::Incompatible { .. })));
+    // One ring in another, coarse ones at many angles: a hexagon is accepted, a pentagon is not.
+    for turn in 0..20 {
+        let ring = |inner: f64, around: usize| {
+            Solid::ring([inner, inner + 0.4], [1, around], MATERIAL).rotated(0.37 * f64::from(turn))
+        };
+        for around in [6, 7, 12] {
+            let rings = whole([ring(1e3, around), ring(2e3, around)]);
+            assert!(rings.mortar(true).is_ok(), "{around}");
+            let nodes: Vec<[f32; 2]> = rings.solid.nodes.iter().map(|x| x.map(f32::of)).collect();
+            let [inner, outer] = rings.surfaces();
+            assert!(Mortar::new(&nodes, &rings.solid.node_dofs(), inner, outer).is_ok(), "{around}");
+        }
+        assert!(whole([ring(0.5, 5), ring(1.0, 12)]).mortar(true).is_err());
+    }
+    // The rims of open sides are no corners, and reentrant corners are no convex ones.
+    let sides = Stack::new([floor().moved([0.0, 1.0]), Solid::rectangle([1.0; 2], [2; 2], MATERIAL)], 0.1, |x| x);
+    assert!(sides.mortar(true).is_ok());
+    let coordinates = [[0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [0.9, 0.1], [0.1, 0.1], [0.1, 0.9]];
+    let dofs: [[usize; 2]; 6] = std::array::from_fn(|node| [2 * node, 2 * node + 1]);
+    let (dent, corner) = ([[2, 1], [1, 0]], [[5, 4], [4, 3]]);
+    assert!(Mortar::new(&coordinates, &dofs, [[3, 5]], dent).is_ok());
+    assert!(matches!(Mortar::new(&coordinates, &dofs, corner, dent), Err(Error::Incompatible { .. })));
 }
 
 #[test]

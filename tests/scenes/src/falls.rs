@@ -4,7 +4,7 @@ use crate::OnSystem;
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
-use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, Mortar, NodeToFacet};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, NodeToFacet};
 use contact_dynamics::{PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -109,8 +109,8 @@ impl Fall {
     }
 
     /// Weighted gaps, the upper block being the slave.
-    pub fn mortar(&self) -> Result<Mortar<f64>> {
-        self.stack.mortar(true)?.reach(0.2)
+    pub fn mortar(&self) -> Result<Box<dyn ContactConstraint<f64>>> {
+        self.stack.weighted(true, 0.2)
     }
 
     /// Weighted gaps, nodes at corners and edges, and edges, the upper block being the slave.
@@ -135,7 +135,7 @@ impl Fall {
         let constraints: Vec<Box<dyn ContactConstraint<f64>>> = match keeps {
             Keeps::TwoPasses => vec![Box::new(self.two_passes()?)],
             Keeps::TwoPassesAndEdges => vec![Box::new(self.two_passes()?), Box::new(self.edges()?)],
-            Keeps::Mortar => vec![Box::new(self.mortar()?)],
+            Keeps::Mortar => vec![self.mortar()?],
             Keeps::Bodies => self.bodies()?,
             Keeps::Itself => self.of_itself()?,
         };

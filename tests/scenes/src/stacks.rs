@@ -62,6 +62,11 @@ impl<const D: usize> Stack<D> {
         Mortar::new(&self.solid.nodes, &self.solid.node_dofs(), slave, master)
     }
 
+    /// Weighted gaps as among [`bodies`](Self::bodies), of surfaces that may have corners.
+    pub fn weighted(&self, upper: bool, reach: f64) -> Result<Box<dyn ContactConstraint<f64>>> {
+        Ok(self.bodies(upper)?.reach(reach).constraints()?.remove(0))
+    }
+
     /// What keeps the bodies apart by faces, corners and edges, the upper one being the slave, or the lower one.
     pub fn bodies(&self, upper: bool) -> Result<BodyContact<f64, D>> {
         let [lower, above] = self.surfaces();

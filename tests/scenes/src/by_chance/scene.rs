@@ -10,7 +10,7 @@ use crate::solids::{Material, Solid};
 use crate::sparse::{entries, matrix};
 use contact_dynamics::contact::{
     BodyContact, BondStrength, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet, NodesOnObstacle,
-    Obstacle, Plane, Side, Sphere, Tie,
+    Obstacle, Plane, Side, Sphere, Surface, Tie,
 };
 use contact_dynamics::{LinearSystem, Result, System};
 
@@ -460,7 +460,11 @@ where
         let [lower, upper]: [Vec<Facet>; 2] = self.facets(variant).try_into().expect("two bodies");
         let reach = 0.1 * length;
         let mut found: Vec<Boxed> = Vec::new();
-        let weighted = || Mortar::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied());
+        // Of bodies with corners weighted gaps are among what keeps them apart.
+        let bodies = || BodyContact::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied());
+        let weighted = |bodies: BodyContact<f64, D>| -> Result<Boxed> {
+            Ok(bodies.friction(drawn.friction).reach(reach).constraints()?.remove(0))
+        };
         found.push(match between {
             Between::OnePass => {
                 let mut slaves: Vec<_> = upper.iter().flat_map(|facet| facet.nodes().iter().copied()).collect();
@@ -481,10 +485,10 @@ where
                 let facets = lower.iter().chain(&upper).copied();
                 Box::new(NodeToFacet::of_itself(nodes, &dofs, facets)?.friction(drawn.friction).reach(reach)?)
             }
-            Between::Mortar | Between::MortarAndEdges => Box::new(weighted()?.friction(drawn.friction).reach(reach)?),
+            Between::Mortar | Between::MortarAndEdges => weighted(bodies()?)?,
             Between::Offsets => {
                 let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
-                Box::new(weighted()?.offsets(&offsets)?.friction(drawn.friction).reach(reach)?)
+                weighted(bodies()?.offsets(&offsets)?)?
             }
             Between::Coated => {
                 let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
@@ -496,7 +500,18 @@ where
                 let speed = drawn.speed * length / drawn.units.time;
                 let stress = material.density * material.wave_speed() * speed;
                 let strengths = [decades(-1.0, 1.0, random), decades(-1.0, 1.0, random)].map(|share| share * stress);
-                let bonded = weighted()?.friction(drawn.friction).reach(reach)?;
+                // The sides that face each other.
+                let facing = |facets: &[Facet], sign: f64| -> Result<Vec<Facet>> {
+                    let mut found = Vec::new();
+                    for facet in facets {
+                        let normals = Surface::new(nodes, [*facet])?.normals(nodes)?;
+                        let along = normals[0].iter().zip(drawn.turn[D - 1]).map(|(n, up)| n * up).sum::<f64>();
+                        found.extend((sign * along > 0.9).then_some(*facet));
+                    }
+                    Ok(found)
+                };
+                let bonded = Mortar::new(nodes, &dofs, facing(&upper, -1.0)?, facing(&lower, 1.0)?)?;
+                let bonded = bonded.friction(drawn.friction).reach(reach)?;
                 Box::new(bonded.bonded(BondStrength::new(strengths[0], strengths[1])?)?)
             }
             Between::Tie => Box::new(Tie::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?),
