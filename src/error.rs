@@ -384,8 +384,10 @@ pub enum Error {
         /// The violation, in units of the gap.
         violation: f64,
     },
-    /// Friction leaves a contact no way out: sliding on, no force of it can stop the approach (Painlevé), since
-    /// μ |W_nt| ≥ W_nn. Bodies would jam, or jump; a model that resolves what happens then has compliance.
+    /// Friction jams a contact: as it slides on, no force of it can stop the approach (Painlevé), since
+    /// μ |W_nt| ≥ W_nn. At the start of a run an impact stops the slip of one such contact instead
+    /// ([`StartAdjustment::impact`](crate::StartAdjustment)). Steps, restarts, and starts with several such contacts
+    /// return this error. A model that resolves what happens then has compliance.
     #[error(
         "t = {t:e}: contact {contact} jams: with μ = {friction} a unit of its force closes the gap by {friction} × \
          {coupling:e} through friction and opens it by {normal:e} only; lower μ, or give the contact compliance \

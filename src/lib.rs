@@ -52,7 +52,7 @@ pub use preset::Preset;
 pub use real::Real;
 pub use simulation::{
     ContactForce, Energy, InitialOverclosure, Iteration, Newton, Outcome, Simulation, SimulationBuilder,
-    StartAdjustment, Statistics, StepControl, Works,
+    StartAdjustment, StartImpact, Statistics, StepControl, Works,
 };
 #[cfg(feature = "serde")]
 pub use state::Checkpoint;

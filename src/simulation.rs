@@ -77,3 +77,4 @@ pub(crate) use overclosures::Overclosures;
 pub use results::{Energy, Outcome, Statistics, Works};
 pub use run::Simulation;
 pub use start::InitialOverclosure;
+pub use start_problem::StartImpact;

@@ -6,6 +6,7 @@ use super::massless::{Columns, Embedded};
 use super::massless_parts::{by_damping, factorize, joined, parts};
 use super::operator::Operator;
 use super::responses::Unit;
+use super::start_problem::StartImpact;
 use crate::contact::{Candidates, ContactJacobian, Course};
 use crate::contact_solver::{ContactProblem, ContactSolver};
 use crate::corrector::{Gaps, contact_error, rounding};
@@ -16,7 +17,7 @@ use crate::state::Motion;
 use crate::system::System;
 
 /// How dofs without mass, or all dofs of a run that [starts at rest](crate::SimulationBuilder::start_at_rest), were
-/// moved when a simulation was built, before its first step.
+/// moved when a simulation was built, before its first step, and how an impact changed their velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StartAdjustment<T> {
@@ -25,8 +26,10 @@ pub struct StartAdjustment<T> {
     pub energy: Option<T>,
     /// The largest change of a displacement (length).
     pub largest: T,
-    /// The dof that has moved most.
+    /// The dof that has moved most; 0 if none has moved.
     pub dof: usize,
+    /// The impact that stopped the slip of a contact, if friction jammed one. It changed velocities.
+    pub impact: Option<StartImpact<T>>,
 }
 
 /// What is not positive definite where a run cannot start at rest.
@@ -175,7 +178,10 @@ fn balance<T: Real>(
                 // with small displacements of its own would count as rounding.
                 missed = missed.max(T::of(8.0) * g.largest_row() * (size + T::epsilon() * scale));
             }
-            return Ok(Balance::Found(StartAdjustment { energy, largest: moves(dof).abs(), dof }, missed));
+            return Ok(Balance::Found(
+                StartAdjustment { energy, largest: moves(dof).abs(), dof, impact: None },
+                missed,
+            ));
         }
     }
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: worst })

@@ -109,7 +109,9 @@ impl<T: Real> Simulation<'_, T> {
     /// How dofs without mass were moved when the simulation was built, because they were not in static balance with the
     /// others, the load and contact. (They would have jumped in the first step, and the energy balance would not have
     /// shown what this costs.) Of a run that [starts at rest](crate::SimulationBuilder::start_at_rest) all dofs count.
-    /// None if none was moved.
+    ///
+    /// It also stores the [impact](crate::StartImpact) that stopped the slip of a contact which friction jammed at the
+    /// start. None if nothing was moved, and no velocity changed.
     pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
         self.adjustment
     }

@@ -8,7 +8,7 @@ use super::overclosures::Overclosures;
 use super::past::{straight_past, taylor_past};
 use super::rate_check::RateCheck;
 use super::scheme::Scheme;
-use super::start_problem::{StartProblem, sliding, stop_in_time};
+use super::start_problem::{StartImpact, StartProblem, sliding, stop_in_time};
 use super::supports::put_initial_supports;
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
@@ -66,6 +66,17 @@ pub(super) enum Violation {
     Initial(InitialOverclosure),
     /// At a restart: schemes that impose contact on velocities leave penetrations behind.
     Accepted,
+}
+
+/// The impact by which a contact that friction jams comes to stick.
+#[derive(Clone, Copy, Debug)]
+enum Impact<T> {
+    /// Velocities are those of a run that goes on, and stay as they are.
+    Refused,
+    /// None so far.
+    Possible,
+    /// The row of the contact, and the impulses that the velocities contain. There is no second one.
+    Found(usize, StartImpact<T>),
 }
 
 /// Motion and contacts at the start.
@@ -163,7 +174,7 @@ impl<T: Real> Start<'_, T> {
         projection: &mut JumpProjection<T>,
         violation: Violation,
     ) -> Result<Found<T>> {
-        let Self { system, contact_solver, scheme, together, h, t, massless, balanced, .. } = self;
+        let Self { system, contact_solver, scheme, together, h, t, massless, balanced, .. } = &mut *self;
         let (h, t) = (*h, *t);
         let dofs = u.len();
         let prescribed = system.prescribed().to_vec();
@@ -197,13 +208,47 @@ impl<T: Real> Start<'_, T> {
             }
         }
 
+        let known = (motion.a.clone(), contacts.clone());
+        let mut impact = match violation {
+            Violation::Initial(_) => Impact::Possible,
+            Violation::Accepted => Impact::Refused,
+        };
+        loop {
+            let rows = (&mut *constraints, &*g, &mut *projection);
+            match self.accelerate(rows, (&supports, &touching), impact, (&mut motion, &mut contacts))? {
+                None => break,
+                Some((row, found)) => {
+                    impact = Impact::Found(row, found);
+                    (motion.a, contacts) = known.clone();
+                }
+            }
+        }
+        if let Impact::Found(_, found) = impact {
+            let unmoved = StartAdjustment { energy: Some(T::zero()), largest: T::zero(), dof: 0, impact: None };
+            adjustment = Some(StartAdjustment { impact: Some(found), ..adjustment.unwrap_or(unmoved) });
+        }
+        Ok(Found { motion, contacts, adjustment })
+    }
+
+    /// Solves for accelerations and contact forces. If friction jams a contact at rest, changes the velocities instead
+    /// by the impact that stops its slip, and returns its row and its impulses: the caller then solves again.
+    fn accelerate(
+        &mut self,
+        (constraints, g, projection): (&mut Constraints<'_, T>, &ContactJacobian<T>, &mut JumpProjection<T>),
+        (supports, touching): (&[[T; 3]], &[bool]),
+        impact: Impact<T>,
+        (motion, contacts): (&mut Motion<T>, &mut ContactState<T>),
+    ) -> Result<Option<(usize, StartImpact<T>)>> {
+        let Self { system, contact_solver, scheme, h, t, massless, .. } = self;
+        let (h, t, dofs) = (*h, *t, motion.u.len());
+        let prescribed = system.prescribed().to_vec();
         let mut held = vec![false; dofs];
         for row in (0..constraints.len()).filter(|&row| touching[row] || contacts.gap[row] <= T::zero()) {
             for (dof, _) in g.row(row).filter(|(_, weight)| *weight != T::zero()) {
                 held[dof] = true;
             }
         }
-        balance_rates(&mut **system, massless, &held, &mut motion)?;
+        balance_rates(&mut **system, massless, &held, motion)?;
 
         // Accelerations without contact: M a = f − M a_p on free dofs.
         let mut force = vec![T::zero(); dofs];
@@ -211,7 +256,7 @@ impl<T: Real> Start<'_, T> {
         system.mass().add_product(-T::one(), &motion.a, &mut force);
         let unbalanced: Vec<T> = massless.iter().map(|&dof| force[dof]).collect();
         projection.apply_inverse(&mut force)?;
-        for (&dof, support) in prescribed.iter().zip(&supports) {
+        for (&dof, support) in prescribed.iter().zip(supports) {
             force[dof] = support[2];
         }
         motion.a = force;
@@ -243,28 +288,44 @@ impl<T: Real> Start<'_, T> {
         let is_spring = |row: usize| contacts.closed[row] && constraints.law(row).is_spring();
         let rubs = |row: &usize| is_spring(*row) && !drags(constraints, *row);
         let rows: Vec<usize> = constraints.tangents().contacts().filter(rubs).collect();
-        let moved = (&mut motion, &mut contacts);
+        let moved = (&mut *motion, &mut *contacts);
         rub_known(constraints, g, &mut **contact_solver, &mut *projection, h, moved, &rows)?;
         if !massless.is_empty() {
-            let moved = (&mut motion, &mut contacts);
+            let moved = (&mut *motion, &mut *contacts);
             let solver = &mut **contact_solver;
-            press_static(constraints, (g, projection), solver, (massless, &unbalanced), (h, &touching), moved)?;
+            press_static(constraints, (g, projection), solver, (massless, &unbalanced), (h, touching), moved)?;
         }
         let mut problem = match looks_ahead {
-            true => StartProblem::ahead(contact, &mut **system, constraints, g, &motion, h, &touching)?,
-            false => StartProblem::at_rest(constraints, g, &motion, h, &touching)?,
+            true => StartProblem::ahead(contact, &mut **system, constraints, g, motion, h, touching)?,
+            false => StartProblem::at_rest(constraints, g, motion, h, touching)?,
         };
-        problem.add_inertial(constraints, g, &motion, &contacts.gap)?;
+        problem.add_inertial(constraints, g, motion, &contacts.gap)?;
         if !massless.is_empty() {
             // These have been solved for, or are open.
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
-        let rubs = |row: usize| !drags(constraints, row);
-        problem.solve(t, constraints, g, (&mut *projection, &rubs), &mut **contact_solver)?;
-        problem.press(g, projection, &mut motion, &mut contacts)?;
-        pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), &contacts, &mut motion)?;
-        Ok(Found { motion, contacts, adjustment })
+        let rubbing: Vec<bool> = (0..constraints.len()).map(|row| !drags(constraints, row)).collect();
+        let rubs = |row: usize| rubbing[row];
+        if let Impact::Found(row, _) = impact {
+            problem.stick(row);
+        }
+        let solved = problem.solve(t, constraints, g, (&mut *projection, &rubs), &mut **contact_solver);
+        if let Err(error) = solved {
+            let jammed = match &error {
+                Error::Jammed { contact, .. } if matches!(impact, Impact::Possible) && !looks_ahead => {
+                    constraints.ids.iter().position(|id| id == contact)
+                }
+                _ => None,
+            };
+            let Some(row) = jammed else { return Err(error) };
+            let rows = (constraints, g, projection);
+            let found = problem.stop(row, rows, &rubs, &mut **contact_solver, motion)?;
+            return found.map(|found| Some((row, found))).ok_or(error);
+        }
+        problem.press(g, projection, motion, contacts)?;
+        pass_on_rest(&mut **system, (massless, &unbalanced), (g, projection), contacts, motion)?;
+        Ok(None)
     }
 }
 

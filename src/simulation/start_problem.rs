@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::supports::finite_supports;
-use crate::contact::{ContactJacobian, ContactLaw, Course, GapRates, Tangents};
+use crate::contact::{ContactId, ContactJacobian, ContactLaw, Course, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
 use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, rounding, slides};
 use crate::error::Result;
@@ -10,6 +10,27 @@ use crate::real::Real;
 use crate::state::{ContactState, Motion};
 use crate::system::System;
 use crate::tableau::ContactLevel;
+
+/// The impact by which friction stopped the slip of a contact when a simulation was built.
+///
+/// Where μ |W_nt| ≥ W_nn a contact that touches, and slides so that its friction closes the gap, has no force with
+/// which it could slide on ([`Error::Jammed`](crate::Error::Jammed)). Rigid bodies then have an impact without collision
+/// (Painlevé's paradox; Génot and Brogliato, Eur. J. Mech. A/Solids 18, 1999): impulses that bring the slip to zero and
+/// keep the rate of the gap at zero. For a single contact they are X = −W⁻¹ (0, slip velocity), with
+/// |X_t|/X_n = W_nn/|W_nt| ≤ μ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct StartImpact<T> {
+    /// The contact that sticks after it.
+    pub contact: ContactId,
+    /// Its normal impulse (force times time); positive.
+    pub normal: T,
+    /// Its impulses along its tangents (force times time); the second one is zero in two dimensions.
+    pub friction: [T; 2],
+    /// Change of the kinetic energy, less the work of obstacles that move; not positive. Other contacts that rest are
+    /// part of the impact, and of its energy.
+    pub energy: T,
+}
 
 /// The contact problem of the start: 0 ≤ S λ + q ⊥ λ ≥ 0. q is the acceleration of the gap without contact, or, for a
 /// scheme that imposes contact ahead of the state, the violation of that condition as an acceleration.
@@ -204,6 +225,70 @@ impl<T: Real> StartProblem<T> {
             solved: Vec::new(),
             lambda: Vec::new(),
         })
+    }
+
+    /// Takes a contact as one that sticks, if its friction can hold it: its slip is rounding.
+    pub(super) fn stick(&mut self, contact: usize) {
+        self.sliding.retain(|slide| slide.contact != contact);
+    }
+
+    /// Changes the velocities by the impact without collision that stops the slip of a contact: its gap rate and slip
+    /// are zero afterwards, with impulses W X = −(gap rate, slip). The other contacts of the problem have impulses by
+    /// Coulomb's law of impact: 0 ≤ X_n ⊥ gap rate ≥ 0, |X_t| ≤ μ X_n against the slip. Changes nothing if there are
+    /// no such impulses, or if those of the contact are outside of its cone.
+    pub(super) fn stop(
+        &self,
+        contact: usize,
+        (constraints, g, projection): (&mut Constraints<'_, T>, &ContactJacobian<T>, &mut JumpProjection<T>),
+        rubs: &dyn Fn(usize) -> bool,
+        solver: &mut dyn ContactSolver<T>,
+        motion: &mut Motion<T>,
+    ) -> Result<Option<StartImpact<T>>> {
+        let mut rates = vec![GapRates::default(); constraints.len()];
+        constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
+        let mut slips = vec![GapRates::default(); constraints.tangents().len()];
+        constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
+        rates.truncate(constraints.len());
+        rates.append(&mut slips);
+        let rate = |v: &[T], row: usize| g.product(row, v) + rates[row].rate;
+        let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+        for &row in self.rows.iter().filter(|&&row| self.compliance[row] == T::zero()) {
+            let own = if rubs(row) { tangents.of(row) } else { 0..0 };
+            let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
+            if row != contact {
+                problem.push(&Block::new(row, own.len(), set));
+            }
+            for row in std::iter::once(row).chain(own) {
+                if tangents.owner(row) == contact {
+                    problem.push(&Block::new(row, 0, AdmissibleSet::Free));
+                }
+                let noise = rounding(g.magnitude(row, &motion.v) + rates[row].rate.abs());
+                problem.demand(row, rate(&motion.v, row), noise, T::zero());
+            }
+        }
+        solver.reserve(problem.rows.len());
+        let id = |row| constraints.ids[tangents.owner(row)];
+        if problem.solve((g, &mut *projection), solver, T::one(), (motion.t, id)).is_err() {
+            return Ok(None);
+        }
+        let impulse = |row: usize| {
+            let place = problem.rows.iter().position(|&other| other == row);
+            place.map_or(T::zero(), |place| problem.totals[place])
+        };
+        let (normal, mut friction) = (impulse(contact), [T::zero(); 2]);
+        for (friction, row) in friction.iter_mut().zip(tangents.of(contact)) {
+            *friction = impulse(row);
+        }
+        let bound = T::of(tangents.friction(contact)) * (T::one() + T::epsilon().sqrt()) * normal;
+        if normal.is_nan() || normal <= T::zero() || friction[0].hypot(friction[1]) > bound {
+            return Ok(None);
+        }
+        let mut v = motion.v.clone();
+        projection.push(g, (&problem.rows, &problem.totals), T::one(), &mut v)?;
+        let work = |(&row, &impulse): (&usize, &T)| impulse * (rate(&motion.v, row) + rate(&v, row));
+        let energy = T::of(0.5) * problem.rows.iter().zip(&problem.totals).map(work).sum::<T>();
+        motion.v = v;
+        Ok(Some(StartImpact { contact: constraints.ids[contact], normal, friction, energy }))
     }
 
     /// Applies the multipliers and closes their contacts.
