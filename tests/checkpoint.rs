@@ -507,7 +507,7 @@ fn other_files_and_formats_are_refused_in_words() {
     let [files, _] = samples();
     let read = |text: &str| serde_json::from_str::<Checkpoint<f64>>(text).unwrap_err().to_string();
     for (written, words) in [
-        (files.text.replace("checkpoint 4", "checkpoint 7"), ["format 7", "reads format 4"]),
+        (files.text.replace("checkpoint 5", "checkpoint 7"), ["format 7", "reads format 5"]),
         (files.text.replace("contact-dynamics checkpoint", "results"), ["no checkpoint", "contact-dynamics"]),
         (files.text.replace("\"f64\"", "\"f16\""), ["f16", "f64"]),
         ("7".to_owned(), ["a checkpoint of contact-dynamics", "integer"]),
@@ -526,7 +526,7 @@ fn other_files_and_formats_are_refused_in_words() {
 fn another_layout_is_another_format() {
     let [files, _] = samples();
     let document: Value = serde_json::from_str(&files.text).unwrap();
-    assert_eq!(document["format"], "contact-dynamics checkpoint 4");
+    assert_eq!(document["format"], "contact-dynamics checkpoint 5");
     // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
     for (path, names) in [
         ("", "format history rows scalar scheme state"),
@@ -538,7 +538,7 @@ fn another_layout_is_another_format() {
         ),
         ("/history", "clock known made_with overclosures pace past slopes smooth trail trail_room unmoved"),
         ("/history/clock", "elapsed h origin steps"),
-        ("/history/pace", "grown kept level nominal patience position steps"),
+        ("/history/pace", "grown kept lasting level nominal patience position steps"),
         ("/history/overclosures", "depths over start"),
     ] {
         let fields = document.pointer(path).and_then(Value::as_object).unwrap();

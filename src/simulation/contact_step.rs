@@ -29,6 +29,9 @@ pub(super) struct ContactWork<T> {
     pub(super) closed_at_start: Vec<bool>,
     /// Which contacts exerted a force at the start of the step.
     pub(super) exerting_at_start: Vec<bool>,
+    /// Forces of all rows at the start of the step, and which contacts slid there; empty without friction.
+    pub(super) forces_at_start: Vec<T>,
+    pub(super) sliding_at_start: Vec<bool>,
     /// Closed flags before the present stage.
     pub(super) was_closed: Vec<bool>,
     /// Which contacts friction held before the present stage; empty without friction.

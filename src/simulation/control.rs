@@ -19,7 +19,7 @@ impl<T: Real> Simulation<'_, T> {
             let Some(judge) = &mut self.judge else { break self.attempt().map(drop) };
             let last = smaller < judge.control.smallest * (1.0 - 1e-9);
             judge.suspended = last;
-            judge.begin(&self.state);
+            judge.begin(&self.state, self.history.pace.lasting);
             self.work.contact.rows.curved.may_halve = !last;
             match self.attempt() {
                 Ok(Verdict::Accepted) => break Ok(()),
@@ -68,6 +68,7 @@ impl<T: Real> Simulation<'_, T> {
     fn grow(&mut self) {
         let Self { judge: Some(judge), constraints, state, statistics, history, .. } = self else { return };
         statistics.coarse_steps += u64::from(judge.coarse);
+        history.pace.note_change(judge.changed, history.clock.h);
         let may_grow = judge.may_grow() && !judge.coarse;
         let presses = || {
             let mut rows = constraints.rows_of(&state.contacts);

@@ -1,6 +1,7 @@
 //! Settings of the step-size control, and the judgement of a step: fine enough, or too coarse.
 
 use crate::analysis::LocalError;
+use crate::contact::ContactJacobian;
 use crate::error::{Error, Result, positive};
 use crate::ranks::Together;
 use crate::real::Real;
@@ -71,9 +72,20 @@ impl StepControl {
     /// ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or opens the
     /// motion is not smooth and the factor is 1; the estimate is then about the velocity that the contact lost times
     /// the step size, as the instant of impact is uncertain by a step. Velocities are compared as well as
-    /// displacements, so corrections do not hide an impact. Schemes that impose contact ahead of the state show an
-    /// impact one step late, and with some schemes of first order the error of the velocity does not show at all:
-    /// `build` refuses both.
+    /// displacements, so corrections do not hide an impact.
+    ///
+    /// In a step in which a contact begins or ends to slide, or its slip reverses, the acceleration jumps by Δa at an
+    /// instant that is uncertain by the step size h. The velocity may then err by h Δa, and this error moves the body
+    /// until contacts change again. The estimate is therefore at least h Δa τ. Δa is measured along the tangents of the
+    /// contact. τ is about the time between changes of contact: it grows by h in each step, and halves in a step in
+    /// which contacts close, open or change their friction. A slip that reverses every half second is found by steps of
+    /// about `tolerance`/(0.5 s · Δa). Contacts that change in every step are judged by 2 h² Δa. Friction on dofs
+    /// without mass leaves no such error.
+    ///
+    /// All other errors are those of one step: the estimate does not contain their sum over a run.
+    ///
+    /// Schemes that impose contact ahead of the state show an impact one step late, and with some schemes of first
+    /// order the error of the velocity does not show at all: `build` refuses both.
     ///
     /// # Errors
     ///
@@ -115,6 +127,10 @@ pub(super) struct Judge<T> {
     pub(super) local: Option<LocalError>,
     /// u, v and a at the time of the state that the step starts from; empty if errors are not estimated.
     start: Motion<T>,
+    /// Time over which the error of a velocity lasts, at the start of the step.
+    lasting: f64,
+    /// Whether contacts or their friction changed in the step judged last.
+    pub(super) changed: bool,
     /// Whether steps are accepted though too coarse: they cannot be smaller.
     pub(super) suspended: bool,
     /// The estimate of the step judged last, as a length and divided by the tolerance.
@@ -127,11 +143,13 @@ pub(super) struct Judge<T> {
 impl<T: Real> Judge<T> {
     pub(super) fn new(control: StepControl, local: Option<LocalError>, dofs: usize) -> Self {
         let start = Motion::zero(if local.is_some() { dofs } else { 0 });
-        Self { control, local, start, suspended: false, estimate: 0.0, excess: 0.0, coarse: false }
+        let (estimate, excess) = (0.0, 0.0);
+        Self { control, local, start, lasting: 0.0, changed: false, suspended: false, estimate, excess, coarse: false }
     }
 
-    /// Remembers the state that a step starts from.
-    pub(super) fn begin(&mut self, state: &State<T>) {
+    /// Remembers the state that a step starts from, and how long the error of a velocity lasts.
+    pub(super) fn begin(&mut self, state: &State<T>, lasting: f64) {
+        self.lasting = lasting;
         if self.local.is_some() {
             self.start.u.copy_from_slice(state.displacement());
             self.start.v.copy_from_slice(state.velocity());
@@ -139,24 +157,27 @@ impl<T: Real> Judge<T> {
         }
     }
 
-    /// Judges a step that ends with u and v, after contacts have closed or opened: whether the motion jumps with
-    /// them, and how many there are.
+    /// Judges a step that ends with u and v, by its contacts too: whether the motion jumps because some have closed or
+    /// opened, how many have, and the error of the velocity if friction jumps.
     pub(super) fn judge(
         &mut self,
         together: &Together<T>,
         [u, v]: [&[T]; 2],
         prescribed: &[usize],
         h: f64,
-        (jumps, changes): (bool, usize),
+        (jumps, changes, velocity_error): (bool, usize, Option<f64>),
     ) -> Result<Verdict> {
         self.excess = 0.0;
+        self.changed = jumps || velocity_error.is_some();
         if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
             let factor = if jumps { 1.0 } else { local.factor };
             // (The largest of numbers leaves NaN out.)
             let distance = self.distance([u, v], prescribed, h);
             let distance = if distance.is_nan() { f64::INFINITY } else { distance };
             let [distance] = together.max(Ok([distance]))?;
-            self.estimate = factor * distance;
+            // (Where a contact closes as well, the acceleration contains its impact. All ranks know all contact dofs.)
+            let lasting = velocity_error.filter(|_| !jumps).map_or(0.0, |error| error * (self.lasting + h));
+            self.estimate = (factor * distance).max(lasting);
             self.excess = self.estimate / tolerance;
         }
         // Written so that NaN is refused.
@@ -166,6 +187,19 @@ impl<T: Real> Judge<T> {
             true => Verdict::Accepted,
             false => Verdict::Coarse,
         })
+    }
+
+    /// How far the velocity along some rows may be off at the end of a step of size h in which the acceleration along
+    /// them jumps: h times the largest jump. None if there are no rows.
+    pub(super) fn velocity_error(
+        &self,
+        (g, rows): (&ContactJacobian<T>, impl Iterator<Item = usize>),
+        a: &[T],
+        h: f64,
+    ) -> Option<f64> {
+        let a0 = self.local.map(|_| &self.start.a)?;
+        let jump = |row| g.row(row).map(|(dof, weight)| weight * (a[dof] - a0[dof])).sum::<T>();
+        rows.map(|row| h * jump(row).value().abs()).reduce(f64::max)
     }
 
     /// Largest distance of the free dofs from Taylor's expansion, in u and in h v.

@@ -1,4 +1,5 @@
-//! Contacts that close or open in a step: whether the motion jumps with them, or rounding has said so.
+//! Contacts that close or open in a step, and friction that changes: whether the motion jumps with them. Rounding alone
+//! makes no jump.
 
 use super::constraints::Constraints;
 use super::contact_step::ContactWork;
@@ -29,6 +30,27 @@ fn exerts<T: Real>(
     let is_pressed =
         || !constraints.law(row).is_spring() || -gap > constraints.gap_rounding(row, g.magnitude(row, u), gap);
     (contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()) && is_pressed()
+}
+
+/// The contacts that exert a force at both ends of a step and whose friction jumps in it, because they begin or end to
+/// slide or their slip reverses. On dofs without mass friction is part of a static balance: those contacts are left
+/// out.
+pub(super) fn friction_jumps<'c, T: Real>(
+    constraints: &'c Constraints<'_, T>,
+    g: &'c ContactJacobian<T>,
+    massless: &'c [usize],
+    contact: &'c ContactWork<T>,
+) -> impl Iterator<Item = usize> + 'c {
+    let ContactWork { trial, exerting_at_start, forces_at_start, sliding_at_start, .. } = contact;
+    let tangents = constraints.tangents();
+    tangents.contacts().filter(move |&row| {
+        let reverses = || tangents.of(row).map(|k| forces_at_start[k] * trial.lambda[k]).sum::<T>() < T::zero();
+        let jumps = match [sliding_at_start[row], trial.sliding[row]] {
+            [true, true] => reverses(),
+            [before, now] => before != now,
+        };
+        jumps && exerting_at_start[row] && trial.lambda[row] != T::zero() && !tangents.act_on(g, row, massless)
+    })
 }
 
 /// Whether contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion jump.

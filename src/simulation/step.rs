@@ -7,7 +7,7 @@ use super::contact_step::{ContactStep, ContactWork};
 use super::energy::StepBooks;
 use super::finite::{Extent, check_contacts, check_motion};
 use super::judge::Verdict;
-use super::jumps::{jumps, note_exerting};
+use super::jumps::{friction_jumps, jumps, note_exerting};
 use super::massless_step::difference;
 use super::program::CompiledStage;
 use super::run::Simulation;
@@ -51,8 +51,12 @@ impl<T: Real> Simulation<'_, T> {
             ledger.begin((constraints, g), state, &work.contact.trial.lambda)?;
         }
         work.contact.closed_at_start.clone_from(&work.contact.trial.closed);
-        let ContactWork { trial, exerting_at_start, .. } = &mut work.contact;
+        let ContactWork { trial, exerting_at_start, forces_at_start, sliding_at_start, .. } = &mut work.contact;
         note_exerting((constraints, g), trial, &state.motion.u, exerting_at_start);
+        if !constraints.tangents().is_empty() {
+            forces_at_start.clone_from(&trial.lambda);
+            sliding_at_start.clone_from(&trial.sliding);
+        }
         work.backup.begin();
         work.contact.impulses.begin();
         work.correction.energy = T::zero();
@@ -132,6 +136,8 @@ impl<T: Real> Simulation<'_, T> {
         let ends = [work.backup.start(past), new];
         let jumps = broken > 0 || jumps(constraints, g, ends, history.clock.h, &work.contact);
         let changes = changes.max(broken);
+        let friction_jumps = || friction_jumps(constraints, g, &work.massless, &work.contact);
+        let rubs = friction_jumps().next().is_some();
         let from = (!jumps).then(|| &past[stages - 1]);
         let finite = scheme.show(new, from, &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
@@ -158,7 +164,9 @@ impl<T: Real> Simulation<'_, T> {
         let motion = [&new.u, new.shown(&work.shown, 1), new.shown(&work.shown, 2)];
         if let Some(judge) = judge {
             let (prescribed, h) = (&work.vectors.supports.dofs[..], history.clock.h);
-            let verdict = judge.judge(together, [motion[0], motion[1]], prescribed, h, (jumps, changes))?;
+            let rows = friction_jumps().flat_map(|contact| constraints.tangents().of(contact));
+            let friction = judge.velocity_error((g, rows), motion[2], h);
+            let verdict = judge.judge(together, [motion[0], motion[1]], prescribed, h, (jumps, changes, friction))?;
             if verdict == Verdict::Coarse {
                 return Ok(verdict);
             }
@@ -198,7 +206,7 @@ impl<T: Real> Simulation<'_, T> {
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
         let depth = scheme.depth;
         history.known = (history.known + 1).min(depth);
-        history.smooth = if jumps { 1 } else { history.smooth + 1 };
+        history.smooth = if jumps || rubs { 1 } else { history.smooth + 1 };
         if !history.trail.is_empty() {
             history.trail.push(&history.slots[1], history.made_with);
             for (field, unmoved) in (1..).zip(&mut history.unmoved) {

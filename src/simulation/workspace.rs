@@ -111,6 +111,8 @@ impl<T: Real> Workspace<T> {
                 impulses: Impulses::new(room(true)),
                 closed_at_start: Vec::with_capacity(rows),
                 exerting_at_start: Vec::with_capacity(rows),
+                forces_at_start: Vec::new(),
+                sliding_at_start: Vec::new(),
                 was_closed: Vec::with_capacity(rows),
                 was_sticking: Vec::new(),
             },

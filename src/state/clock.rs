@@ -95,6 +95,9 @@ pub(crate) struct Pace {
     /// Halvings that growth keeps: a larger step was beyond the limit of stability of the system, and of contacts that
     /// pressed (until none does).
     kept: [u32; 2],
+    /// Time over which the error of a velocity lasts: about the time between changes of contact. It grows in each step,
+    /// and halves in a step in which a contact closes, opens, begins or ends to slide, or its slip reverses.
+    pub(crate) lasting: f64,
 }
 
 /// Why a step was refused.
@@ -113,13 +116,22 @@ const PATIENCE: [u32; 2] = [2, 64];
 
 impl Pace {
     pub(crate) fn new(nominal: f64) -> Self {
-        Self { nominal, level: 0, position: 0, steps: 0, grown: false, patience: PATIENCE[0], kept: [0; 2] }
+        Self {
+            nominal,
+            level: 0,
+            position: 0,
+            steps: 0,
+            grown: false,
+            patience: PATIENCE[0],
+            kept: [0; 2],
+            lasting: 0.0,
+        }
     }
 
     /// Of a checkpoint that was read: refuses what no run with a present step size of h leaves.
     #[cfg(feature = "serde")]
     pub(super) fn check_read(&self, h: f64) -> Result<()> {
-        let Self { nominal, level, position, steps: _, grown: _, patience, kept } = *self;
+        let Self { nominal, level, position, steps: _, grown: _, patience, kept, lasting } = *self;
         let halved = |nominal: f64| (0..level).fold(nominal, |h, _| 0.5 * h);
         let levels = u64::from(f64::MANTISSA_DIGITS) + u64::from(f64::MAX_EXP.unsigned_abs());
         count("the halvings of a checkpoint", level.into(), 0..=levels)?;
@@ -129,6 +141,8 @@ impl Pace {
         for kept in kept {
             count("the halvings of a checkpoint that growth keeps", kept.into(), 0..=level.into())?;
         }
+        let is_time = |time: f64| time >= 0.0 && time.is_finite();
+        number("the time between changes of contact of a checkpoint", lasting, "finite, not negative", is_time)?;
         count("the patience of a checkpoint", patience.into(), PATIENCE[0].into()..=PATIENCE[1].into())
     }
 
@@ -161,6 +175,13 @@ impl Pace {
         }
         let most = self.kept[0].max(self.kept[1]);
         self.level > most && self.position.is_multiple_of(2) && self.steps >= self.patience
+    }
+
+    /// After a good step of size h: updates the time over which the error of a velocity lasts. Half of it remains after
+    /// a change of contacts, because a slip that reverses may stick for a step before the second change. With changes
+    /// in every step it falls to h.
+    pub(crate) fn note_change(&mut self, changed: bool, h: f64) {
+        self.lasting = (self.lasting + h) * if changed { 0.5 } else { 1.0 };
     }
 
     /// Growth: twice the size.

@@ -12,8 +12,8 @@ pub struct History<T> {
     pub(crate) slots: Vec<Motion<T>>,
     /// Number of states known, the current one included.
     pub(crate) known: usize,
-    /// Number of newest states since the motion last jumped with a contact that closed or opened, the first one after
-    /// that included.
+    /// Number of newest states since the motion last jumped with a contact that closed or opened, or with friction. The
+    /// first state after the jump is included.
     pub(crate) smooth: usize,
     pub(crate) clock: Clock,
     pub(crate) pace: Pace,

@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// The format that is written, and the only one that is read.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 /// How every file begins.
 const KIND: &str = "contact-dynamics checkpoint";

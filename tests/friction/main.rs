@@ -10,6 +10,7 @@ mod published;
 mod random;
 mod refused;
 mod resumed;
+mod reversals;
 mod slab;
 mod solids;
 mod systems;
