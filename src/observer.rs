@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::real::Real;
-use crate::simulation::results::{Energy, Statistics};
+use crate::simulation::{Energy, Statistics};
 use crate::state::{ContactStatus, State};
 
 /// Whether a run goes on.

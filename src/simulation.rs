@@ -1,80 +1,27 @@
 //! The simulation: one system, one integrator, contacts and correctors, advanced step by step.
+//!
+//! In the order of a run: `build` puts its parts together, `start` finds its first state, `step` advances it by one
+//! step. A step consists of stages (`stage`), each solved with its effective matrix (`operator`) and the rows of contact
+//! (`rows`). `watch` follows energy and stability, `run` is what the caller has in hands.
 
-mod admitted;
-mod advance;
-mod applied_rows;
-mod builder;
-#[cfg(feature = "serde")]
-mod checkpoint;
-mod closing;
-mod constraint_part;
-mod constraints;
-mod contact_multipliers;
-mod contact_output;
-mod contact_path;
-mod contact_rows;
-mod contact_solve;
-mod contact_step;
-mod control;
-mod curved_rows;
-mod curved_step;
-mod derived;
-mod energy;
-mod excess_forces;
-mod finite;
-mod gaps;
-mod impacts;
-mod impulses;
-mod interface;
-mod judge;
-mod jumps;
-mod kept_depths;
-mod laws;
-mod linear_step;
-mod massless;
-mod massless_parts;
-mod massless_start;
-mod massless_step;
-mod mixing;
-mod newton;
-mod newton_step;
+mod build;
 mod operator;
-mod overclosures;
-mod pairing;
-mod past;
-mod path;
-mod program;
-mod rate_check;
-mod rate_differences;
-mod resample;
-mod responses;
-pub(crate) mod results;
-mod resumed;
+mod rows;
 mod run;
-mod scheme;
-#[cfg(feature = "serde")]
-mod settings;
-mod slip;
-mod stability;
 mod stage;
-mod stage_vectors;
 mod start;
-mod start_problem;
 mod step;
-mod stiffening;
-mod supports;
-mod tangent;
-mod workspace;
+mod watch;
 
-pub use builder::SimulationBuilder;
-pub use contact_output::ContactForce;
-pub use judge::StepControl;
-pub(crate) use massless::MasslessBlock;
-pub use massless_start::StartAdjustment;
-pub use newton::{Iteration, Newton};
+pub use build::builder::SimulationBuilder;
 pub(crate) use operator::Operator;
-pub(crate) use overclosures::Overclosures;
-pub use results::{Energy, Outcome, Statistics, Works};
 pub use run::Simulation;
+pub use run::contact_output::ContactForce;
+pub use run::results::{Energy, Outcome, Statistics, Works};
+pub(crate) use stage::massless::MasslessBlock;
+pub use stage::newton::{Iteration, Newton};
 pub use start::InitialOverclosure;
-pub use start_problem::StartImpact;
+pub use start::massless::StartAdjustment;
+pub(crate) use start::overclosures::Overclosures;
+pub use start::problem::StartImpact;
+pub use step::judge::StepControl;

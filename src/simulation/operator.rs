@@ -1,10 +1,16 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
+//!
+//! - `tangent`: the pattern of the effective matrix and the entries of its tangent.
+//! - `contact_path`, `interface`: the order of elimination, and the dofs that contact acts on.
+//! - `responses`, `delassus`: responses of the interface to unit forces, and the Delassus operator of the rows.
+
+pub(super) mod contact_path;
+pub(super) mod interface;
+pub(super) mod responses;
+pub(super) mod tangent;
 
 mod delassus;
 
-use super::contact_path::{ContactPath, analyze, condensation, respond};
-use super::responses::{Responses, Unit};
-use super::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::contact::{ContactJacobian, Groups, SpreadRow};
 use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
@@ -12,6 +18,9 @@ use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
+use crate::simulation::operator::contact_path::{ContactPath, analyze, condensation, respond};
+use crate::simulation::operator::responses::{Responses, Unit};
+use crate::simulation::operator::tangent::{At, Tangent, TangentOf, check_sources, pattern};
 use crate::sparse::Combination;
 use crate::system::{Linearity, System, TangentWeights};
 use delassus::Delassus;

@@ -1,16 +1,14 @@
 //! A run: its parts, what is read of it, and how it is put back after a failed step.
+//!
+//! - `advance`: a run goes on, until a time.
+//! - `results`: work counts, energies, and why a run ended.
+//! - `contact_output`, `impulses`: forces and impulses of contact for the caller.
 
-use super::constraints::Constraints;
-use super::energy::{self, Ledger};
-use super::judge::Judge;
-use super::massless_start::StartAdjustment;
-use super::newton::Iteration;
-use super::operator::Operator;
-use super::program::Program;
-use super::results::{Energy, Statistics};
-use super::scheme::Scheme;
-use super::stability::StepLimit;
-use super::workspace::Workspace;
+pub(super) mod advance;
+pub(super) mod contact_output;
+pub(super) mod impulses;
+pub(super) mod results;
+
 use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::ContactSolver;
 use crate::corrector::Corrector;
@@ -18,6 +16,17 @@ use crate::error::{Error, Result};
 use crate::linear_solver::LinearSolver;
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::simulation::build::program::Program;
+use crate::simulation::build::scheme::Scheme;
+use crate::simulation::build::workspace::Workspace;
+use crate::simulation::operator::Operator;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::run::results::{Energy, Statistics};
+use crate::simulation::stage::newton::Iteration;
+use crate::simulation::start::massless::StartAdjustment;
+use crate::simulation::step::judge::Judge;
+use crate::simulation::watch::energy::{self, Ledger};
+use crate::simulation::watch::stability::StepLimit;
 use crate::state::{History, State};
 use crate::system::System;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -42,29 +51,29 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Simulation<'a, T: Real> {
-    pub(super) system: Box<dyn System<T> + 'a>,
-    pub(super) constraints: Constraints<'a, T>,
+    pub(crate) system: Box<dyn System<T> + 'a>,
+    pub(crate) constraints: Constraints<'a, T>,
     /// The rows of G of all constraints.
-    pub(super) g: ContactJacobian<T>,
-    pub(super) contact_solver: Box<dyn ContactSolver<T> + 'a>,
-    pub(super) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
-    pub(super) linear_solver: Box<dyn LinearSolver<T> + 'a>,
-    pub(super) together: Together<T>,
-    pub(super) scheme: Scheme<'a>,
-    pub(super) program: Program<T>,
-    pub(super) limit: StepLimit,
+    pub(crate) g: ContactJacobian<T>,
+    pub(crate) contact_solver: Box<dyn ContactSolver<T> + 'a>,
+    pub(crate) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
+    pub(crate) linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    pub(crate) together: Together<T>,
+    pub(crate) scheme: Scheme<'a>,
+    pub(crate) program: Program<T>,
+    pub(crate) limit: StepLimit,
     /// The one-step scheme of the first steps; none once the past is known.
-    pub(super) startup: Option<Program<T>>,
-    pub(super) state: State<T>,
-    pub(super) history: History<T>,
-    pub(super) work: Workspace<T>,
-    pub(super) ledger: Option<Box<Ledger<T>>>,
+    pub(crate) startup: Option<Program<T>>,
+    pub(crate) state: State<T>,
+    pub(crate) history: History<T>,
+    pub(crate) work: Workspace<T>,
+    pub(crate) ledger: Option<Box<Ledger<T>>>,
     /// For runs that control their step size.
-    pub(super) judge: Option<Judge<T>>,
-    pub(super) adjustment: Option<StartAdjustment<T>>,
-    pub(super) statistics: Statistics,
+    pub(crate) judge: Option<Judge<T>>,
+    pub(crate) adjustment: Option<StartAdjustment<T>>,
+    pub(crate) statistics: Statistics,
     /// Whether a callback of the host has panicked.
-    pub(super) poisoned: bool,
+    pub(crate) poisoned: bool,
 }
 
 impl<T: Real> std::fmt::Debug for Simulation<'_, T> {
@@ -176,13 +185,13 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Refuses to go on after a panic of the host.
-    pub(super) fn check_sound(&self) -> Result<()> {
+    pub(crate) fn check_sound(&self) -> Result<()> {
         if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
     }
 
     /// Runs a call that changes the run and calls the host. If the host panics, state and history are put back before
     /// the panic goes on, and later calls are refused.
-    pub(super) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
+    pub(crate) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
         self.check_sound()?;
         // Unwind safe: state and history are put back below, and nothing else can be used after a panic.
         match catch_unwind(AssertUnwindSafe(|| call(self))) {
@@ -200,7 +209,7 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Puts state and history back to what they were when the attempt of a step began.
-    pub(super) fn put_back(&mut self) {
+    pub(crate) fn put_back(&mut self) {
         let Self { state, history, work, .. } = self;
         work.backup.undo(&mut history.slots);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);

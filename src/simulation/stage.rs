@@ -1,38 +1,57 @@
 //! What a stage is solved with, and its contact.
+//!
+//! In the order in which a stage visits them:
+//!
+//! - `supports`, `vectors`: prescribed motions, the predicted motion and its residual.
+//! - `massless`, `massless_step`: dofs without mass.
+//! - `linear`, or `newton_step` with the settings in `newton` and the force in `path`: the stage is solved.
+//! - `contact`: its contact.
+//! - `excess_forces`: contacts on dofs without mass that press for a part of the stage.
 
-use super::constraints::Constraints;
-use super::contact_rows::Part;
-use super::contact_step::{ContactStep, ContactWork};
-use super::curved_rows::{CurvedRowsWork, FOLLOWED, Worst};
-use super::operator::Operator;
-use super::program::CompiledStage;
-use super::results::Statistics;
-use super::stage_vectors::StageVectors;
+pub(super) mod contact;
+pub(super) mod excess_forces;
+pub(super) mod linear;
+pub(super) mod massless;
+pub(super) mod massless_step;
+pub(super) mod newton;
+pub(super) mod newton_step;
+pub(super) mod path;
+pub(super) mod supports;
+pub(super) mod vectors;
+
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
 use crate::error::{Error, Result};
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::simulation::build::program::CompiledStage;
+use crate::simulation::operator::Operator;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::contact_rows::Part;
+use crate::simulation::rows::curved_rows::{CurvedRowsWork, FOLLOWED, Worst};
+use crate::simulation::run::results::Statistics;
+use crate::simulation::stage::contact::{ContactStep, ContactWork};
+use crate::simulation::stage::vectors::StageVectors;
 use crate::state::{Clock, Motion};
 use crate::system::System;
 
 /// What a stage is solved with.
-pub(super) struct StageSolve<'s, 'a, T: Real> {
-    pub(super) stage: &'s CompiledStage<T>,
-    pub(super) clock: Clock,
-    pub(super) system: &'s mut dyn System<T>,
-    pub(super) together: &'s Together<T>,
-    pub(super) operator: &'s mut Operator<T>,
-    pub(super) constraints: &'s mut Constraints<'a, T>,
-    pub(super) g: &'s mut ContactJacobian<T>,
-    pub(super) solver: &'s mut dyn ContactSolver<T>,
-    pub(super) statistics: &'s mut Statistics,
+pub(crate) struct StageSolve<'s, 'a, T: Real> {
+    pub(crate) stage: &'s CompiledStage<T>,
+    pub(crate) clock: Clock,
+    pub(crate) system: &'s mut dyn System<T>,
+    pub(crate) together: &'s Together<T>,
+    pub(crate) operator: &'s mut Operator<T>,
+    pub(crate) constraints: &'s mut Constraints<'a, T>,
+    pub(crate) g: &'s mut ContactJacobian<T>,
+    pub(crate) solver: &'s mut dyn ContactSolver<T>,
+    pub(crate) statistics: &'s mut Statistics,
 }
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Adds the response to contact to the increment on the interface; `iterate` is the part of the unknown that
     /// motions contain already. Says whether curved rows fit the result.
-    pub(super) fn contact(
+    pub(crate) fn contact(
         &mut self,
         part: Part,
         iterate: Option<&[T]>,
@@ -48,7 +67,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 
     /// Refuses contact whose curved rows do not fit its result.
-    pub(super) fn refuse_unsettled(&self, settled: bool, t: f64, rows: &CurvedRowsWork<T>) -> Result<()> {
+    pub(crate) fn refuse_unsettled(&self, settled: bool, t: f64, rows: &CurvedRowsWork<T>) -> Result<()> {
         if settled {
             return Ok(());
         }
@@ -57,7 +76,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         Err(Error::ContactUnsettled { t, iterations, contact, what, change, tolerance })
     }
 
-    pub(super) fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {
+    pub(crate) fn refuse_nan(&self, values: &[T], what: &'static str) -> Result<()> {
         if T::all_finite(values) {
             return Ok(());
         }

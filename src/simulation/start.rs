@@ -1,15 +1,22 @@
 //! The state at the start: supports, contacts, accelerations, and the past that a multistep scheme needs.
+//!
+//! - `overclosures`: bodies that overlap at the start.
+//! - `rate_check`: gap rates and rows are compared with gaps.
+//! - `massless`, `massless_parts`: dofs without mass are brought into static balance.
+//! - `problem`: the contact problem of the start.
+//! - `past`: past states made from a motion.
+//! - `resumed`, `checkpoint`: a run is continued from another one, or from a file.
 
-use super::constraints::Constraints;
-use super::finite::check_state;
-use super::massless_parts::{joined, parts};
-use super::massless_start::{Balanced, StartAdjustment, balance_rates, balance_start, pass_on};
-use super::overclosures::Overclosures;
-use super::past::{straight_past, taylor_past};
-use super::rate_check::RateCheck;
-use super::scheme::Scheme;
-use super::start_problem::{StartImpact, StartProblem, sliding, stop_in_time};
-use super::supports::put_initial_supports;
+#[cfg(feature = "serde")]
+pub(super) mod checkpoint;
+pub(super) mod massless;
+pub(super) mod massless_parts;
+pub(super) mod overclosures;
+pub(super) mod past;
+pub(super) mod problem;
+pub(super) mod rate_check;
+pub(super) mod resumed;
+
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, rounding};
@@ -18,25 +25,35 @@ use crate::linear_solver::LinearSolver;
 use crate::mass::InverseMass;
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::simulation::build::scheme::Scheme;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::stage::supports::put_initial_supports;
+use crate::simulation::start::massless::{Balanced, StartAdjustment, balance_rates, balance_start, pass_on};
+use crate::simulation::start::massless_parts::{joined, parts};
+use crate::simulation::start::overclosures::Overclosures;
+use crate::simulation::start::past::{straight_past, taylor_past};
+use crate::simulation::start::problem::{StartImpact, StartProblem, sliding, stop_in_time};
+use crate::simulation::start::rate_check::RateCheck;
+use crate::simulation::step::finite::check_state;
 use crate::sparse::scattered_signed;
 use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
 use crate::system::System;
 use crate::tableau::StartUp;
 
 /// What the state at the start is made from.
-pub(super) struct Start<'s, T: Real> {
-    pub(super) system: &'s mut dyn System<T>,
-    pub(super) contact_solver: &'s mut dyn ContactSolver<T>,
-    pub(super) scheme: &'s Scheme<'s>,
-    pub(super) together: &'s Together<T>,
-    pub(super) h: f64,
-    pub(super) t: f64,
+pub(crate) struct Start<'s, T: Real> {
+    pub(crate) system: &'s mut dyn System<T>,
+    pub(crate) contact_solver: &'s mut dyn ContactSolver<T>,
+    pub(crate) scheme: &'s Scheme<'s>,
+    pub(crate) together: &'s Together<T>,
+    pub(crate) h: f64,
+    pub(crate) t: f64,
     /// Free dofs without mass.
-    pub(super) massless: &'s [usize],
+    pub(crate) massless: &'s [usize],
     /// Which dofs are brought into static balance.
-    pub(super) balanced: Balanced,
+    pub(crate) balanced: Balanced,
     /// Whether accelerations are those of the smooth motion, without the forces of closed contacts.
-    pub(super) is_smooth: bool,
+    pub(crate) is_smooth: bool,
 }
 
 /// How bodies that overlap at the start are treated, in rigid contacts and equality rows. (Mesh generators leave small
@@ -61,7 +78,7 @@ pub enum InitialOverclosure {
 
 /// Whether a motion may start inside an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Violation {
+pub(crate) enum Violation {
     /// As the caller has chosen, at the start of a run.
     Initial(InitialOverclosure),
     /// At a restart: schemes that impose contact on velocities leave penetrations behind.
@@ -87,14 +104,14 @@ struct Found<T: Real> {
 }
 
 /// What a run starts from.
-pub(super) struct Begun<T: Real> {
-    pub(super) state: State<T>,
-    pub(super) history: History<T>,
-    pub(super) adjustment: Option<StartAdjustment<T>>,
+pub(crate) struct Begun<T: Real> {
+    pub(crate) state: State<T>,
+    pub(crate) history: History<T>,
+    pub(crate) adjustment: Option<StartAdjustment<T>>,
 }
 
 /// M⁻¹ on the free dofs with room for the candidates.
-pub(super) fn projection<T: Real>(
+pub(crate) fn projection<T: Real>(
     system: &dyn System<T>,
     constraints: &Constraints<'_, T>,
     (together, solver): (&Together<T>, &dyn LinearSolver<T>),
@@ -109,7 +126,7 @@ pub(super) fn projection<T: Real>(
 
 impl<T: Real> Start<'_, T> {
     /// State and past from displacements and velocities at the start.
-    pub(super) fn begin(
+    pub(crate) fn begin(
         mut self,
         u: Vec<T>,
         v: Vec<T>,

@@ -1,33 +1,44 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything as it was.
+//!
+//! - `jumps`: contacts that close or open, and friction that changes.
+//! - `finite`: the check before a state is accepted.
+//! - `judge`: whether a step is fine enough; `control`: a refused step is taken again.
+//! - `resample`: changes of the step size, and restarts.
 
-use super::closing::Booking;
-use super::constraints::Constraints;
-use super::contact_rows::Part;
-use super::contact_step::{ContactStep, ContactWork};
-use super::energy::StepBooks;
-use super::finite::{Extent, check_contacts, check_motion};
-use super::judge::Verdict;
-use super::jumps::{friction_jumps, jumps, note_exerting};
-use super::massless_step::difference;
-use super::program::CompiledStage;
-use super::run::Simulation;
-use super::slip::note_slips_of_state;
-use super::stage::StageSolve;
-use super::stage_vectors::predict;
-use super::stiffening::Taken;
-use super::workspace::{CorrectionWork, Workspace};
+pub(super) mod control;
+pub(super) mod finite;
+pub(super) mod judge;
+pub(super) mod jumps;
+pub(super) mod resample;
+
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
 use crate::corrector::{Correction, Corrector, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::real::Real;
+use crate::simulation::build::program::CompiledStage;
+use crate::simulation::build::workspace::{CorrectionWork, Workspace};
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::contact_rows::Part;
+use crate::simulation::rows::slip::note_slips_of_state;
+use crate::simulation::run::Simulation;
+use crate::simulation::stage::StageSolve;
+use crate::simulation::stage::contact::closing::Booking;
+use crate::simulation::stage::contact::{ContactStep, ContactWork};
+use crate::simulation::stage::massless_step::difference;
+use crate::simulation::stage::vectors::predict;
+use crate::simulation::step::finite::{Extent, check_contacts, check_motion};
+use crate::simulation::step::judge::Verdict;
+use crate::simulation::step::jumps::{friction_jumps, jumps, note_exerting};
+use crate::simulation::watch::energy::StepBooks;
+use crate::simulation::watch::stiffening::Taken;
 use crate::state::{Clock, History, Motion};
 use crate::tableau::impulse_weight;
 
 impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
-    pub(super) fn attempt(&mut self) -> Result<Verdict> {
+    pub(crate) fn attempt(&mut self) -> Result<Verdict> {
         match self.attempt_together() {
             // (All ranks have agreed on it before the host's history moved.)
             Ok(verdict) => Ok(verdict),

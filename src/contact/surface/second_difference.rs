@@ -5,7 +5,7 @@ use crate::real::Real;
 use crate::state::resolution;
 
 /// Share of the time ahead by which gaps are differenced: as for gaps whose rates the run finds itself
-/// (`simulation/rate_differences.rs`).
+/// (`simulation/rows/rate_differences.rs`).
 const SHARE: f64 = 1.0 / 16.0;
 
 /// Share of the smallest facet that nodes go where nothing is known of a step.

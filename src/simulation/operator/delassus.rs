@@ -8,18 +8,18 @@ use crate::real::Real;
 
 /// W of some rows, kept until they or their responses change. It grows with them.
 #[derive(Debug)]
-pub(super) struct Delassus<T> {
-    pub(super) rows: Vec<usize>,
+pub(crate) struct Delassus<T> {
+    pub(crate) rows: Vec<usize>,
     /// Row by row, with the compliances of the laws on the diagonal.
-    pub(super) values: Vec<T>,
+    pub(crate) values: Vec<T>,
     /// The diagonal without them.
-    pub(super) diagonal: Vec<T>,
+    pub(crate) diagonal: Vec<T>,
     /// The roots of that.
     roots: Vec<T>,
     /// Its number, 0 if what is here belongs to no rows.
-    pub(super) version: u64,
+    pub(crate) version: u64,
     /// Places of the rows that have joined.
-    pub(super) joined: Vec<usize>,
+    pub(crate) joined: Vec<usize>,
     /// The rows that have stayed.
     runs: Vec<Run>,
 }
@@ -37,7 +37,7 @@ const WHAT: &str = "the Delassus operator";
 
 impl<T: Real> Delassus<T> {
     /// Memory for as many rows as are foreseen on an interface of so many dofs.
-    pub(super) fn foreseen(interface: usize) -> Self {
+    pub(crate) fn foreseen(interface: usize) -> Self {
         let rows = interface.min(FORESEEN);
         Self {
             rows: Vec::with_capacity(rows),
@@ -51,7 +51,7 @@ impl<T: Real> Delassus<T> {
     }
 
     /// Memory for W of some rows; all of them have joined.
-    pub(super) fn begin(&mut self, rows: &[usize]) -> Result<()> {
+    pub(crate) fn begin(&mut self, rows: &[usize]) -> Result<()> {
         self.values.clear();
         memory::grow(&mut self.values, rows.len(), rows.len(), WHAT)?;
         self.joined.clear();
@@ -61,7 +61,7 @@ impl<T: Real> Delassus<T> {
 
     /// Memory for W of some rows, where the entries of those that stay have been moved to their places, compliances
     /// taken off: rows and columns of those that have joined are to be filled.
-    pub(super) fn rearrange(&mut self, rows: &[usize]) -> Result<()> {
+    pub(crate) fn rearrange(&mut self, rows: &[usize]) -> Result<()> {
         if !self.compare(rows) {
             return self.begin(rows);
         }
@@ -102,7 +102,7 @@ impl<T: Real> Delassus<T> {
     ///
     /// What a force does far away in a step decays by orders of magnitude from node to node, down to numbers without
     /// digits, and to zero in one unit and not in another: where W begins and ends is not to depend on that.
-    pub(super) fn end(&mut self, rows: &[usize]) {
+    pub(crate) fn end(&mut self, rows: &[usize]) {
         let Self { rows: assembled, values, diagonal, roots, joined, .. } = self;
         let size = rows.len();
         diagonal.clear();

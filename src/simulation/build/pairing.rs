@@ -1,0 +1,149 @@
+//! Whether the parts of a run go together: the scheme with dofs without mass, with corrections, damping and
+//! paths, with an estimate of the local error.
+
+use crate::analysis::{self, LocalError};
+use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
+use crate::error::{Error, Result};
+use crate::integrator::TimeIntegrator;
+use crate::real::Real;
+use crate::simulation::build::scheme::Scheme;
+use crate::simulation::rows::constraints::Constraints;
+use crate::state::Motion;
+use crate::system::System;
+use crate::tableau::{ContactLevel, Tableau};
+
+/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
+/// they follow statically before the other dofs move.
+pub(crate) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
+    let Some(dof) = dof else { return Ok(false) };
+    let reason = match analysis::massless_factor(&scheme.tableau) {
+        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(false),
+        Some(_) => {
+            "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
+             choose a scheme that damps high frequencies, or give the dof a mass"
+        }
+        None if analysis::massless_follow(&scheme.tableau) => return Ok(true),
+        None => {
+            "its balance does not determine the displacement of a dof without mass at the end of the step; choose \
+             central differences or an implicit scheme, or give the dof a mass"
+        }
+    };
+    Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
+}
+
+/// Refuses corrections of contact that is not imposed on the displacements of the state, and those that cannot act.
+pub(crate) fn check_corrections<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    system: &mut dyn System<T>,
+    correctors: &[Box<dyn Corrector<T> + '_>],
+) -> Result<()> {
+    let refuse = |corrector: &dyn Corrector<T>, reason| {
+        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
+    let level = tableau.stages.iter().find_map(|stage| match stage.contact {
+        ContactLevel::POSITION => None,
+        ContactLevel::Position { .. } => {
+            Some("the scheme imposes contact ahead of the state, whose velocity still approaches")
+        }
+        ContactLevel::Velocity { .. } => {
+            Some("the scheme imposes contact on velocities, which leaves no jump to correct")
+        }
+    });
+    let damped = system.damping_force().is_some();
+    for corrector in correctors {
+        let mut checked = match level {
+            Some(reason) if !corrector.corrects_massless() => Err(reason),
+            _ => corrector.check(tableau),
+        };
+        if damped {
+            checked = checked.and_then(|()| corrector.check_damping(tableau));
+        }
+        if let Err(reason) = checked {
+            return refuse(&**corrector, reason);
+        }
+    }
+    Ok(())
+}
+
+/// What the local error of a scheme follows from; refused where contact would not show in it.
+pub(crate) fn local_error(scheme: &Scheme<'_>, may_press: bool) -> Result<LocalError> {
+    let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
+    let refuse = |reason| {
+        let part = format!("an estimate of the local error with {}", scheme.integrator.name());
+        Err(Error::Incompatible { part, reason })
+    };
+    if may_press && ahead {
+        return refuse(
+            "the scheme imposes contact ahead of the state, where the step in which it happens does not show it",
+        );
+    }
+    match analysis::local_error(&scheme.tableau) {
+        Some(error) => Ok(error),
+        None => refuse("what it errs in velocity does not show in one step"),
+    }
+}
+
+/// Refuses systems that have neither a potential nor a force of their own for paths.
+pub(crate) fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_>, motion: &Motion<T>) -> Result<()> {
+    match system.path_force().is_some() || system.potential_energy(&motion.u).is_some() {
+        true => Ok(()),
+        false => Err(Error::Incompatible {
+            part: scheme.integrator.name(),
+            reason: "the system gives neither a potential energy nor a force along paths, so its energy is not defined",
+        }),
+    }
+}
+
+/// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.
+pub(crate) fn check_lagged_damping<T: Real>(
+    integrator: &dyn TimeIntegrator,
+    tableau: &Tableau,
+    system: &mut dyn System<T>,
+) -> Result<()> {
+    let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
+    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
+    if lags && grows() && system.damping_force().is_some() {
+        return Err(Error::Incompatible {
+            part: integrator.name(),
+            reason: "it takes damping forces from the start of the step, which makes it unstable for every step \
+                     size; choose a member with more numerical damping",
+        });
+    }
+    Ok(())
+}
+
+/// The correctors of a run that names none: of jumps, and of contacts without mass, where each has something to do.
+pub(crate) fn default_corrections<'a, T: Real>(
+    tableau: &Tableau,
+    constraints: &Constraints<'_, T>,
+    massless: &[usize],
+) -> Vec<Box<dyn Corrector<T> + 'a>> {
+    let mut correctors: Vec<Box<dyn Corrector<T> + 'a>> = Vec::new();
+    if is_correctable(tableau, constraints, massless) {
+        correctors.push(Box::new(PersistencyCorrection::with_history_projection()));
+    }
+    if is_balanceable(tableau, constraints, massless) {
+        correctors.push(Box::new(WorkBalance));
+    }
+    correctors
+}
+
+/// Whether the correction of jumps has something to do: contact on displacements of the state, of a rigid law (or not
+/// known yet), on dofs with mass.
+fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
+    tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
+        && constraints.may_press()
+        && (constraints.len() == 0
+            || constraints.laws().iter().any(|law| law.is_plain() || law.restitution().is_some()))
+        && constraints.interface().iter().any(has_mass)
+}
+
+/// Whether the work of contacts without mass is balanced by default: contact dofs have none, and the scheme conserves
+/// energy but for the steps in which contacts close or open.
+fn is_balanceable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
+    let has_none = |dof: &usize| massless.binary_search(dof).is_ok();
+    constraints.may_press() && constraints.interface().iter().any(has_none) && analysis::steps_by_means(tableau)
+}

@@ -1,0 +1,189 @@
+//! Memory of the steps: nothing in it changes a result, and nothing is allocated after it but for more
+//! contacts than there have ever been.
+
+use crate::contact::ContactJacobian;
+use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::error::Result;
+use crate::ranks::Together;
+use crate::real::Real;
+use crate::simulation::build::program::Program;
+use crate::simulation::operator::interface::InterfaceWork;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::contact_rows::ContactRowsWork;
+use crate::simulation::run::impulses::Impulses;
+use crate::simulation::stage::contact::ContactWork;
+use crate::simulation::stage::contact::mixing::Mixing;
+use crate::simulation::stage::excess_forces::ExcessForces;
+use crate::simulation::stage::massless::{MasslessBlock, is_damped};
+use crate::simulation::stage::newton::NewtonWork;
+use crate::simulation::stage::supports::Supports;
+use crate::simulation::stage::vectors::StageVectors;
+use crate::simulation::start::rate_check::RateCheck;
+use crate::simulation::watch::stiffening::Stiffening;
+use crate::state::{ContactState, Motion};
+use crate::system::{Linearity, System};
+
+/// Memory of a step.
+pub(crate) struct Workspace<T: Real> {
+    pub(crate) vectors: StageVectors<T>,
+    pub(crate) contact: ContactWork<T>,
+    /// For nonlinear systems.
+    pub(crate) newton: Option<Box<NewtonWork<T>>>,
+    /// Free dofs without mass.
+    pub(crate) massless: Vec<usize>,
+    /// For explicit schemes, if there are dofs without mass.
+    pub(crate) block: Option<MasslessBlock<T>>,
+    /// For implicit schemes, if the work of contacts on such dofs is balanced.
+    pub(crate) excess: Option<Box<ExcessForces<T>>>,
+    pub(crate) correction: CorrectionWork<T>,
+    pub(crate) rate_check: RateCheck<T>,
+    /// For schemes that are stable up to some frequency, which may be met in the run.
+    pub(crate) stiffening: Option<Stiffening<T>>,
+    /// The number of contacts that there is memory for.
+    pub(crate) rows: usize,
+    /// v and a at the time of the new state, where the scheme stores those of another time.
+    pub(crate) shown: [Vec<T>; 2],
+    pub(crate) backup: Backup<T>,
+}
+
+/// Memory of the corrections.
+pub(crate) struct CorrectionWork<T: Real> {
+    pub(crate) buffers: Buffers<T>,
+    pub(crate) projection: Option<JumpProjection<T>>,
+    /// Version of the rows for which the projection was made.
+    pub(crate) projected_rows: u64,
+    /// For correctors that act on the prediction, one entry a dof.
+    pub(crate) shifted: Vec<T>,
+    /// Change of kinetic energy by corrections in this step.
+    pub(crate) energy: T,
+}
+
+/// How much contact there is when memory is reserved.
+pub(crate) struct ContactSize {
+    /// Rows that there is to be memory for, and weights of all of them.
+    pub(crate) rows: usize,
+    pub(crate) entries: usize,
+    /// Dofs that contact may ever act on.
+    pub(crate) interface: usize,
+    /// Whether there may ever be a row, and whether rows may move within a step.
+    pub(crate) may_press: bool,
+    pub(crate) curved: bool,
+}
+
+impl ContactSize {
+    /// That of the constraints, with room for so many rows.
+    pub(crate) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
+        let (entries, interface) = (g.entries(), constraints.interface().len());
+        Self { rows, entries, interface, may_press: constraints.may_press(), curved: !constraints.is_affine() }
+    }
+}
+
+impl<T: Real> Workspace<T> {
+    /// Memory for the steps of a program, with a history of so many `slots`.
+    pub(crate) fn new(
+        system: &mut dyn System<T>,
+        program: &Program<T>,
+        correctors: &[Box<dyn Corrector<T> + '_>],
+        projection: JumpProjection<T>,
+        contact: &ContactSize,
+        slots: usize,
+    ) -> Self {
+        let dofs = system.dofs();
+        let &ContactSize { rows, entries, interface, may_press, curved } = contact;
+        let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
+        let balances = may_press && correctors.iter().any(Corrector::corrects_massless);
+        let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+        let room = |needed: bool| if needed && may_press { dofs } else { 0 };
+        let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
+        let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
+        let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
+        let supports = Supports::of(system);
+        let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
+        if curved && may_press {
+            contact_rows.curved.mixing = Some(Box::new(Mixing::new(interface)));
+        }
+        contact_rows.slides_by_way = correctors.iter().any(Corrector::leaves_smooth_motion);
+        Self {
+            contact: ContactWork {
+                interface: InterfaceWork::new(interface),
+                rows: contact_rows,
+                trial: ContactState::with_capacity(rows),
+                impulses: Impulses::new(room(true)),
+                closed_at_start: Vec::with_capacity(rows),
+                exerting_at_start: Vec::with_capacity(rows),
+                forces_at_start: Vec::new(),
+                sliding_at_start: Vec::new(),
+                was_closed: Vec::with_capacity(rows),
+                was_sticking: Vec::new(),
+            },
+            vectors: StageVectors {
+                increment: vec![T::zero(); dofs],
+                balance: separate_balance.then(|| Motion::zero(dofs)),
+                supports,
+            },
+            newton: None,
+            massless: Vec::new(),
+            block: None,
+            excess: None,
+            correction: CorrectionWork {
+                buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
+                projection: (may_press && !correctors.is_empty()).then_some(projection),
+                projected_rows: 0,
+                shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
+                energy: T::zero(),
+            },
+            rate_check: RateCheck::new(rows),
+            stiffening: None,
+            rows,
+            shown: [Vec::new(), Vec::new()],
+            backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
+        }
+    }
+
+    /// Keeps the free dofs without mass, and what they take: `follower` is the name of the scheme if they follow
+    /// statically before the others move.
+    pub(crate) fn keep_massless(
+        &mut self,
+        massless: Vec<usize>,
+        (system, together): (&mut dyn System<T>, &Together<T>),
+        (program, follower): (&Program<T>, Option<String>),
+        at: &Motion<T>,
+        interface: &[usize],
+    ) -> Result<()> {
+        if let Some(name) = follower {
+            self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
+            self.contact.rows.on_massless = vec![false; self.rows];
+        } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
+            self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
+        }
+        let buffers = &mut self.correction.buffers;
+        if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
+            let damps = match system.linearity() {
+                Linearity::Linear => is_damped(system, &massless),
+                // (Forces that are not linear may act on them later.)
+                Linearity::Nonlinear => Ok(!massless.is_empty()),
+            };
+            let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
+            buffers.damps_massless = damps > 0.0;
+        }
+        self.contact.rows.massless.clone_from(&massless);
+        self.massless = massless;
+        Ok(())
+    }
+
+    /// Memory for so many contacts, of so many weights in all.
+    pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
+        self.rows = rows;
+        self.contact.rows.make_room(rows, entries);
+        self.contact.trial.make_room(rows);
+        let ContactWork { closed_at_start, exerting_at_start, was_closed, .. } = &mut self.contact;
+        for flags in [closed_at_start, exerting_at_start, was_closed] {
+            flags.reserve(rows.saturating_sub(flags.len()));
+        }
+        self.correction.buffers.make_room(rows);
+        if let Some(excess) = &mut self.excess {
+            excess.make_room(rows);
+        }
+        self.rate_check.make_room(rows);
+    }
+}

@@ -1,0 +1,239 @@
+//! Responses of the interface to unit forces, kept for what has been pressed.
+//!
+//! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where
+//! the matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
+
+mod tiles;
+
+use crate::contact::ContactJacobian;
+use crate::error::Result;
+use crate::linear_solver::COLUMNS;
+use crate::memory;
+use crate::real::Real;
+use crate::simulation::rows::constraints::Constraints;
+use tiles::Tiles;
+
+/// What a column is the response to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unit {
+    /// A unit force on a dof of the interface.
+    Dof,
+    /// A unit multiplier of a row.
+    Row,
+}
+
+impl Unit {
+    /// What responses of a matrix that stays are kept for: rows that never change are fewer than the dofs they act on.
+    pub(crate) fn of<T: Real>(constraints: &Constraints<'_, T>) -> Self {
+        if constraints.is_fixed() { Self::Row } else { Self::Dof }
+    }
+}
+
+/// Columns of displacements of the interface, filled when first needed.
+#[derive(Debug)]
+pub(crate) struct Responses<T> {
+    unit: Unit,
+    /// Number of dofs on the interface.
+    size: usize,
+    /// For each dof there, or each row, the number of its column.
+    slots: Vec<usize>,
+    columns: Vec<Column>,
+    /// What the columns hold, in pages: none is moved when more are needed. Pages behind the `page`-th are empty.
+    pages: Vec<Vec<T>>,
+    page: usize,
+    /// Columns that are being solved for.
+    solved: Vec<T>,
+    /// The dofs or rows whose columns are missing.
+    missing: Vec<usize>,
+    /// The response to a row.
+    whole: Vec<T>,
+    tiles: Tiles<T>,
+}
+
+/// A column from the first to the last entry that is not zero: of bodies side by side a force moves two.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    page: usize,
+    start: usize,
+    /// The dofs it belongs to.
+    first: usize,
+    count: usize,
+}
+
+/// Dofs of an interface whose responses take little memory, all together.
+const SMALL: usize = 256;
+
+/// Entries of a row, in the mean, up to which the response to each is formed as a whole: those of nodes on obstacles.
+const SHORT: usize = 8;
+
+const WHAT: &str = "the responses of contact";
+
+/// A dof or row without a column, and one that is about to get one.
+const NONE: usize = usize::MAX;
+const MISSING: usize = usize::MAX - 1;
+
+impl<T: Real> Responses<T> {
+    /// For an interface of so many dofs. Of a small one all columns have memory at once.
+    pub(crate) fn new(unit: Unit, size: usize) -> Self {
+        let small = if size <= SMALL { size } else { 0 };
+        Self {
+            unit,
+            size,
+            slots: Vec::with_capacity(small),
+            columns: Vec::with_capacity(small),
+            pages: (0..small.div_ceil(COLUMNS)).map(|_| Vec::with_capacity(COLUMNS * size)).collect(),
+            page: 0,
+            solved: Vec::with_capacity(COLUMNS * small),
+            missing: Vec::with_capacity(small),
+            whole: Vec::with_capacity(size),
+            tiles: Tiles::for_interface(small),
+        }
+    }
+
+    /// Forgets all columns: they belong to another matrix. Their memory is used again.
+    pub(crate) fn reset(&mut self) {
+        self.slots.clear();
+        self.columns.clear();
+        self.pages.iter_mut().for_each(Vec::clear);
+        self.page = 0;
+    }
+
+    /// Forgets columns that belong to other rows.
+    pub(crate) fn forget_rows(&mut self) {
+        if self.unit == Unit::Row {
+            self.reset();
+        }
+    }
+
+    /// Makes known what [`couple`](Self::couple) and [`respond`](Self::respond) need of some rows
+    /// (ascending); `solve` replaces up to [`COLUMNS`] columns of forces by their responses.
+    pub(crate) fn prepare(
+        &mut self,
+        g: &ContactJacobian<T>,
+        rows: &[usize],
+        mut solve: impl FnMut(&mut [T]) -> Result<()>,
+    ) -> Result<()> {
+        let Self { unit, size, slots, missing, .. } = self;
+        slots.resize(if *unit == Unit::Row { g.rows() } else { *size }, NONE);
+        missing.clear();
+        let mut ask = |index: usize| {
+            if slots[index] == NONE {
+                slots[index] = MISSING;
+                missing.push(index);
+            }
+        };
+        for &row in rows {
+            match unit {
+                Unit::Row => ask(row),
+                Unit::Dof => g.located(row).for_each(|(place, _)| ask(place)),
+            }
+        }
+        // (Should a solve fail nothing is known of these.)
+        for &index in missing.iter() {
+            slots[index] = NONE;
+        }
+        let (missing, mut solved) = (std::mem::take(&mut self.missing), std::mem::take(&mut self.solved));
+        let found = missing.chunks(COLUMNS).try_for_each(|indices| {
+            let size = self.size;
+            solved.clear();
+            memory::grow(&mut solved, indices.len(), size, WHAT)?;
+            for (&index, column) in indices.iter().zip(solved.chunks_exact_mut(size)) {
+                match self.unit {
+                    Unit::Row => g.interface_scatter(index, T::one(), column),
+                    Unit::Dof => column[index] = T::one(),
+                }
+            }
+            solve(&mut solved)?;
+            indices.iter().zip(solved.chunks_exact(size)).try_for_each(|(&index, column)| self.keep(index, column))
+        });
+        (self.missing, self.solved) = (missing, solved);
+        found
+    }
+
+    /// Keeps the column of a dof or row: of a row what is not zero, of a dof, for tiles, all of it.
+    fn keep(&mut self, index: usize, column: &[T]) -> Result<()> {
+        let Self { unit, size, slots, columns, pages, page, .. } = self;
+        let known = |x: &T| *x != T::zero();
+        let range = match (*unit, column.iter().position(known), column.iter().rposition(known)) {
+            (Unit::Row, Some(first), Some(last)) => first..last + 1,
+            (Unit::Row, ..) => 0..0,
+            (Unit::Dof, ..) => 0..*size,
+        };
+        let is_full = |page: &Vec<T>| page.capacity() - page.len() < range.len();
+        *page += usize::from(pages.get(*page).is_some_and(is_full));
+        if *page == pages.len() {
+            pages.push(memory::reserve(COLUMNS, *size, WHAT)?);
+        }
+        let values = &mut pages[*page];
+        slots[index] = columns.len();
+        columns.push(Column { page: *page, start: values.len(), first: range.start, count: range.len() });
+        values.extend_from_slice(&column[range]);
+        Ok(())
+    }
+
+    /// The column of a dof or row that has one, from the dof on where it begins.
+    fn column(&self, index: usize) -> (usize, &[T]) {
+        let Column { page, start, first, count } = self.columns[self.slots[index]];
+        (first, &self.pages[page][start..start + count])
+    }
+
+    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): its entries are then sums whose rounding
+    /// depends on which rows there are.
+    pub(crate) fn couples_by_tiles(&self, g: &ContactJacobian<T>, rows: &[usize]) -> bool {
+        let entries = || rows.iter().map(|&row| g.located(row).count()).sum::<usize>();
+        self.unit == Unit::Dof && entries() > SHORT * rows.len()
+    }
+
+    /// W = G A⁻¹ Gᵀ of some rows, row by row.
+    pub(crate) fn couple_by_tiles(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
+        let mut tiles = std::mem::take(&mut self.tiles);
+        tiles.couple(g, rows, self.size, |place| self.column(place).1, w);
+        self.tiles = tiles;
+    }
+
+    /// The rows and columns of W = G A⁻¹ Gᵀ that belong to the `joined` places of some rows.
+    pub(crate) fn couple(&mut self, g: &ContactJacobian<T>, (rows, joined): (&[usize], &[usize]), w: &mut [T]) {
+        let mut whole = std::mem::take(&mut self.whole);
+        let mut next = joined.iter().peekable();
+        for (k, &j) in rows.iter().enumerate() {
+            let (first, response) = match self.unit {
+                _ if joined.is_empty() => break,
+                Unit::Row => self.column(j),
+                Unit::Dof => {
+                    whole.clear();
+                    whole.resize(self.size, T::zero());
+                    g.located(j).for_each(|(place, weight)| T::axpy(weight, self.column(place).1, &mut whole));
+                    (0, &whole[..])
+                }
+            };
+            let at = |place: usize| response.get(place.wrapping_sub(first)).copied().unwrap_or(T::zero());
+            let moved = |row: usize| g.located(row).map(|(place, weight)| weight * at(place)).sum::<T>();
+            let column = &mut w[k..];
+            if next.next_if(|place| **place == k).is_some() {
+                for (entry, &i) in column.iter_mut().step_by(rows.len()).zip(rows) {
+                    *entry = moved(i);
+                }
+            } else {
+                for &place in joined {
+                    column[place * rows.len()] = moved(rows[place]);
+                }
+            }
+        }
+        self.whole = whole;
+    }
+
+    /// A⁻¹ Gᵀ λ of some rows, whose forces Gᵀ λ on the interface are known.
+    pub(crate) fn respond(&self, (rows, multipliers): (&[usize], &[T]), forces: &[T], response: &mut [T]) {
+        response.fill(T::zero());
+        let mut add = |index: usize, factor: T| {
+            if factor != T::zero() {
+                let (first, column) = self.column(index);
+                T::axpy(factor, column, &mut response[first..first + column.len()]);
+            }
+        };
+        match self.unit {
+            Unit::Row => rows.iter().zip(multipliers).for_each(|(&row, &lambda)| add(row, lambda)),
+            Unit::Dof => forces.iter().enumerate().for_each(|(place, &force)| add(place, force)),
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! The rows of contact: gaps of all constraints as one list, and what a stage constrains of each row.
+//!
+//! - `constraints`, `part`, `laws`: all constraints as one list of rows, each constraint with its dofs, and their laws.
+//! - `gaps`, `rate_differences`: gaps of all rows and their rates.
+//! - `kept_depths`: limits the penetration recovered in a step.
+//! - `contact_rows`: what each row constrains in a stage; `slip`: the same of tangential rows; `curved_rows`: gaps that
+//!   are not linear in the displacements.
+
+pub(super) mod constraints;
+pub(super) mod contact_rows;
+pub(super) mod curved_rows;
+pub(super) mod gaps;
+pub(super) mod kept_depths;
+pub(super) mod laws;
+pub(super) mod part;
+pub(super) mod rate_differences;
+pub(super) mod slip;

@@ -1,0 +1,513 @@
+//! All constraints of a simulation as one list of rows.
+
+use crate::contact::{
+    BrokenBond, Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride,
+    Tangents, Variation,
+};
+use crate::contact_solver::AdmissibleSet;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::build::admitted::Admitted;
+use crate::simulation::rows::kept_depths::recovery_of;
+use crate::simulation::rows::laws::Laws;
+use crate::simulation::rows::part::{Local, Part, gather, of};
+use crate::simulation::rows::rate_differences::RateDifferences;
+use crate::simulation::start::overclosures::Overclosures;
+use crate::state::{ContactState, Motion, Names};
+
+/// The constraints in the order given, their rows one after the other.
+pub(crate) struct Constraints<'a, T: Real> {
+    pub(crate) parts: Vec<Part<'a, T>>,
+    pub(crate) ids: Vec<ContactId>,
+    pub(crate) laws: Laws,
+    pub(crate) tangents: Tangents,
+    /// The tangents before rows were read anew.
+    old_tangents: Tangents,
+    pub(crate) magnitudes: Vec<T>,
+    pub(crate) recoveries: Vec<T>,
+    /// Rows and rates of a constraint that is evaluated at another motion.
+    pub(crate) scratch: Contacts<T>,
+    pub(crate) rates: Vec<GapRates<T>>,
+    pub(crate) slip_rates: Vec<GapRates<T>>,
+    pub(crate) local: Local<T>,
+    /// The free dofs that contact may ever act on, ascending.
+    interface: Vec<usize>,
+    /// For each dof of the system its place on the interface.
+    places: Vec<usize>,
+    admitted: Admitted,
+    /// Whether candidates have changed since the rows were last read.
+    pub(crate) stale: bool,
+    /// Counts how often the rows have been read, and how often their names have changed by that.
+    version: u64,
+    names: Names,
+    /// The number of rows that there is to be memory for.
+    room: usize,
+    /// How far the last search looks ahead.
+    pub(crate) ahead: f64,
+    pub(crate) differences: RateDifferences<T>,
+    /// Bonds that break in a step, and features of all that are broken of a constraint.
+    overloads: Vec<(usize, f64)>,
+    features: Vec<usize>,
+    /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
+    pub(crate) overclosures: Option<Overclosures<T>>,
+    pub(crate) added: Vec<T>,
+    /// What is added to gaps in the step under way (empty if there is none).
+    pub(crate) kept: Vec<T>,
+}
+
+/// The place of a dof that no constraint has listed among those it may act on.
+const UNKNOWN: usize = usize::MAX - 1;
+
+impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Constraints").field("parts", &self.parts.len()).field("rows", &self.ids.len()).finish()
+    }
+}
+
+impl<'a, T: Real> Constraints<'a, T> {
+    /// The constraints after a search at (t, u, v), with bonds that are broken there, and room for the rows of their G
+    /// (kept apart: corrections read G while they evaluate gaps), which the next search reads.
+    pub(crate) fn new(
+        parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
+        (t, u, v): (f64, &[T], &[T]),
+        prescribed: &[usize],
+        broken: &[BrokenBond],
+        admitted: Admitted,
+    ) -> Result<(Self, ContactJacobian<T>)> {
+        let dofs = u.len();
+        if let Some(bond) = broken.iter().find(|bond| bond.constraint >= parts.len()) {
+            let part = format!("a broken bond of constraint {}", bond.constraint);
+            return Err(Error::Incompatible { part, reason: "the run that is continued had more constraints" });
+        }
+        let mut places = vec![UNKNOWN; dofs];
+        let (mut seen, mut local) = (vec![usize::MAX; dofs], Local::default());
+        let (mut own, mut interface, mut room) = (Vec::with_capacity(parts.len()), Vec::new(), 0);
+        let mut features = Vec::new();
+        let mut scratch = Contacts::new();
+        for (number, mut constraint) in parts.into_iter().enumerate() {
+            let list = constraint.dofs().to_vec();
+            for &dof in &list {
+                match seen.get(dof) {
+                    None => return Err(Error::MissingContactDof { constraint: number, dof, dofs }),
+                    Some(&other) if other == number => {
+                        return Err(Error::RepeatedContactDof { constraint: number, dof });
+                    }
+                    Some(_) => seen[dof] = number,
+                }
+            }
+            let (u, v) = (gather(&list, u, &mut local.u), gather(&list, v, &mut local.v));
+            local.other.reserve(list.len());
+            list_features(number, broken, &mut features);
+            constraint.set_broken(&features);
+            constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
+            interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
+            let contacts = Contacts::of(&constraint);
+            // (The memory of the largest.)
+            scratch.clear();
+            constraint.contacts(&mut scratch);
+            room += contacts.len() + contacts.rubbing_rows();
+            own.push(Part {
+                variation: constraint.variation(),
+                inspects: constraint.inspects(),
+                place: (t, u.to_vec()),
+                constraint,
+                dofs: list,
+                contacts,
+                stale: true,
+                version: 0,
+                rates: None,
+                slip_rates: None,
+            });
+        }
+        interface.sort_unstable();
+        interface.dedup();
+        for &dof in &interface {
+            places[dof] = NO_RESPONSE;
+        }
+        interface.retain(|dof| prescribed.binary_search(dof).is_err());
+        for (place, &dof) in interface.iter().enumerate() {
+            places[dof] = place;
+        }
+        let constraints = Self {
+            parts: own,
+            ids: Vec::with_capacity(room),
+            laws: Laws::with_capacity(room),
+            tangents: Tangents::default(),
+            old_tangents: Tangents::default(),
+            magnitudes: Vec::with_capacity(room),
+            recoveries: Vec::with_capacity(room),
+            scratch,
+            rates: vec![GapRates::default(); room],
+            slip_rates: Vec::new(),
+            local,
+            interface,
+            places,
+            admitted,
+            stale: true,
+            version: 0,
+            names: Names::default(),
+            room,
+            ahead: 0.0,
+            differences: RateDifferences::default(),
+            overloads: Vec::new(),
+            features,
+            overclosures: None,
+            added: Vec::new(),
+            kept: Vec::new(),
+        };
+        Ok((constraints, ContactJacobian::default()))
+    }
+
+    /// The number of rows that there is to be memory for: more than there have ever been, and it grows by doubling.
+    pub(crate) fn room(&self) -> usize {
+        self.room
+    }
+
+    /// Whether any constraint may ever have rows.
+    pub(crate) fn may_press(&self) -> bool {
+        self.parts.iter().any(|part| !part.dofs.is_empty())
+    }
+
+    /// One of the constraints, in the order given.
+    pub(crate) fn part(&self, constraint: usize) -> Option<&dyn ContactConstraint<T>> {
+        self.parts.get(constraint).map(|part| &*part.constraint as &dyn ContactConstraint<T>)
+    }
+
+    /// The first row of a constraint, and its dofs.
+    pub(crate) fn rows_of_part(&self, constraint: usize) -> (usize, &[usize]) {
+        let first = self.parts[..constraint].iter().map(|part| part.contacts.len()).sum();
+        (first, &self.parts[constraint].dofs)
+    }
+
+    /// Finds the candidates of a step that imposes contact up to a time `ahead` of the motion.
+    pub(crate) fn search(
+        &mut self,
+        motion: &Motion<T>,
+        ahead: f64,
+        jacobian: &mut ContactJacobian<T>,
+    ) -> Result<Candidates> {
+        let Self { parts, local, stale, .. } = self;
+        for (number, part) in parts.iter_mut().enumerate().filter(|(_, part)| part.variation != Variation::Never) {
+            let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
+            part.settle(motion.t, u);
+            let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
+            // This is kept if a later part fails: the next search that succeeds reads the rows again.
+            part.stale |= found == Candidates::Changed;
+            *stale |= part.stale;
+        }
+        self.ahead = ahead;
+        self.kept.clear();
+        self.read_stale(jacobian)
+    }
+
+    /// Lets every constraint inspect the step that is about to be accepted.
+    pub(crate) fn inspect(&mut self, [from, to]: [&Motion<T>; 2], closed: [&[bool]; 2]) -> Result<()> {
+        let Self { parts, local, .. } = self;
+        let mut rest = closed;
+        for (number, part) in parts.iter_mut().enumerate() {
+            let count = part.contacts.len();
+            let (own, others) = (rest.map(|flags| &flags[..count]), rest.map(|flags| &flags[count..]));
+            rest = others;
+            if !part.inspects {
+                continue;
+            }
+            let dofs = &part.dofs;
+            let u = [gather(dofs, &from.u, &mut local.u), gather(dofs, &to.u, &mut local.other)];
+            let step = Stride::new([from.t, to.t], u, gather(dofs, &from.v, &mut local.v), own);
+            part.constraint.inspect(&step).map_err(|error| of(number, error))?;
+        }
+        Ok(())
+    }
+
+    /// Breaks the bonds that do not stand the forces of a step that ends at t, and appends them to those that are
+    /// broken.
+    pub(crate) fn break_bonds(&mut self, forces: &[T], t: f64, broken: &mut Vec<BrokenBond>) {
+        let Self { parts, overloads, features, stale, .. } = self;
+        let mut rest = forces;
+        for (number, part) in parts.iter_mut().enumerate() {
+            let (own, others) = rest.split_at(part.contacts.len());
+            rest = others;
+            overloads.clear();
+            part.constraint.overloads(own, overloads);
+            if overloads.is_empty() {
+                continue;
+            }
+            broken.extend(overloads.iter().map(|&overload| BrokenBond::new(number, overload, t)));
+            list_features(number, broken, features);
+            part.constraint.set_broken(features);
+            (part.stale, *stale) = (true, true);
+        }
+    }
+
+    /// Moves the linearization of the rows to u.
+    pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+        for number in 0..self.parts.len() {
+            let moved = self.follow_part(number, t, u);
+            // This is kept after an error, as in a search.
+            let changed = !matches!(moved, Ok(Candidates::Unchanged));
+            self.parts[number].stale |= changed;
+            self.stale |= changed;
+            moved?;
+        }
+        self.read_stale(jacobian)
+    }
+
+    pub(crate) fn follow_part(&mut self, number: usize, t: f64, u: &[T]) -> Result<Candidates> {
+        let Self { parts, local, .. } = self;
+        let part = &mut parts[number];
+        if part.variation != Variation::Follows {
+            return Ok(Candidates::Unchanged);
+        }
+        part.follow(t, gather(&part.dofs, u, &mut local.u)).map_err(|error| of(number, error))
+    }
+
+    /// Whether rows never move within a step.
+    pub(crate) fn is_affine(&self) -> bool {
+        self.parts.iter().all(|part| part.variation != Variation::Follows)
+    }
+
+    /// Whether rows never change at all.
+    pub(crate) fn is_fixed(&self) -> bool {
+        self.parts.iter().all(|part| part.variation == Variation::Never)
+    }
+
+    /// The version of the rows: what was computed from rows of another version is out of date.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Whether the constraint of a row has left its rows as they were since a version.
+    pub(crate) fn is_unchanged(&self, row: usize, since: u64) -> bool {
+        self.parts[self.ids[row].constraint].version <= since
+    }
+
+    /// The names of all rows, and which version of them these are.
+    pub(crate) fn named(&self) -> (&[ContactId], Names) {
+        (&self.ids, self.names)
+    }
+
+    /// Reads the rows if they may have changed.
+    fn read_stale(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
+        if !self.stale {
+            return Ok(Candidates::Unchanged);
+        }
+        self.read_rows(jacobian)?;
+        Ok(Candidates::Changed)
+    }
+
+    /// Reads names, laws and G of all rows, and refuses what does not fit the system.
+    fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
+        let Self { parts, ids, names, laws, magnitudes, recoveries, places, admitted, .. } = self;
+        jacobian.clear();
+        laws.clear();
+        magnitudes.clear();
+        recoveries.clear();
+        self.stale = true;
+        for (constraint, part) in parts.iter_mut().enumerate() {
+            let Part { contacts, dofs, .. } = part;
+            if part.stale {
+                (part.rates, part.slip_rates) = (None, None);
+                contacts.clear();
+                part.constraint.contacts(contacts);
+                part.version = self.version + 1;
+            }
+            for row in 0..contacts.len() {
+                let (feature, candidate) = contacts.name(row);
+                let contact = ContactId { constraint, feature, candidate };
+                if ids.get(laws.len()) != Some(&contact) {
+                    names.change();
+                    ids.truncate(laws.len());
+                    ids.push(contact);
+                }
+                let law = contacts.law(row);
+                law.check()?;
+                law.check_scalar::<T>()?;
+                admitted.check(law)?;
+                laws.push(law);
+                let magnitude = contacts.magnitude(row);
+                if !magnitude.is_finite() {
+                    let (what, value) = ("the magnitude of the coordinates of a contact row", magnitude.value());
+                    return Err(Error::NotFinite { what, index: laws.len() - 1, value });
+                }
+                magnitudes.push(magnitude);
+                recoveries.push(recovery_of(contacts.recovery(row), law)?);
+                check_entries(contacts.row(row), (dofs, places), contact, "a weight of a contact row (by dof)")?;
+            }
+            jacobian.append(contacts.rows(), dofs);
+        }
+        if ids.len() > laws.len() {
+            names.change();
+            ids.truncate(laws.len());
+        }
+        self.read_tangents(jacobian)?;
+        jacobian.locate(&self.places);
+        for part in &mut self.parts {
+            part.stale = false;
+        }
+        self.stale = false;
+        self.version += 1;
+        if jacobian.rows() > self.room {
+            self.room = jacobian.rows().max(2 * self.room);
+        }
+        self.distribute();
+        Ok(())
+    }
+
+    /// Reads the tangential rows of contacts with friction, which stand behind those of all gaps.
+    fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
+        let Self { parts, ids, names, laws, tangents, old_tangents, places, admitted, .. } = self;
+        std::mem::swap(tangents, old_tangents);
+        tangents.clear();
+        if parts.iter().any(|part| part.contacts.has_friction()) {
+            tangents.begin(laws.len());
+            jacobian.end_normals();
+            for part in parts.iter() {
+                let Part { contacts, dofs, .. } = part;
+                for own in 0..contacts.len() {
+                    let (row, friction) = (tangents.listed(), contacts.friction(own));
+                    if friction == 0.0 {
+                        tangents.push(0.0, 0);
+                        continue;
+                    }
+                    let rows = contacts.tangents_of(own);
+                    admitted.check_friction(ids[row], (friction, laws[row], rows.len()))?;
+                    for tangent in rows.clone() {
+                        let entries = contacts.tangent_rows().row(tangent);
+                        check_entries(entries, (dofs, places), ids[row], "a weight of a tangent (by dof)")?;
+                    }
+                    tangents.push(friction, rows.len());
+                    jacobian.append_rows((contacts.tangent_rows(), rows), dofs);
+                }
+            }
+        }
+        if !tangents.has_rows_of(old_tangents) {
+            names.change();
+        }
+        Ok(())
+    }
+
+    /// Adds the depths at the start to the gaps from now on.
+    pub(crate) fn adjust(&mut self, overclosures: Overclosures<T>) {
+        self.overclosures = Some(overclosures);
+        self.distribute();
+    }
+
+    /// What [`adjust`](Self::adjust) was given.
+    pub(crate) fn overclosures(&self) -> Option<&Overclosures<T>> {
+        self.overclosures.as_ref()
+    }
+
+    /// Finds for every row what is added to its gap.
+    fn distribute(&mut self) {
+        if let Some(overclosures) = &self.overclosures {
+            self.added.clear();
+            self.added.extend(self.ids.iter().map(|&id| overclosures.of(id)));
+        }
+    }
+
+    /// The free dofs that contact may ever act on, ascending.
+    pub(crate) fn interface(&self) -> &[usize] {
+        &self.interface
+    }
+
+    /// The place of a dof on the interface; none of one that is prescribed, or that contact never acts on.
+    pub(crate) fn place(&self, dof: usize) -> Option<usize> {
+        Some(self.places[dof]).filter(|&place| place < self.interface.len())
+    }
+
+    /// The laws of all rows.
+    pub(crate) fn laws(&self) -> &Laws {
+        &self.laws
+    }
+
+    /// The tangential rows of contacts with friction.
+    pub(crate) fn tangents(&self) -> &Tangents {
+        &self.tangents
+    }
+
+    /// What the multipliers of a contact belong to.
+    pub(crate) fn set(&self, row: usize) -> AdmissibleSet {
+        match self.tangents.of(row).len() {
+            0 => self.laws[row].into(),
+            rows => AdmissibleSet::with_friction(self.tangents.friction(row), rows, false),
+        }
+    }
+
+    /// The contact of a row, tangential or not.
+    pub(crate) fn id_of(&self, row: usize) -> ContactId {
+        self.ids[self.tangents.owner(row)]
+    }
+
+    /// [`rows_of`](Self::rows_of) with the rows of friction of these contacts.
+    pub(crate) fn all_rows_of<'c>(
+        &'c self,
+        contacts: &'c ContactState<T>,
+    ) -> impl Iterator<Item = (usize, usize)> + 'c {
+        let rows = |(contact, row): (usize, usize)| {
+            std::iter::once((contact, row)).chain(contacts.tangents.of(contact).zip(self.tangents.of(row)))
+        };
+        self.rows_of(contacts).flat_map(rows)
+    }
+
+    /// Number of candidates: of the rows of their gaps.
+    pub(crate) fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// (contact, row) of the contacts of a state that are still candidates: a search may have changed these since.
+    pub(crate) fn rows_of<'c>(&'c self, contacts: &'c ContactState<T>) -> impl Iterator<Item = (usize, usize)> + 'c {
+        let (same, sorted) = (self.ids == contacts.ids, self.ids.is_sorted());
+        let row = move |contact: usize, id: &ContactId| match (same, sorted) {
+            (true, _) => Some(contact),
+            (_, true) => self.ids.binary_search(id).ok(),
+            _ => self.ids.iter().position(|other| other == id),
+        };
+        contacts.ids.iter().enumerate().filter_map(move |(contact, id)| row(contact, id).map(|row| (contact, row)))
+    }
+
+    /// Refuses rows that act on no free dof, and gaps that are not numbers.
+    pub(crate) fn check_rows(
+        &mut self,
+        jacobian: &ContactJacobian<T>,
+        prescribed: &[usize],
+        t: f64,
+        u: &[T],
+    ) -> Result<()> {
+        let mut gaps = vec![T::zero(); self.len()];
+        self.finite_gaps(t, u, &mut gaps)?;
+        for (row, &contact) in self.ids.iter().enumerate() {
+            let acts = |(dof, weight): (usize, T)| weight != T::zero() && prescribed.binary_search(&dof).is_err();
+            if !jacobian.row(row).any(acts) {
+                return Err(Error::EmptyContact { contact });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lists the features of the bonds of a constraint that are broken, ascending.
+fn list_features(constraint: usize, broken: &[BrokenBond], features: &mut Vec<usize>) {
+    features.clear();
+    features.extend(broken.iter().filter(|bond| bond.constraint == constraint).map(|bond| bond.feature));
+    features.sort_unstable();
+}
+
+/// Refuses (place, weight) pairs of a row that are not of the dofs that its constraint has listed, and weights that are
+/// no numbers.
+fn check_entries<T: Real>(
+    entries: impl Iterator<Item = (usize, T)>,
+    (dofs, places): (&[usize], &[usize]),
+    contact: ContactId,
+    what: &'static str,
+) -> Result<()> {
+    for (place, weight) in entries {
+        let dof = match dofs.get(place) {
+            Some(&dof) if places[dof] != UNKNOWN => dof,
+            _ => return Err(Error::UnlistedPlace { contact, place }),
+        };
+        if !weight.is_finite() {
+            return Err(Error::NotFinite { what, index: dof, value: weight.value() });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,233 @@
+//! Gaps of all rows and their rates, here and elsewhere.
+
+use crate::contact::{ContactLaw, GapRates, Rates, Tangents, Variation};
+use crate::corrector::{Gaps, rounding};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::part::{Part, gather, of};
+
+impl<T: Real> Constraints<'_, T> {
+    /// Gaps of all rows, refusing NaN and infinity.
+    pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
+        let Self { parts, local, .. } = self;
+        let mut rest = &mut *out;
+        for (number, part) in parts.iter_mut().enumerate() {
+            let (own, others) = rest.split_at_mut(part.contacts.len());
+            if !own.is_empty() {
+                let u = gather(&part.dofs, u, &mut local.u);
+                part.constraint.gaps(t, u, own).map_err(|error| of(number, error))?;
+            }
+            rest = others;
+        }
+        self.shift(t, 0, out);
+        self.refuse_infinite(t, "the gap", out)
+    }
+
+    /// Adds to gaps, or to derivatives of them, what is added in the run and in the step.
+    fn shift(&self, t: f64, derivative: usize, out: &mut [T]) {
+        if let Some(overclosures) = &self.overclosures {
+            let share = T::of(overclosures.share(t)[derivative]);
+            for (out, &added) in out.iter_mut().zip(&self.added) {
+                *out += share * added;
+            }
+        }
+        if derivative == 0 {
+            for (gap, &kept) in out.iter_mut().zip(&self.kept) {
+                *gap += kept;
+            }
+        }
+    }
+
+    /// Refuses values of the rows that are NaN or infinite.
+    fn refuse_infinite(&self, t: f64, what: &'static str, out: &[T]) -> Result<()> {
+        match out[..self.len()].iter().position(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(row) => Err(Error::ContactNotFinite { t, what, contact: self.ids[row], value: out[row].value() }),
+        }
+    }
+
+    /// The parts of the gap rates of all rows that do not come from v and a, refusing NaN and infinity.
+    pub(crate) fn finite_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        let mut rest = &mut *out;
+        for number in 0..self.parts.len() {
+            let (own, others) = rest.split_at_mut(self.parts[number].contacts.len());
+            self.rates_of(number, (t, u, v), own)?;
+            rest = others;
+        }
+        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
+            let [_, rate, acceleration] = overclosures.share(t).map(T::of);
+            for (rates, &added) in out.iter_mut().zip(&self.added) {
+                rates.rate += rate * added;
+                rates.acceleration += acceleration * added;
+            }
+        }
+        if self.parts.iter().all(|part| part.rates == Some(Rates::Zero)) {
+            return Ok(());
+        }
+        for (&contact, rates) in self.ids.iter().zip(&*out) {
+            for (what, value) in [("the gap rate", rates.rate), ("the gap acceleration", rates.acceleration)] {
+                if !value.is_finite() {
+                    return Err(Error::ContactNotFinite { t, what, contact, value: value.value() });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the gap rates of a constraint have of their own, as it says or from differences of its gaps.
+    fn rates_of(&mut self, number: usize, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) -> Result<()> {
+        if out.is_empty() {
+            return Ok(());
+        }
+        let Self { parts, local, differences, ahead, .. } = self;
+        let Part { constraint, dofs, contacts, variation, place, rates: said, .. } = &mut parts[number];
+        if *said == Some(Rates::Zero) {
+            out.fill(GapRates::default());
+            return Ok(());
+        }
+        let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
+        let answer = constraint.rates(t, u, v, out).map_err(|error| of(number, error))?;
+        *said = Some(answer);
+        match answer {
+            Rates::Given => {}
+            Rates::Zero => out.fill(GapRates::default()),
+            Rates::Differences => {
+                let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
+                let found = differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out);
+                found.map_err(|error| of(number, error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the slips of contacts with friction have of their own, one entry a tangential row.
+    pub(crate) fn finite_slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        let Self { parts, ids, tangents, slip_rates, local, .. } = self;
+        let (mut contact, mut filled) = (0, 0);
+        for (number, part) in parts.iter_mut().enumerate() {
+            let first = contact;
+            contact += part.contacts.len();
+            if !part.contacts.has_friction() {
+                continue;
+            }
+            let rows = part.contacts.tangent_rows().rows();
+            slip_rates.clear();
+            slip_rates.resize(rows, GapRates::default());
+            if part.slip_rates != Some(Rates::Zero) {
+                let (u, v) = (gather(&part.dofs, u, &mut local.u), gather(&part.dofs, v, &mut local.v));
+                let answer = part.constraint.slip_rates(t, u, v, slip_rates).map_err(|error| of(number, error))?;
+                match answer {
+                    Rates::Given => {}
+                    Rates::Zero => slip_rates.fill(GapRates::default()),
+                    Rates::Differences => {
+                        return Err(Error::Incompatible {
+                            part: format!("constraint {number}, with friction"),
+                            reason: "the motion of its surface along itself does not follow from differences of the \
+                                     gaps; give the rates of slip",
+                        });
+                    }
+                }
+                part.slip_rates = Some(answer);
+            }
+            for row in (first..contact).filter(|&row| !tangents.of(row).is_empty()) {
+                for rates in &slip_rates[part.contacts.tangents_of(row - first)] {
+                    for (what, value) in [("the slip rate", rates.rate), ("the slip acceleration", rates.acceleration)]
+                    {
+                        if !value.is_finite() {
+                            let value = value.value();
+                            return Err(Error::ContactNotFinite { t, what, contact: ids[row], value });
+                        }
+                    }
+                    out[filled] = *rates;
+                    filled += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the constraint of a row has given its rates when they were asked for.
+    pub(crate) fn gives_rates(&self, row: usize) -> bool {
+        self.parts[self.ids[row].constraint].rates != Some(Rates::Differences)
+    }
+}
+
+impl<T: Real> Gaps<T> for Constraints<'_, T> {
+    fn law(&self, row: usize) -> ContactLaw {
+        self.laws[row]
+    }
+
+    fn turn(&self) -> bool {
+        !self.is_affine()
+    }
+
+    fn gap_rounding(&self, row: usize, magnitude: T, gap: T) -> T {
+        rounding(magnitude + gap.abs() + self.magnitudes[row])
+    }
+
+    fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        self.finite_rates(t, u, v, out)
+    }
+
+    fn tangents(&self) -> &Tangents {
+        &self.tangents
+    }
+
+    fn slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
+        self.finite_slip_rates(t, u, v, out)
+    }
+
+    fn elsewhere(
+        &mut self,
+        field: usize,
+        (t, [u, v, a]): (f64, [&[T]; 3]),
+        here: (f64, &[T]),
+        out: &mut [T],
+    ) -> Result<()> {
+        let mut first = 0;
+        for number in 0..self.parts.len() {
+            let found = self.follow_part(number, t, u).and_then(|_| {
+                let count = self.parts[number].contacts.len();
+                let out = &mut out[first..first + count];
+                if out.is_empty() {
+                    return Ok(());
+                }
+                if field == 0 {
+                    let Self { parts, local, .. } = self;
+                    let part = &mut parts[number];
+                    let u = gather(&part.dofs, u, &mut local.u);
+                    return part.constraint.gaps(t, u, out).map_err(|error| of(number, error));
+                }
+                let mut rates = std::mem::take(&mut self.rates);
+                rates.resize(count.max(rates.len()), GapRates::default());
+                let found = self.rates_of(number, (t, u, v), &mut rates[..count]);
+                let Self { parts, local, scratch, .. } = self;
+                let part = &mut parts[number];
+                let contacts = match part.variation {
+                    Variation::Follows => {
+                        scratch.clear();
+                        part.constraint.contacts(scratch);
+                        scratch
+                    }
+                    _ => &mut part.contacts,
+                };
+                let x = gather(&part.dofs, if field == 1 { v } else { a }, &mut local.other);
+                for (row, (out, own)) in out.iter_mut().zip(&rates).enumerate() {
+                    let own = if field == 1 { own.rate } else { own.acceleration };
+                    *out = contacts.rows().product(row, x) + own;
+                }
+                self.rates = rates;
+                found
+            });
+            // Back to the same rows, after an error too: G need not be read again.
+            let back = self.follow_part(number, here.0, here.1);
+            self.parts[number].stale |= back.is_err();
+            self.stale |= back.is_err();
+            found.and(back)?;
+            first += self.parts[number].contacts.len();
+        }
+        self.shift(t, field.min(2), out);
+        self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
+    }
+}

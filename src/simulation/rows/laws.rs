@@ -1,0 +1,63 @@
+//! The laws of all rows, and what is known of them together: a phase that no law asks for costs nothing.
+
+use crate::contact::ContactLaw;
+
+/// The laws of the rows, in their order.
+#[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each of them is a question of its own")]
+pub(crate) struct Laws {
+    list: Vec<ContactLaw>,
+    /// Whether the condition of any row depends on the gap at the start of the stage.
+    pub(crate) read_start: bool,
+    /// Whether any row is compliant, predictive, or compliant with inertia.
+    pub(crate) compliant: bool,
+    pub(crate) predictive: bool,
+    pub(crate) inertial: bool,
+    /// Whether the force of any row depends on the rate of its gap.
+    pub(crate) damped: bool,
+    /// Whether any row leaves with a share of its approach.
+    pub(crate) rebound: bool,
+    /// Whether any row holds both ways.
+    pub(crate) equality: bool,
+    /// The most augmentations of a row.
+    pub(crate) augmentations: usize,
+}
+
+impl Laws {
+    /// Memory for so many rows.
+    pub(crate) fn with_capacity(rows: usize) -> Self {
+        Self { list: Vec::with_capacity(rows), ..Self::default() }
+    }
+
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        *self = Self { list: std::mem::take(&mut self.list), ..Self::default() };
+        self.list.clear();
+    }
+
+    /// Appends the law of a row.
+    pub(crate) fn push(&mut self, law: ContactLaw) {
+        self.list.push(law);
+        self.read_start |= law.reads_start();
+        self.compliant |= law.is_compliant();
+        self.predictive |= law.is_predictive();
+        self.inertial |= law.inertia() != 0.0;
+        self.damped |= law.is_damped();
+        self.rebound |= law.rebounds();
+        self.equality |= law.is_equality();
+        self.augmentations = self.augmentations.max(law.augmentations());
+    }
+
+    /// Whether every row constrains what the scheme asks for, with the weight of d that the scheme gives it.
+    pub(crate) fn are_uniform(&self) -> bool {
+        !self.compliant && !self.read_start
+    }
+}
+
+impl std::ops::Deref for Laws {
+    type Target = [ContactLaw];
+
+    fn deref(&self) -> &[ContactLaw] {
+        &self.list
+    }
+}

@@ -1,0 +1,243 @@
+//! What the tangential rows of contacts with friction constrain in a stage: the slip, as a length.
+//!
+//! Coulomb's law does not change when the slip is scaled by a positive number. It is taken from the velocity that the
+//! stage ends with, scaled so that the unknown has the same weight as in the gap; W is symmetric then. Where velocities
+//! do not contain the unknown, dofs have no mass, or corrections take contact forces out of the accelerations, it is
+//! the way made in the stage. It is measured along the rows along which friction acts.
+
+use crate::contact::{ContactJacobian, GapRates, Tangents};
+use crate::corrector::{rounding, slides};
+use crate::error::Result;
+use crate::real::Real;
+use crate::simulation::build::program::{CompiledStage, ContactTarget};
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::contact_rows::{ContactRowsWork, Part};
+use crate::simulation::stage::contact::{ContactStep, ContactWork};
+use crate::state::{Clock, Motion};
+
+/// What the slip of a stage is taken from.
+#[derive(Clone, Copy, Debug)]
+enum Source<T> {
+    /// The velocity of the state, times this.
+    Velocity(T),
+    /// What contact constrains: h times a velocity.
+    Target,
+    /// The way from the state to where contact is imposed.
+    WayAhead,
+    /// The way from where the stage starts to its state.
+    Way,
+}
+
+/// The source of a slip, and the weight of d in it.
+fn source<T: Real>(stage: &CompiledStage<T>, by_way: bool) -> (Source<T>, T) {
+    let [by_u, by_v, _] = stage.recovery.weights();
+    match &stage.contact {
+        Some(target) if target.forecast.is_some() => (Source::Target, target.row.weight),
+        Some(target) => (Source::WayAhead, target.row.weight - by_u),
+        None if by_v > T::zero() && !by_way => (Source::Velocity(by_u / by_v), by_u),
+        None => (Source::Way, by_u),
+    }
+}
+
+/// Whether the slip of a contact is that of dofs without mass. (Where these are solved for with the others, it is that
+/// of a contact on such dofs.)
+fn is_static<T: Real>(
+    part: Part,
+    (tangents, g): (&Tangents, &ContactJacobian<T>),
+    massless: &[usize],
+    row: usize,
+) -> bool {
+    match part {
+        Part::All => tangents.act_on(g, row, massless),
+        Part::Massless | Part::Massive => tangents.rub_on(g, row, massless),
+    }
+}
+
+/// When an obstacle has the velocity that a slip is measured against: with that of the state, at the target, or in the
+/// middle of the way to it. The state is that of t.
+fn time_of_slip<T: Real>(stage: &CompiledStage<T>, clock: Clock, t: f64) -> f64 {
+    match &stage.contact {
+        None => t,
+        Some(target) if target.forecast.is_some() => clock.at(target.at),
+        Some(target) => 0.5 * (clock.at(target.at) + t),
+    }
+}
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Sets the weights of d in the slips: those of contacts that the problem is about.
+    pub(crate) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
+        let tangents = self.constraints.tangents();
+        for row in tangents.contacts() {
+            let is_static = is_static(self.part, (tangents, &*self.g), &rows.massless, row);
+            let (_, weight) = source(self.stage, rows.slides_by_way || is_static);
+            // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
+            let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
+            let rubs = match self.rubs_later(rows, row) {
+                true => self.part == Part::Massive,
+                false => rows.weight[row] > T::zero() || knows,
+            };
+            rows.weight[tangents.of(row)].fill(if rubs { weight } else { T::zero() });
+            // (Candidates may have come and gone: these were other rows before.)
+            rows.compliance[tangents.of(row)].fill(T::zero());
+            rows.shift[tangents.of(row)].fill(T::zero());
+        }
+    }
+
+    /// Whether the friction of a contact on dofs without mass acts on dofs with mass alone. In an explicit stage it is
+    /// no part of the static balance, in which nothing would answer to it: it is found after that, when its normal
+    /// force is known.
+    fn rubs_later(&self, rows: &ContactRowsWork<T>, row: usize) -> bool {
+        let tangents = (self.constraints.tangents(), &*self.g);
+        self.part != Part::All && rows.on_massless[row] && !is_static(self.part, tangents, &rows.massless, row)
+    }
+
+    /// Evaluates y of the tangential rows at the d that was [placed](Self::place).
+    pub(crate) fn evaluate_slips(
+        &mut self,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, iterate, part, .. } = self;
+        if constraints.tangents().is_empty() {
+            return Ok(());
+        }
+        let ContactWork { rows, interface, .. } = contact;
+        let ContactRowsWork { y, tolerance, target, slips, curved, massless, slides_by_way, .. } = rows;
+        let forces = curved.forces(g);
+        if slips.len() < constraints.tangents().len() {
+            slips.resize(constraints.tangents().len(), GapRates::default());
+        }
+        let h = T::of(clock.h);
+        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, slips)?;
+        let tangents = constraints.tangents();
+        for row in tangents.contacts() {
+            let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
+            // (Of a motion along the normal a share of rounding is slip: so well are the directions known.)
+            for k in tangents.of(row) {
+                let own = slips[k - tangents.all().start].rate;
+                (y[k], tolerance[k]) = match source {
+                    Source::Velocity(scale) => {
+                        let slip = forces.product(k, &new.v) + own;
+                        let size = forces.magnitude(k, &new.v) + forces.magnitude(row, &new.v) + own.abs();
+                        // Velocities that are differences of displacements have the rounding of those.
+                        let known = if stage.recovery.subtracts(1) { forces.magnitude(k, &new.u) } else { T::zero() };
+                        let d = &interface.increment;
+                        let added = weight * forces.interface_magnitude(k, d);
+                        (scale * slip + weight * forces.interface_product(k, d), scale * size + known + added)
+                    }
+                    Source::Target => {
+                        let size = forces.magnitude(k, target) + forces.magnitude(row, target) + (h * own).abs();
+                        (forces.product(k, target) + h * own, size)
+                    }
+                    Source::WayAhead | Source::Way => {
+                        let ahead = stage.contact.as_ref();
+                        let time = T::of(ahead.map_or(stage.end - stage.start, |target| target.at - stage.end)) * h;
+                        let ends = match ahead {
+                            Some(_) => [&new.u, &*target],
+                            None => [past.first().map_or(&new.u, |start| &start.u), &new.u],
+                        };
+                        // From the terms of the scheme, which have not the rounding of displacements: what sticks must
+                        // not creep by that. (Supports, and dofs that follow statically, are where they are.)
+                        let part = |dof: usize| {
+                            let free = constraints.place(dof).zip(stage.way.past_at(past, dof));
+                            let Some((place, past)) = free else {
+                                return (ends[1][dof] - ends[0][dof], ends[1][dof].abs());
+                            };
+                            let known = iterate.map_or(T::zero(), |d| d[dof]);
+                            (past + stage.way.weight * (known + interface.increment[place]), T::zero())
+                        };
+                        let (mut way, mut size) = (T::zero(), T::zero());
+                        for (dof, weight) in forces.row(k) {
+                            let (part, known) = part(dof);
+                            way += weight * part;
+                            size += weight.abs() * (known + part.abs());
+                        }
+                        size += forces.row(row).map(|(dof, weight)| (weight * part(dof).0).abs()).sum::<T>();
+                        let terms = (time * own).abs() + weight * forces.interface_magnitude(k, &interface.increment);
+                        (way + time * own, size + terms)
+                    }
+                };
+                tolerance[k] = rounding(tolerance[k]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes which contacts slide in a finished stage, and the slips (length/time) that say so: where contact is imposed
+    /// ahead of the state, and of dofs without mass, those of the way.
+    pub(crate) fn note_slips(
+        &mut self,
+        new: &Motion<T>,
+        past: &[Motion<T>],
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, part, .. } = self;
+        let ContactWork { trial, rows, .. } = contact;
+        let ContactRowsWork { slips, curved, target, massless, .. } = rows;
+        if constraints.tangents().is_empty() {
+            return Ok(());
+        }
+        slips.resize(slips.len().max(constraints.tangents().len()), GapRates::default());
+        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, slips)?;
+        let (forces, tangents) = (curved.forces(g), constraints.tangents());
+        let (h, first) = (T::of(clock.h), tangents.all().start);
+        for row in tangents.contacts() {
+            // From where to where, and the time that takes; a target at velocity level is h times a velocity.
+            let start = past.first().filter(|_| is_static(*part, (tangents, g), massless, row));
+            let (ends, time) = match (start, &stage.contact) {
+                (Some(start), _) => ([Some(&start.u), Some(&new.u)], T::of(stage.end - stage.start) * h),
+                (None, None) => ([None, None], T::one()),
+                (None, Some(ahead)) if ahead.forecast.is_some() => ([None, Some(&*target)], h),
+                (None, Some(ahead)) => ([Some(&new.u), Some(&*target)], T::of(ahead.at - stage.end) * h),
+            };
+            let (mut length, mut noise) = (T::zero(), T::zero());
+            for k in tangents.of(row) {
+                let at = |end: Option<&Vec<T>>, dof: usize| end.map_or(T::zero(), |end| end[dof]);
+                let way = |(dof, weight): (usize, T)| weight * (at(ends[1], dof) - at(ends[0], dof));
+                // (A velocity that has vanished has the rounding of what it is the sum of.)
+                let (slip, size) = if let [None, None] = ends {
+                    (forces.product(k, &new.v), forces.magnitude(k, &new.v) + h * forces.magnitude(k, &new.a))
+                } else {
+                    let size = ends.into_iter().flatten().map(|end| forces.magnitude(k, end)).sum::<T>();
+                    (forces.row(k).map(way).sum::<T>() / time, size / time)
+                };
+                let own = slips[k - first].rate;
+                trial.slip[k - first] = slip + own;
+                (length, noise) = (length.hypot(slip + own), noise.max(rounding(size + own.abs())));
+            }
+            let bound = T::of(tangents.friction(row)) * trial.lambda_raw[row];
+            trial.sliding[row] = slides(trial.tangential(row, &trial.lambda_raw), bound) && length > noise;
+        }
+        tangents.turn([forces, &**g], &mut trial.slip);
+        Ok(())
+    }
+}
+
+/// Notes the slips of the velocities of a state after corrections. Those of a stage that imposes contact `ahead` of its
+/// state, and of dofs without mass, are means over what was before and comes after: where a contact stops sliding, or
+/// turns back, they stay those of the way, to which its friction belongs.
+pub(crate) fn note_slips_of_state<T: Real>(
+    (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
+    new: &Motion<T>,
+    ahead: Option<&ContactTarget<T>>,
+    contact: &mut ContactWork<T>,
+) -> Result<()> {
+    if constraints.tangents().is_empty() {
+        return Ok(());
+    }
+    let ContactWork { trial, rows, .. } = contact;
+    let ContactRowsWork { slips, massless, .. } = rows;
+    constraints.finite_slip_rates(new.t, &new.u, &new.v, slips)?;
+    let tangents = constraints.tangents();
+    let first = tangents.all().start;
+    for row in tangents.contacts() {
+        let slip = |k: usize| g.product(k, &new.v) + slips[k - first].rate;
+        let along = tangents.of(row).map(|k| trial.lambda[k] * slip(k)).sum::<T>();
+        let is_mean = ahead.is_some() || tangents.act_on(g, row, massless);
+        if !is_mean || trial.sliding[row] && along <= T::zero() {
+            tangents.of(row).for_each(|k| trial.slip[k - first] = slip(k));
+        }
+    }
+    Ok(())
+}

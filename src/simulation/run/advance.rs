@@ -1,0 +1,110 @@
+//! How a run goes on: a step, whole steps until a time, steps that land on it.
+
+use crate::error::{Error, Result};
+use crate::observer::{Control, Observer, StepView, Wants};
+use crate::ranks::check_alike;
+use crate::real::Real;
+use crate::simulation::run::Simulation;
+use crate::simulation::run::results::Outcome;
+use crate::state::resolution;
+
+impl<T: Real> Simulation<'_, T> {
+    /// Takes one step. Under [`step_control`](super::SimulationBuilder::step_control) it is taken with smaller sizes
+    /// until one succeeds.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
+    /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::PassedThrough`],
+    /// [`Error::LinearNotConverged`], [`Error::TimeNotAdvancing`], or what the host's own parts return;
+    /// [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
+    /// were. [`Error::Poisoned`] after a panic of the host that was caught.
+    pub fn step(&mut self) -> Result<()> {
+        self.guarded(|run| match run.judge {
+            Some(_) => run.controlled_step(),
+            None => run.attempt().map(drop),
+        })
+    }
+
+    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time
+    /// whose distance from `t` is rounding counts as `t`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step); [`Error::EnergyNotFinite`] if an
+    /// observer asks for the energy, and it is NaN or infinite, and what an observer returns: the step itself has then
+    /// been taken.
+    pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
+        if !t.is_finite() {
+            return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
+        }
+        check_alike(&self.together, ["the end time"], [t])?;
+        while !self.history.clock.has_reached(t) {
+            if self.observed_step(observer)? == Control::Stop {
+                return Ok(Outcome::Stopped);
+            }
+        }
+        Ok(Outcome::Reached)
+    }
+
+    /// Takes a step and shows it to the observer.
+    fn observed_step(&mut self, observer: &mut dyn Observer<T>) -> Result<Control> {
+        self.step()?;
+        // (Energies are sums over all ranks, which take part even if an observer elsewhere wants them.)
+        let [wanted] = self.together.sum(Ok([f64::from(u8::from(observer.wants() == Wants::Energy))]))?;
+        let energy = (wanted > 0.0).then(|| self.energy());
+        energy.map_or(Ok(()), |energy| energy.check(self.time()))?;
+        let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
+        let observed = observer.observe(&view);
+        if self.together.is_alone() {
+            return observed;
+        }
+        let stops = observed.map(|control| [f64::from(u8::from(control == Control::Stop))]);
+        let stops = self.together.sum(stops);
+        self.together.caught();
+        Ok(if stops? == [0.0] { Control::Continue } else { Control::Stop })
+    }
+
+    /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it
+    /// was.
+    ///
+    /// Two factorizations, if `t` is not on the grid.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.03)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// run.land_on(1.0, &mut ())?;
+    /// assert!((run.time() - 1.0).abs() < 1e-14 && run.step_size() == 0.03);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run_until`](Self::run_until) and [`set_step_size`](Self::set_step_size).
+    pub fn land_on(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
+        let nominal = self.history.pace.nominal;
+        if !t.is_finite() {
+            return self.run_until(t, observer);
+        }
+        // Times closer than this count as the same.
+        let sliver = (1e-9 * nominal).max(resolution(t));
+        while self.history.clock.h <= self.history.clock.until(t) + sliver.min(0.5 * self.history.clock.h) {
+            if self.observed_step(observer)? == Control::Stop {
+                return Ok(Outcome::Stopped);
+            }
+        }
+        let rest = self.history.clock.until(t);
+        if rest <= sliver {
+            return Ok(Outcome::Reached);
+        }
+        self.set_step_size(rest)?;
+        let outcome = self.run_until(t, observer);
+        let back = self.set_step_size(nominal);
+        back.and(outcome)
+    }
+}

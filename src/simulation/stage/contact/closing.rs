@@ -1,0 +1,118 @@
+//! The end of the contact of a stage: which contacts are closed, which have opened, and their forces and impulses.
+
+use crate::contact::ContactLaw;
+use crate::corrector::{Buffers, Gaps};
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::rows::contact_rows::{Level, Part};
+use crate::simulation::stage::contact::{ContactStep, ContactWork};
+use crate::state::Motion;
+
+/// Where a stage stands in its step, for the impulses of its contacts.
+pub(crate) struct Booking {
+    /// Impulse of a unit multiplier over a step, divided by h.
+    pub(crate) impulse_weight: f64,
+    /// Whether the stage is the first of its step, or the last.
+    pub(crate) is_first: bool,
+    pub(crate) is_last: bool,
+}
+
+impl<T: Real> ContactStep<'_, '_, T> {
+    /// Decides which contacts are closed, and sets what the stage reports of them before corrections: force and
+    /// impulse.
+    pub(crate) fn close(
+        &mut self,
+        (new, past): (&Motion<T>, &[Motion<T>]),
+        booking: &Booking,
+        massless: &[usize],
+        buffers: &mut Buffers<T>,
+        contact: &mut ContactWork<T>,
+    ) -> Result<()> {
+        let Self { stage, clock, constraints, g, .. } = self;
+        let ContactWork { trial, impulses, rows, was_closed, was_sticking, closed_at_start, .. } = contact;
+        let level = Level { target: stage.contact.as_ref(), clock: *clock };
+        rows.evaluate(&level, constraints, g, new, 1e-10)?;
+        if level.target.is_none() {
+            trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
+        } else {
+            // The gaps that are reported are those at the displacements of the state.
+            rows.curved.hold(g, constraints);
+            constraints.follow(new.t, &new.u, g)?;
+            rows.curved.release(constraints);
+            constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
+        }
+        let impulse_weight = T::of(clock.h * booking.impulse_weight);
+        impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
+        if rows.curved.apart {
+            // Multipliers along the rows of the balance: from here on all is along those of the state.
+            let tangents = constraints.tangents();
+            tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
+        }
+        rows.measure(stage, clock.h, constraints, g, new, None)?;
+        if self.part != Part::All && level.target.is_some() {
+            // Rows on dofs without mass constrain the gaps of the state.
+            for row in (0..constraints.len()).filter(|&row| rows.on_massless[row]) {
+                let rate = g.product(row, &new.v) + rows.rates[row].rate;
+                let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
+                (rows.y[row], rows.enabled[row]) = (trial.gap[row], true);
+                rows.tolerance[row] = rounded + T::of(1e-10 * clock.h) * rate.abs();
+            }
+        }
+        was_closed.clear();
+        was_closed.extend_from_slice(&trial.closed);
+        was_sticking.clear();
+        was_sticking.extend(trial.sliding.iter().zip(&trial.closed).map(|(&slides, &closed)| closed && !slides));
+        buffers.closed.clear();
+        buffers.opened.clear();
+        buffers.released.clear();
+        trial.lambda.copy_from_slice(&trial.lambda_raw);
+        trial.lambda_v.fill(T::zero());
+        trial.lambda_a.fill(T::zero());
+        if booking.is_first {
+            trial.impulse.fill(T::zero());
+        }
+        for (row, &was_closed) in was_closed.iter().enumerate() {
+            let raw = trial.lambda_raw[row];
+            let law = constraints.law(row);
+            let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
+            let closed = raw > T::zero() || touching || law.is_equality();
+            trial.closed[row] = closed;
+            // Compliant contacts, and those on dofs without mass, leave no jump to correct. (Impulses do not reach such
+            // dofs: friction there would be taken from one side alone.)
+            let is_static = !massless.is_empty() && g.acts_on(row, massless);
+            let has_mass = !is_static && !constraints.tangents().act_on(g, row, massless);
+            if law.rebounds() && is_static {
+                return Err(Error::Incompatible {
+                    part: format!("{law:?} of contact {} on dofs without mass", constraints.ids[row]),
+                    reason: "such dofs stop and start at once; choose `ContactLaw::Rigid`, or give them a mass",
+                });
+            }
+            if law.leaves_jumps() && has_mass {
+                match (closed, was_closed) {
+                    (true, _) => buffers.closed.push(row),
+                    (false, true) => buffers.opened.push(row),
+                    (false, false) => {}
+                }
+                if booking.is_last && !closed && (was_closed || closed_at_start[row]) {
+                    buffers.released.push(row);
+                }
+            }
+            let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && is_static;
+            if is_balanced {
+                buffers.switching.note(row, trial);
+            }
+            // (What a contact without mass has taken it may give back when it opens, or closes again.)
+            if closed && !was_closed && !closed_at_start[row] && !is_balanced {
+                trial.dissipated[row] = T::zero();
+            }
+            if raw != T::zero() {
+                trial.impulse[row] += impulse_weight * raw;
+            }
+        }
+        for row in constraints.tangents().all() {
+            trial.impulse[row] += impulse_weight * trial.lambda_raw[row];
+        }
+        impulses.note(trial);
+        self.note_slips(new, past, contact)
+    }
+}

@@ -1,0 +1,125 @@
+//! A comparison of gap rates and rows with gaps: a constraint that moves must give rates that are not zero, and one
+//! whose gaps turn must say that its rows change.
+
+use crate::contact::{ContactJacobian, GapRates};
+use crate::corrector::Gaps;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::rows::constraints::Constraints;
+use crate::state::Motion;
+
+/// Memory for the comparison, one entry a row.
+pub(crate) struct RateCheck<T> {
+    /// Gaps at two times.
+    before: Vec<T>,
+    now: Vec<T>,
+    rates: Vec<GapRates<T>>,
+    /// Whether the gap has changed at every time so far with zero rates.
+    silent: Vec<bool>,
+    /// The version of the rows before the search of the step.
+    pub(crate) version: u64,
+}
+
+impl<T: Real> RateCheck<T> {
+    /// Memory for `rows` rows.
+    pub(crate) fn new(rows: usize) -> Self {
+        let mut check = Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new(), version: 0 };
+        check.make_room(rows);
+        check
+    }
+
+    /// Memory for so many rows.
+    pub(crate) fn make_room(&mut self, rows: usize) {
+        self.before.resize(rows, T::zero());
+        self.now.resize(rows, T::zero());
+        self.rates.resize(rows, GapRates::default());
+        self.silent.resize(rows, false);
+    }
+
+    /// Refuses rows whose gap, at fixed displacements, changes throughout the time h from a motion on while their rates
+    /// are zero. (A jump changes a gap once only, and a wall that starts or stops has a rate at some of the times.)
+    pub(crate) fn check(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        motion: &Motion<T>,
+        h: f64,
+        jacobian: &ContactJacobian<T>,
+    ) -> Result<()> {
+        /// Times, in shares of h, so uneven that an oscillation does not have the same gap at all of them.
+        const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
+        let count = constraints.len();
+        let Self { before, now, rates, silent, .. } = self;
+        for (row, silent) in silent[..count].iter_mut().enumerate() {
+            // The force of a spring does not depend on rates.
+            *silent = constraints.law(row).reads_rates();
+        }
+        let mut first = T::zero();
+        let mut found = None;
+        for (k, share) in SHARES.into_iter().enumerate() {
+            if !silent[..count].contains(&true) {
+                break;
+            }
+            let t = motion.t + share * h;
+            std::mem::swap(before, now);
+            constraints.finite_gaps(t, &motion.u, now)?;
+            constraints.finite_rates(t, &motion.u, &motion.v, rates)?;
+            for row in 0..count {
+                let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
+                let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
+                silent[row] &= moves && rates[row].rate == T::zero() && constraints.gives_rates(row);
+            }
+            found = silent[..count].iter().position(|silent| *silent);
+        }
+        if let Some(row) = found {
+            // (The gap at the start, again.)
+            constraints.finite_gaps(motion.t, &motion.u, before)?;
+            first = before[row];
+        }
+        let last = found.map_or(first, |row| now[row]);
+        match found {
+            None => Ok(()),
+            Some(row) => Err(Error::SilentMotion {
+                contact: constraints.ids[row],
+                t: [motion.t, motion.t + h],
+                gap: [first.value(), last.value()],
+            }),
+        }
+    }
+
+    /// Refuses rows of constraints that have said in this step that their rows do not change, along which gaps change
+    /// by something else than the rows between the displacements of the step.
+    pub(crate) fn check_rows(
+        &mut self,
+        constraints: &mut Constraints<'_, T>,
+        [start, new]: [&Motion<T>; 2],
+        jacobian: &ContactJacobian<T>,
+    ) -> Result<()> {
+        /// The share of the way that a row may miss: hosts may leave out turns that do not matter.
+        const SHARE: f64 = 0.01;
+        let count = constraints.len();
+        if !(0..count).any(|row| constraints.is_unchanged(row, self.version)) {
+            return Ok(());
+        }
+        let Self { before, now, .. } = self;
+        constraints.finite_gaps(new.t, &start.u, before)?;
+        constraints.finite_gaps(new.t, &new.u, now)?;
+        for row in (0..count).filter(|&row| constraints.is_unchanged(row, self.version)) {
+            let (mut by_row, mut way, mut size) = (T::zero(), T::zero(), T::zero());
+            for (dof, weight) in jacobian.row(row) {
+                let moved = new.u[dof] - start.u[dof];
+                by_row += weight * moved;
+                (way, size) = (way.max((weight * moved).abs()), size + (weight * start.u[dof]).abs());
+            }
+            let change = now[row] - before[row];
+            let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &new.u) + size, now[row]);
+            if (change - by_row).abs() > T::of(SHARE) * way.max(change.abs()) + T::of(4.0) * rounded {
+                return Err(Error::SilentTurn {
+                    contact: constraints.ids[row],
+                    t: [start.t, new.t],
+                    change: [change.value(), by_row.value()],
+                });
+            }
+        }
+        Ok(())
+    }
+}

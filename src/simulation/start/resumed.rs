@@ -1,0 +1,105 @@
+//! What a run continues from: refused if another run has left it.
+
+use crate::error::{Error, Result, step_size};
+use crate::real::Real;
+use crate::simulation::build::scheme::Scheme;
+#[cfg(feature = "serde")]
+use crate::simulation::step::resample::trail_length;
+#[cfg(feature = "serde")]
+use crate::state::{Checkpoint, Motion};
+use crate::state::{Clock, History, Names, State};
+use crate::system::check_vector;
+
+/// State and history that a run continues from.
+pub(crate) struct Resumed<T> {
+    state: State<T>,
+    history: History<T>,
+    /// Fingerprint of the rows that made a checkpoint; its history has no spare slots.
+    #[cfg(feature = "serde")]
+    rows: Option<u32>,
+}
+
+impl<T: Real> Resumed<T> {
+    pub(crate) fn new(mut state: State<T>, history: History<T>) -> Self {
+        // Versions of names count within a run: those of another one mean nothing here.
+        state.contacts.names = Names::default();
+        Self {
+            state,
+            history,
+            #[cfg(feature = "serde")]
+            rows: None,
+        }
+    }
+
+    #[cfg(feature = "serde")]
+    pub(crate) fn from_checkpoint(checkpoint: Checkpoint<T>) -> Self {
+        let Checkpoint { state, history, rows } = checkpoint;
+        Self { state, history, rows: Some(rows) }
+    }
+
+    pub(crate) fn clock(&self) -> Clock {
+        self.history.clock
+    }
+
+    /// State and history, if a run of this size, scheme and nominal step size may have left them.
+    pub(crate) fn checked(
+        self,
+        scheme: &Scheme<'_>,
+        h: f64,
+        [dofs, massless]: [usize; 2],
+    ) -> Result<(State<T>, History<T>)> {
+        let (state, history) = (self.state, self.history);
+        #[cfg(feature = "serde")]
+        let history = match self.rows {
+            Some(rows) => fitted(&state, history, scheme, rows)?,
+            None => history,
+        };
+        history.check(dofs, scheme.slots(), massless)?;
+        check_vector("the resumed displacement", &state.motion.u, dofs)?;
+        check_vector("the resumed velocity", &state.motion.v, dofs)?;
+        check_vector("the resumed acceleration", &state.motion.a, dofs)?;
+        check_scheme(&history, scheme)?;
+        let (t, end) = (state.motion.t, history.clock.at(0.0));
+        if (t - end).abs() > 1e-6 * history.clock.h {
+            let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
+            return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
+        }
+        let own = history.step_size();
+        if own.to_bits() != h.to_bits() {
+            return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
+        }
+        step_size::<T>(history.clock.h)?;
+        Ok((state, history))
+    }
+}
+
+fn check_scheme<T: Real>(history: &History<T>, scheme: &Scheme<'_>) -> Result<()> {
+    let name = scheme.integrator.name();
+    if history.scheme != name {
+        let part = format!("a history of {} in a run by {name}", history.scheme);
+        return Err(Error::Incompatible { part, reason: "a past belongs to the scheme that made it" });
+    }
+    Ok(())
+}
+
+/// The history of a checkpoint with the spare slots that a run of the scheme has.
+#[cfg(feature = "serde")]
+fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_>, rows: u32) -> Result<History<T>> {
+    check_scheme(&history, scheme)?;
+    let refuse = |reason| Err(Error::Incompatible { part: format!("a checkpoint of {}", history.scheme), reason });
+    if scheme.tableau.fingerprint() != rows {
+        return refuse("the rows of its scheme were others, though their name was that of the scheme of this run");
+    }
+    let slots = scheme.slots();
+    let trail = history.trail.room();
+    let shifted = scheme.shifts.map(|shift| shift != 0.0);
+    // Values at the time of the state are there where, and only where, the stored ones live elsewhere.
+    let shown = state.shown.each_ref().map(|shown| !shown.is_empty());
+    let moved = history.unmoved.iter().zip(shifted).any(|(unmoved, shifted)| !unmoved.is_empty() && !shifted);
+    let length = trail == 0 || trail == trail_length(scheme);
+    if history.known > scheme.depth || history.slots.len() > slots || !length || moved || shown != shifted {
+        return refuse("it does not hold what this scheme reads");
+    }
+    history.slots.resize(slots, Motion::zero(state.motion.u.len()));
+    Ok(history)
+}

@@ -1,0 +1,102 @@
+//! Step-size control: refused steps are taken again with halves of the step, which grow back to the nominal one.
+
+use crate::corrector::Gaps;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::operator::tangent::At;
+use crate::simulation::run::Simulation;
+use crate::simulation::step::judge::Verdict;
+use crate::state::{History, Refusal, State};
+
+impl<T: Real> Simulation<'_, T> {
+    /// Takes one step, with halves of the step size as long as steps are refused.
+    pub(crate) fn controlled_step(&mut self) -> Result<()> {
+        let mut before: Option<(State<T>, History<T>)> = None;
+        let mut refusals = 0;
+        let result = loop {
+            let h = self.history.clock.h;
+            let smaller = 0.5 * h;
+            let Some(judge) = &mut self.judge else { break self.attempt().map(drop) };
+            let last = smaller < judge.control.smallest * (1.0 - 1e-9);
+            judge.suspended = last;
+            judge.begin(&self.state, self.history.pace.lasting);
+            self.work.contact.rows.curved.may_halve = !last;
+            match self.attempt() {
+                Ok(Verdict::Accepted) => break Ok(()),
+                Err(error) if !error.is_recoverable() => break Err(error),
+                Err(source) if last => {
+                    self.statistics.refused_steps += 1;
+                    let (t, attempts) = (self.time(), refusals + 1);
+                    break Err(Error::StepRefused { t, h, attempts, source: Box::new(source) });
+                }
+                verdict @ (Ok(Verdict::Coarse) | Err(_)) => {
+                    let refusal = match verdict {
+                        Err(Error::Stiffened { contact: Some(_), .. }) => Refusal::StiffContact,
+                        Err(Error::Stiffened { contact: None, .. }) => Refusal::StiffSystem,
+                        _ => Refusal::Passing,
+                    };
+                    self.statistics.refused_steps += 1;
+                    refusals += 1;
+                    before.get_or_insert_with(|| (self.state.clone(), self.history.clone()));
+                    if let Err(error) = self.change_step_size(smaller) {
+                        break Err(error);
+                    }
+                    self.history.pace.halve(refusal);
+                }
+            }
+        };
+        match (result, before) {
+            (Ok(()), _) => {
+                self.grow();
+                Ok(())
+            }
+            (Err(error), None) => Err(error),
+            (Err(error), Some((state, history))) => {
+                let (h, tried) = (history.clock.h, self.history.clock.h);
+                (self.state, self.history) = (state, history);
+                if self.history.known == self.scheme.depth {
+                    self.startup = None;
+                }
+                let compiled = self.compile_for(tried, h);
+                self.together.finish(compiled)?;
+                Err(error)
+            }
+        }
+    }
+
+    /// Counts a good step, and doubles the step size where the nominal grid and the judgement allow it.
+    fn grow(&mut self) {
+        let Self { judge: Some(judge), constraints, state, statistics, history, .. } = self else { return };
+        statistics.coarse_steps += u64::from(judge.coarse);
+        history.pace.note_change(judge.changed, history.clock.h);
+        let may_grow = judge.may_grow() && !judge.coarse;
+        let presses = || {
+            let mut rows = constraints.rows_of(&state.contacts);
+            rows.any(|(contact, row)| constraints.law(row).is_spring() && state.contacts.closed[contact])
+        };
+        if history.pace.advance(presses) && may_grow {
+            // If the matrix of the larger step cannot be factorized, the run goes on with the smaller one.
+            let larger = 2.0 * self.history.clock.h;
+            if self.change_step_size(larger).is_ok() {
+                self.history.pace.double();
+            }
+        }
+    }
+
+    /// Compiles the programs for h again; they are compiled for `other`.
+    fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
+        let Self { system, scheme, program, startup, state, .. } = self;
+        let at = At::state(&state.motion);
+        program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
+        match startup {
+            Some(startup) => startup.set_step_size(&scheme.derived.starter.stages, &mut **system, other, h, at),
+            None => Ok(()),
+        }
+    }
+
+    /// The estimate of the local error of the last step (length), for runs that
+    /// [control it](crate::StepControl::local_error).
+    pub fn local_error(&self) -> Option<f64> {
+        self.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
+    }
+}

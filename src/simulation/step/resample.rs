@@ -1,0 +1,457 @@
+//! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
+
+use crate::contact::{ContactJacobian, GapRates};
+use crate::contact_solver::FORESEEN;
+use crate::corrector::{Corrector, Gaps, JumpProjection, no_response};
+use crate::error::{Result, step_size};
+use crate::ranks::check_alike;
+use crate::real::Real;
+use crate::simulation::build::program::{Compiler, Program};
+use crate::simulation::build::scheme::Scheme;
+use crate::simulation::operator::responses::Unit;
+use crate::simulation::operator::tangent::At;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::run::Simulation;
+use crate::simulation::start::massless::Balanced;
+use crate::simulation::start::past::taylor;
+use crate::simulation::start::{self, Begun, Start, Violation};
+use crate::simulation::watch::stability::{self, StepLimit};
+use crate::state::{History, Motion, Pace, State, Trail};
+use crate::system::Linearity;
+
+/// The past is not extrapolated farther than to so many times its age: polynomials grow beyond it. (Not at all where a
+/// scheme reads accelerations of the past: those of stiff motions are the larger the faster they are.)
+const FARTHEST: f64 = 3.0;
+
+impl<T: Real> Simulation<'_, T> {
+    /// Size of the next step.
+    pub fn step_size(&self) -> f64 {
+        self.history.clock.h
+    }
+
+    /// Changes the step size from here on. Effective matrices are factorized anew (their analysis is kept), and the
+    /// past of a multistep scheme is resampled at the new spacing: u by the cubic through (u, v) of two states, v by
+    /// the cubic through (v, a), a linearly. States from before a contact closed or opened are not used: the past is
+    /// then extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the
+    /// closed contacts.
+    ///
+    /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`).
+    /// A step so much larger that the past would be extrapolated to more than three times its age (beyond its age,
+    /// where the scheme reads accelerations of it) makes it anew instead, by steps of the trapezoidal rule, as at the
+    /// start of a run, so that fast motions gain no energy to speak of. The velocity of the state becomes that of the
+    /// scheme's momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that
+    /// goes back and forth by such factors all the time is of order 1.
+    ///
+    /// The velocities of the state stay as they are. [`momentum`](Self::momentum), in which schemes may look a part p of
+    /// the step ahead, becomes that of the new step: under a force F, for instance of a contact that presses, it changes
+    /// by p (h' − h) F, which no impulse accounts for (central differences: half of it, p = ½). Without force it is
+    /// conserved. The impulse of one contact agrees with the change of a body's momentum across a change of h only to
+    /// the order of the scheme.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    ///
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Composite, 0.01)
+    ///     .displacement(vec![1.0])
+    ///     .build()?;
+    /// run.run_until(1.0, &mut ())?;
+    /// run.set_step_size(0.004)?;
+    /// run.run_until(2.0, &mut ())?;
+    /// assert!((run.state().displacement()[0] - run.time().cos()).abs() < 1e-4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`](crate::Error::Parameter) unless h is positive and finite,
+    /// [`Error::TimeNotAdvancing`](crate::Error::TimeNotAdvancing) if a step of that size would not change the time,
+    /// [`Error::BeyondStability`](crate::Error::BeyondStability) if the scheme is not stable with it,
+    /// [`Error::MatrixNotFinite`](crate::Error::MatrixNotFinite) or
+    /// [`Error::Singular`](crate::Error::Singular) if the effective matrix cannot be factorized. The simulation is then
+    /// as it was.
+    pub fn set_step_size(&mut self, h: f64) -> Result<()> {
+        self.guarded(|run| {
+            check_alike(&run.together, ["the step size"], [h])?;
+            run.change_step_size(h)?;
+            run.history.pace = Pace::new(h);
+            Ok(())
+        })
+    }
+
+    /// Changes the step size, whatever the nominal one is.
+    pub(crate) fn change_step_size(&mut self, h: f64) -> Result<()> {
+        let result = self.change_step_size_together(h);
+        self.together.finish(result)
+    }
+
+    fn change_step_size_together(&mut self, h: f64) -> Result<()> {
+        let old = self.history.clock.h;
+        if h.to_bits() == old.to_bits() {
+            return Ok(());
+        }
+        step_size::<T>(h)?;
+        let clock = self.history.clock.with_step_size(h);
+        clock.check()?;
+        // (Steps of a system that may stiffen are looked at as they are taken: they grow back to the nominal size
+        // whatever was found of them where the run was built, or resumed.)
+        let grows_back = self.system.linearity() == Linearity::Nonlinear && h <= self.history.pace.nominal;
+        if let StepLimit::Cleared(cleared) = self.limit
+            && h > cleared
+            && !grows_back
+        {
+            self.limit =
+                stability::check_step((&mut *self.system, &self.together), &self.scheme, &self.state.motion, h)?;
+        }
+        let anew = self.is_beyond_past(h);
+        let (past, velocity, starter) = match anew {
+            true => {
+                let starter = self.startup.is_none().then(|| self.compiled_starter(h)).transpose()?;
+                (Vec::new(), Some(self.velocity_of_momentum()?), starter)
+            }
+            false => (self.resampled(h)?, None, None),
+        };
+        let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
+        let at = At::state(&state.motion);
+        program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
+        if let Some(startup) = startup
+            && let Err(error) = startup.set_step_size(&scheme.derived.starter.stages, &mut **system, old, h, at)
+        {
+            program.set_step_size(&scheme.tableau.stages, &mut **system, h, old, at)?;
+            return Err(error);
+        }
+        if starter.is_some() {
+            *startup = starter;
+        }
+        let programs = std::iter::once(&*program).chain(&*startup);
+        let constant = programs.flat_map(|program| &program.operators).filter(|operator| !operator.varies());
+        statistics.factorizations += constant.count() as u64;
+        keep_trail(scheme, state, history);
+        move_shifted(scheme, state, history, h);
+        for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
+            *slot = resampled;
+        }
+        if let Some(velocity) = velocity {
+            state.motion.v = velocity;
+            history.known = 1;
+        }
+        history.clock = clock;
+        Ok(())
+    }
+
+    /// Whether the past that the scheme reads with steps of this size would be extrapolated farther than is stable:
+    /// beyond [`FARTHEST`] times what was computed of it. It is then made anew, by steps of the one-step scheme that
+    /// also begins a run.
+    fn is_beyond_past(&self, h: f64) -> bool {
+        let Self { state, history, scheme, .. } = self;
+        let reads = scheme.tableau.reads_after(scheme.tableau.stages.len() - 1);
+        let farthest = if reads.iter().skip(1).any(|reads| reads[2]) { 1.0 } else { FARTHEST };
+        let needed = (history.known - 1) as f64 * h;
+        let computed = computed(state, history).last().map_or(0.0, |oldest| oldest.age);
+        // (Behind an impact nothing is known but the newest state: what counts then is the step that made it.)
+        needed > farthest * (1.0 + 1e-9) * computed.max((history.known - 1) as f64 * history.made_with)
+    }
+
+    /// The velocity with which the newest state has the momentum of the scheme alone, without its past: the stored one
+    /// errs by O(h²), which does not matter as long as the scheme does not go on from it. Closed contacts keep their
+    /// gap rates.
+    fn velocity_of_momentum(&mut self) -> Result<Vec<T>> {
+        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
+        let h = history.clock.h;
+        let newest = &state.motion;
+        let psi = scheme.derived.covectors.get(history.known - 1).filter(|psi| !reads_accelerations_alone(psi));
+        let Some(psi) = psi else { return Ok(newest.v.clone()) };
+        let mut velocity = scheme.momentum(newest, &history.slots[1..history.known], h);
+        T::axpy(T::of(-lead(psi) * h), &newest.a, &mut velocity);
+        for &dof in system.prescribed().iter().chain(&work.massless) {
+            velocity[dof] = newest.v[dof];
+        }
+        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
+        let tangents = constraints.tangents();
+        let corrected =
+            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
+        let rigid: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
+        if !rigid.is_empty() {
+            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
+            projection.close_rows(g, &rigid, |row| no_response(newest.t, constraints.ids[row]))?;
+            let targets: Vec<T> = rigid.iter().map(|&row| g.product(row, &newest.v)).collect();
+            projection.remove_jump(g, &targets, &mut velocity, &mut vec![T::zero(); rigid.len()])?;
+        }
+        Ok(velocity)
+    }
+
+    /// The scheme of the first steps, for another step size.
+    fn compiled_starter(&mut self, h: f64) -> Result<Program<T>> {
+        let Self { system, constraints, linear_solver, scheme, state, .. } = self;
+        let (interface, unit) = (constraints.interface(), Unit::of(constraints));
+        let at = At::state(&state.motion);
+        let mut compiler = Compiler { system: &mut **system, solver: &**linear_solver, h, at, interface, unit };
+        compiler.start(&scheme.derived.starter, &scheme.tableau)
+    }
+
+    /// Past states 1, 2, … known − 1 at the spacing h.
+    fn resampled(&mut self, h: f64) -> Result<Vec<Motion<T>>> {
+        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
+        let known = history.known;
+        let newest = &state.motion;
+        let nodes = computed(state, history);
+        let mut past = vec![Motion::zero(newest.u.len()); known - 1];
+        for (k, out) in (1..known).zip(&mut past) {
+            let age = k as f64 * h;
+            // The interval that contains the time, or else the oldest one.
+            let interval = nodes.windows(2).find(|pair| pair[1].age >= age).or(nodes.windows(2).last());
+            match interval {
+                Some([newer, older]) => interpolate(newer, older, age, out),
+                _ => taylor(newest, -age, out),
+            }
+            out.t = newest.t - age;
+        }
+        conserve_momentum(scheme, state, history, h, &mut past);
+        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
+        // Rows whose law reads the gap where a stage starts may hold it anywhere; those on dofs without mass have
+        // nothing to correct, and would move the other side alone.
+        let tangents = constraints.tangents();
+        let corrected =
+            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
+        let closed: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
+        if history.smooth < known && !closed.is_empty() {
+            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
+            projection.close_rows(g, &closed, |row| no_response(newest.t, constraints.ids[row]))?;
+            for motion in &mut past {
+                project(motion, constraints, g, &mut projection, &closed)?;
+            }
+        }
+        Ok(past)
+    }
+
+    /// Starts again from the displacements and velocities of the present state, after a discontinuity that the host
+    /// knows of (a load or a support that jumps): accelerations follow from the balance after it, contacts at rest are
+    /// found anew, and the past is made anew as at the start.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    ///
+    /// // A mass under a force that is switched on at t = 1.
+    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
+    /// let system = LinearSystem::lumped(vec![1.0], k)?.load(|t, f| f[0] = if t < 1.0 - 1e-9 { 0.0 } else { 3.0 });
+    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build()?;
+    /// run.land_on(1.0 - 1e-8, &mut ())?; // before the jump
+    /// run.land_on(1.0, &mut ())?; // over it
+    /// run.restart()?; // and begin again behind it
+    /// assert!((run.state().acceleration()[0] - 3.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of building a simulation from this state. The simulation is then as it was.
+    pub fn restart(&mut self) -> Result<()> {
+        self.guarded(|run| {
+            let result = run.begin_anew();
+            run.together.finish(result)
+        })
+    }
+
+    fn begin_anew(&mut self) -> Result<()> {
+        let (h, t) = (self.history.clock.h, self.time());
+        let Self { system, constraints, g, contact_solver, correctors, scheme, startup, state, .. } = self;
+        let (history, work) = (&mut self.history, &mut self.work);
+        let is_smooth = correctors.iter().any(Corrector::leaves_smooth_motion);
+        let massless = &work.massless[..];
+        let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
+        let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
+        let (system, contact_solver) = (&mut **system, &mut **contact_solver);
+        let start = Start {
+            system: &mut *system,
+            contact_solver: &mut *contact_solver,
+            scheme,
+            together: &self.together,
+            h,
+            t,
+            massless,
+            balanced: Balanced::Massless,
+            is_smooth,
+        };
+        let Begun { state: mut begun, history: past, .. } =
+            start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
+        work.contact.rows.reserved = constraints.room().min(FORESEEN);
+        contact_solver.reserve(work.contact.rows.reserved);
+        let depth = scheme.depth;
+        if past.known < depth && startup.is_none() {
+            let (interface, unit) = (constraints.interface(), Unit::of(constraints));
+            let at = At::state(&begun.motion);
+            let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
+            let program = compiler.start(&scheme.derived.starter, &scheme.tableau)?;
+            self.statistics.factorizations += program.operators.len() as u64;
+            *startup = Some(program);
+        } else if past.known == depth {
+            *startup = None;
+        }
+        if let Some(ledger) = &mut self.ledger {
+            ledger.restart(system, &begun, (constraints, g))?;
+        }
+        begun.broken = std::mem::take(&mut state.broken);
+        let (pace, clock) = (history.pace, history.clock);
+        (*state, *history) = (begun, past);
+        (history.pace, history.clock) = (pace, clock);
+        Ok(())
+    }
+}
+
+/// A computed motion, and its age, the time from it to the newest one: a sum of step sizes, since differences of
+/// absolute times would have their rounding.
+struct Node<'h, T> {
+    motion: &'h Motion<T>,
+    age: f64,
+}
+
+/// The motions as they were computed since a contact last closed or opened, newest first.
+fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<Node<'h, T>> {
+    let newest = std::iter::once((&state.motion, history.made_with));
+    let smooth = history.smooth;
+    let known: Vec<(&Motion<T>, f64)> = match history.trail.is_empty() {
+        // Until the step changes for the first time, the past that the scheme reads is as it was computed.
+        true => {
+            let past = history.slots[1..history.known].iter().map(|motion| (motion, history.made_with));
+            newest.chain(past).take(smooth).collect()
+        }
+        false => newest.chain(history.trail.known()).take(smooth).collect(),
+    };
+    let mut age = 0.0;
+    let node = |(motion, made_with): (&'h Motion<T>, f64)| {
+        let node = Node { motion, age };
+        age += made_with;
+        node
+    };
+    known.into_iter().map(node).collect()
+}
+
+/// Number of computed motions that are kept: enough of them for ratios of step sizes up to 3.
+pub(crate) fn trail_length(scheme: &Scheme<'_>) -> usize {
+    let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
+    if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) }
+}
+
+/// Begins to keep the computed motions.
+fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
+    let length = trail_length(scheme);
+    if history.trail.is_empty() && length > 0 {
+        // One-step schemes read no past, but the motion before the present one is still in its slot.
+        let known = history.known.max(history.smooth.min(2));
+        let past: Vec<_> = history.slots[1..known].iter().map(|motion| (motion, history.made_with)).collect();
+        history.trail = Trail::new(length, state.motion.u.len(), &past);
+    }
+}
+
+/// Moves stored v and a of schemes that store those δ steps away from the state: δ steps are another time with the new
+/// step size. Values there are on the line through the last two that were computed.
+fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
+    let History { trail, unmoved, made_with, smooth, .. } = history;
+    let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
+    // (A line that is prolonged far is no estimate: what was stored stays, as at the start.)
+    let moved = if h <= FARTHEST * (1.0 + 1e-9) * *made_with { h - *made_with } else { 0.0 };
+    for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
+        if shift == 0.0 {
+            continue;
+        }
+        let stored = state.motion.rate_mut(field);
+        if unmoved.is_empty() {
+            unmoved.clone_from(stored);
+        }
+        let distance = *made_with + shift * (*made_with - previous_h);
+        let fraction = T::of(shift * moved / distance);
+        stored.copy_from_slice(unmoved);
+        T::axpy_difference(fraction, unmoved, previous.field(field), stored);
+    }
+}
+
+/// The motion of an age on the polynomials through two others, beyond the older one too: u by Hermite's cubic through
+/// (u, v), v by the one through (v, a), a linearly.
+fn interpolate<T: Real>(newer: &Node<'_, T>, older: &Node<'_, T>, age: f64, out: &mut Motion<T>) {
+    let length = older.age - newer.age;
+    let s = (age - newer.age) / length;
+    let (newer, older) = (newer.motion, older.motion);
+    let difference = T::of(s * s * (3.0 - 2.0 * s));
+    let slopes = [-length * s * (1.0 - s) * (1.0 - s), length * s * s * (1.0 - s)].map(T::of);
+    let cubic = |x: &[T], x0: &[T], rate: &[T], rate0: &[T], out: &mut [T]| {
+        out.copy_from_slice(x);
+        T::axpy_difference(difference, x0, x, out);
+        T::axpy(slopes[0], rate, out);
+        T::axpy(slopes[1], rate0, out);
+    };
+    cubic(&newer.u, &older.u, &newer.v, &older.v, &mut out.u);
+    cubic(&newer.v, &older.v, &newer.a, &older.a, &mut out.v);
+    out.a.copy_from_slice(&newer.a);
+    T::axpy_difference(T::of(s), &older.a, &newer.a, &mut out.a);
+}
+
+/// p of ψ = v + p h a + O(h²), the momentum functional of a scheme in smooth motion.
+fn lead(psi: &[[f64; 3]]) -> f64 {
+    let terms = psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k)));
+    terms.map(|(psi, k)| 0.5 * k * k * psi[0] - k * psi[1] + psi[2]).sum()
+}
+
+/// The change of ψ by a shift of the past displacements by −k h, and by a unit shift of the past velocities.
+fn shifted(psi: &[[f64; 3]]) -> [f64; 2] {
+    let older = || psi.iter().zip(0_u32..).map(|(psi, k)| (psi, f64::from(k))).skip(1);
+    [older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum()]
+}
+
+/// A ψ that reads only accelerations of the past (Adams formulas) needs no shift: these enter with h a.
+fn reads_accelerations_alone(psi: &[[f64; 3]]) -> bool {
+    shifted(psi).into_iter().all(|by| by.abs() < 1e-6)
+}
+
+/// Shifts the resampled past so that the scheme's momentum is that before the change.
+///
+/// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h makes it p (h' − h) a more.
+/// Interpolation errs in ψ by O(h²) at every change. Without this shift, changes at every step would reduce the order
+/// to 1.
+fn conserve_momentum<T: Real>(
+    scheme: &Scheme<'_>,
+    state: &State<T>,
+    history: &History<T>,
+    h: f64,
+    past: &mut [Motion<T>],
+) {
+    let Some(psi) = scheme.derived.covectors.get(past.len()) else { return };
+    let p = lead(psi);
+    let [by_u, by_v] = shifted(psi);
+    if reads_accelerations_alone(psi) {
+        return;
+    }
+    let newest = &state.motion;
+    let mut miss = scheme.momentum(newest, &history.slots[1..history.known], history.clock.h);
+    T::axpy(T::of(p * (h - history.clock.h)), &newest.a, &mut miss);
+    T::axpy(-T::one(), &scheme.momentum(newest, past, h), &mut miss);
+    for (k, motion) in (1_u32..).zip(past) {
+        if by_u.abs() >= by_v.abs() {
+            T::axpy(T::of(-f64::from(k) * h / by_u), &miss, &mut motion.u);
+        } else {
+            T::axpy(T::of(by_v.recip()), &miss, &mut motion.v);
+        }
+    }
+}
+
+/// Projects gap, gap rate and gap acceleration of a past state to zero on the closed rows.
+fn project<T: Real>(
+    motion: &mut Motion<T>,
+    constraints: &mut Constraints<'_, T>,
+    g: &ContactJacobian<T>,
+    projection: &mut JumpProjection<T>,
+    closed: &[usize],
+) -> Result<()> {
+    let mut gaps = vec![T::zero(); constraints.len()];
+    let mut rates = vec![GapRates::default(); constraints.len()];
+    let mut multipliers = vec![T::zero(); closed.len()];
+    constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
+    let targets: Vec<T> = closed.iter().map(|&row| g.product(row, &motion.u) - gaps[row]).collect();
+    projection.remove_jump(g, &targets, &mut motion.u, &mut multipliers)?;
+    constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
+    let targets: Vec<T> = closed.iter().map(|&row| -rates[row].rate).collect();
+    projection.remove_jump(g, &targets, &mut motion.v, &mut multipliers)?;
+    let targets: Vec<T> = closed.iter().map(|&row| -rates[row].acceleration).collect();
+    projection.remove_jump(g, &targets, &mut motion.a, &mut multipliers)
+}
