@@ -529,7 +529,9 @@ impl<T: Real> Correction<'_, T> {
         for group in (0..groups.len()).map(|group| groups.group(group)) {
             let largest = group.iter().fold(T::zero(), |largest, &position| rest[position].abs().max(largest));
             if largest == T::zero() {
-                group.iter().for_each(|&position| moved[position] = T::one());
+                for &position in group {
+                    moved[position] = T::one();
+                }
                 continue;
             }
             let [mut inertia, mut resistance] = [T::zero(); 2];
