@@ -1,14 +1,14 @@
 //! Contact problems with friction from files, or piles of rigid boxes: what a solver makes of them, a line each.
 //!
 //! `cargo run --release --example friction_problems -- FILE...` prints a table and writes it; without files one of
-//! piles in space and in the plane, with `--quick` of low ones. `--solver active-set` (the default), `gauss-seidel` or
-//! `lemke`.
+//! piles in space and in the plane, with `--quick` of low ones. `--solver active-set` (the default) or
+//! `gauss-seidel`.
 //!
 //! A file is text: `dimension contacts`; a line of friction coefficients, one a contact; a line of q; the number of
 //! entries of W; a line `row column value` for each of these. Rows and columns count from 0, a contact has its normal
 //! row first.
 
-use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel, Lemke};
+use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
 use contact_dynamics::faer::MatRef;
 use contact_dynamics_scenes::boxes;
 use contact_dynamics_scenes::output::Output;
@@ -20,7 +20,7 @@ use std::str::{FromStr, SplitWhitespace};
 use std::time::Instant;
 
 const USAGE: &str =
-    "usage: friction_problems [--solver active-set|gauss-seidel|lemke] [--quick] [--output DIR] [FILE...]";
+    "usage: friction_problems [--solver active-set|gauss-seidel] [--quick] [--output DIR] [FILE...]";
 
 /// Singular values below this share of the largest count as zero, with rows and columns of W divided by √W_ii.
 const RANK_TOLERANCE: f64 = 1e-10;
@@ -39,7 +39,6 @@ fn solver(name: &str) -> Option<Box<dyn ContactSolver<f64>>> {
     match name {
         "active-set" => Some(Box::new(ActiveSet::default())),
         "gauss-seidel" => Some(Box::new(GaussSeidel::default())),
-        "lemke" => Some(Box::new(Lemke::default())),
         _ => None,
     }
 }

@@ -1,7 +1,6 @@
 //! Contact solvers, on their own and in runs whose rows contradict each other.
 
 mod friction;
-mod lemke;
 mod many_rows;
 mod solvers;
 mod squeezes;

@@ -7,7 +7,7 @@ use crate::combinations::Correction;
 use crate::schemes;
 use crate::sparse::{element, matrix};
 use contact_dynamics::contact::{ContactLaw, GapOffset};
-use contact_dynamics::contact_solver::{ContactSolver, GaussSeidel, Lemke, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{ContactSolver, GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::{
     ByBody, Cholesky, ConjugateGradients, LinearRows, LinearSolver, LinearSystem, Lu, Newton, Real, Result, Simulation,
     SimulationBuilder, StepControl, System, Tridiagonal,
@@ -46,7 +46,6 @@ impl Recipe {
         let solver: Option<Box<dyn ContactSolver<T>>> = match self.contact_solver {
             Contacting::Default => None,
             Contacting::Pivoting => Some(Box::new(Pivoting::default())),
-            Contacting::Lemke => Some(Box::new(Lemke::default())),
             Contacting::GaussSeidel => Some(Box::new(GaussSeidel::default())),
             Contacting::ProjectedGradient => Some(Box::new(ProjectedGradient::default())),
         };

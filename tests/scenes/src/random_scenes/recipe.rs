@@ -151,7 +151,6 @@ pub struct Row {
 pub enum Contacting {
     Default,
     Pivoting,
-    Lemke,
     GaussSeidel,
     ProjectedGradient,
 }
