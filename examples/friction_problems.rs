@@ -19,8 +19,7 @@ use std::path::Path;
 use std::str::{FromStr, SplitWhitespace};
 use std::time::Instant;
 
-const USAGE: &str =
-    "usage: friction_problems [--solver active-set|gauss-seidel] [--quick] [--output DIR] [FILE...]";
+const USAGE: &str = "usage: friction_problems [--solver active-set|gauss-seidel] [--quick] [--output DIR] [FILE...]";
 
 /// Singular values below this share of the largest count as zero, with rows and columns of W divided by √W_ii.
 const RANK_TOLERANCE: f64 = 1e-10;

@@ -287,11 +287,8 @@ type Solver = fn() -> Box<dyn ContactSolver<f64>>;
 
 #[test]
 fn motion_that_dies_out_leaves_nothing_to_be_solved() {
-    let solvers: [Solver; 3] = [
-        || Box::new(ActiveSet::default()),
-        || Box::new(Pivoting::default()),
-        || Box::new(GaussSeidel::default()),
-    ];
+    let solvers: [Solver; 3] =
+        [|| Box::new(ActiveSet::default()), || Box::new(Pivoting::default()), || Box::new(GaussSeidel::default())];
     let schemes: [fn() -> Box<dyn TimeIntegrator>; 3] =
         [|| Box::new(Newmark::trapezoidal()), || Box::new(Bathe::default()), || Box::new(Bdf2)];
     for solver in solvers {
