@@ -1,4 +1,4 @@
-//! Correctors: what must be mended so that velocity and acceleration agree with the contact.
+//! Correctors: changes of velocity and acceleration after a contact solve that make them agree with the contact.
 
 mod buffers;
 mod contact_implicit;
@@ -60,7 +60,7 @@ use crate::tableau::Tableau;
 /// # let _ = correctors;
 /// ```
 pub trait Corrector<T: Real>: std::fmt::Debug + Send {
-    /// Name with options, as a table shows it.
+    /// Name with options, as printed in tables.
     fn name(&self) -> String;
 
     /// Whether [`correct`](Self::correct) edits past states; only then is a copy kept to undo a failed step.
@@ -68,7 +68,7 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Edits::NewState
     }
 
-    /// Whether it can act with a scheme, or why not; asked once, at build. Default: it can.
+    /// Checks once, at build, whether the corrector works with a scheme. Default: it does.
     ///
     /// # Errors
     ///
@@ -78,8 +78,7 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
-    /// Whether it can act with a scheme where bodies have damping, or why not; asked once, at build, of such systems.
-    /// Default: it can.
+    /// Checks once, at build, whether the corrector works with a scheme if bodies have damping. Default: it does.
     ///
     /// # Errors
     ///
@@ -89,8 +88,8 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
-    /// Whether it can act where contacts have friction, or why not; asked once, at build. Default: it cannot. (What is
-    /// made of [`Correction::solve_velocity_jumps`] and the other three of these methods can.)
+    /// Checks once, at build, whether the corrector works if contacts have friction. Default: it does not. Correctors
+    /// built from [`Correction::solve_velocity_jumps`] and the three matching methods can return `Ok`.
     ///
     /// # Errors
     ///
@@ -99,8 +98,9 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none")
     }
 
-    /// Whether it can act on contacts under [`ContactLaw::PersistencySwitch`](crate::contact::ContactLaw), which hold
-    /// the rate of a gap once that is closed, or why not; asked once, at build. Default: it can.
+    /// Checks once, at build, whether the corrector works with
+    /// [`ContactLaw::PersistencySwitch`](crate::contact::ContactLaw), which constrains the gap rate once the gap is
+    /// closed. Default: it does.
     ///
     /// # Errors
     ///
@@ -109,8 +109,8 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Ok(())
     }
 
-    /// Whether contacts leave with the share of their approach that [`ContactLaw::Restitution`] asks for, by a scheme
-    /// that imposes contact on the displacements of the state, or why not; asked once, at build. Default: they do not.
+    /// Checks once, at build, whether contacts under [`ContactLaw::Restitution`] rebound with the required share of
+    /// their approach rate, in a scheme that imposes contact on the displacements of the state. Default: they do not.
     ///
     /// [`ContactLaw::Restitution`]: crate::contact::ContactLaw::Restitution
     ///
@@ -122,27 +122,27 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
         Err("the correction knows nothing of restitution: choose `PersistencyCorrection::with_history_projection`")
     }
 
-    /// Whether it takes the forces of closed contacts out of the accelerations, and leaves those of the smooth motion.
-    /// Those of the start are without them then, and friction holds the way made in a stage, not its velocity, which
-    /// the correction changes. Default: the forces stay.
+    /// Whether the corrector removes the forces of closed contacts from the accelerations, so that only the smooth
+    /// motion remains. The accelerations at the start then contain no contact forces, and friction constrains the
+    /// slip of a stage, not its velocity, because the correction changes that. Default: the forces stay.
     fn leaves_smooth_motion(&self) -> bool {
         false
     }
 
-    /// Whether it corrects contacts on dofs without mass, and these alone; they leave no jumps. It is then called for
-    /// every step in which one of them closes or opens, also where a scheme imposes other contacts on velocities.
-    /// Default: it does not.
+    /// Whether the corrector acts on contacts on dofs without mass, and only on these; such contacts leave no jumps.
+    /// It is then called for every step in which one of them closes or opens, even if the scheme imposes other
+    /// contacts on velocities. Default: it does not.
     fn corrects_massless(&self) -> bool {
         false
     }
 
-    /// Whether [`predict`](Self::predict) does anything; memory for it is reserved only then.
+    /// Whether [`predict`](Self::predict) does anything; its memory is reserved only then.
     fn predicts(&self) -> bool {
         false
     }
 
-    /// Acts before a stage is solved, on what the scheme predicts. Called for every stage of a run with contacts, if
-    /// [`predicts`](Self::predicts) says so. Default: nothing.
+    /// Acts on the prediction of the scheme before a stage is solved. Called for every stage of a run with contacts
+    /// if [`predicts`](Self::predicts) is true. Default: does nothing.
     ///
     /// # Errors
     ///
@@ -161,7 +161,7 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()>;
 }
 
-/// What a corrector changes.
+/// Which states a corrector changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Edits {

@@ -9,7 +9,7 @@ use crate::contact_solver::{AdmissibleSet, FORESEEN};
 use crate::real::Real;
 use crate::state::ContactState;
 
-/// Buffers of the corrections, one entry a closed row unless said otherwise; reserved at build.
+/// Buffers of the corrections, one entry per closed row unless noted; reserved at build.
 #[derive(Debug)]
 pub(crate) struct Buffers<T> {
     /// Closed rows.
@@ -18,38 +18,39 @@ pub(crate) struct Buffers<T> {
     pub(super) engaged: Vec<usize>,
     /// Rows that have opened in this stage.
     pub(crate) opened: Vec<usize>,
-    /// Rows that were closed in this step or at its start, and are open now.
+    /// Rows that were closed in this step or at its start and are open now.
     pub(crate) released: Vec<usize>,
-    /// Reported forces before this stage, and λ_a beside them, one a candidate.
+    /// Reported forces and λ_a before this stage, one entry per candidate.
     pub(crate) reported: Vec<T>,
     pub(super) struck: Vec<T>,
-    /// The contact problem of the jumps of one kind: what multipliers may be, jumps, and what of them is rounding.
+    /// The contact problem of the jumps of one kind: admissible sets of the multipliers, jumps, and their rounding
+    /// errors.
     pub(super) sets: Vec<AdmissibleSet>,
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
-    /// Jumps of the past by the rows that hold now, and what removes these.
+    /// Jumps of the past measured with the current rows, and the multipliers that remove them.
     pub(super) straight: Vec<T>,
     pub(super) by_straight: Vec<T>,
-    /// Impulses that remove the velocity jumps, one a closed row.
+    /// Impulses that remove the velocity jumps, one per closed row.
     pub(super) impulses: Vec<T>,
-    /// Forces that remove the acceleration jumps, one an engaged row.
+    /// Forces that remove the acceleration jumps, one per engaged row.
     pub(super) forces: Vec<T>,
-    /// The same of a group of rows.
+    /// Memory for the problem of one group of rows.
     pub(super) group: Box<GroupProblem<T>>,
     /// S = G M⁻¹ Gᵀ of some rows.
     pub(super) s: Vec<T>,
-    /// Contacts with friction among the others.
+    /// The problem with contacts that have friction.
     pub(super) rubbing: Box<Rubbing<T>>,
-    /// Contacts that leave with a share of their approach.
+    /// Contacts that rebound with a share of their approach rate.
     pub(super) rebounds: Box<Rebounds<T>>,
-    /// Rates of slips, one a tangential row.
+    /// Slip rates, one per tangential row.
     pub(super) slips: Vec<GapRates<T>>,
     pub(super) past_slips: Vec<GapRates<T>>,
-    /// Rates and gaps as the constraints give them, one a candidate.
+    /// Gap rates and gaps from the constraints, one per candidate.
     pub(super) rates: Vec<GapRates<T>>,
     pub(super) gaps: Vec<T>,
-    /// Change of v by a correction, the change of damping force that it makes, and the force before it where damping is
-    /// not linear; one a dof, empty without damping.
+    /// Change of v by a correction, the resulting change of the damping force, and the force before it for nonlinear
+    /// damping; one entry per dof, empty without damping.
     pub(super) change: Vec<T>,
     pub(super) damping: Vec<T>,
     pub(super) before: Vec<T>,
@@ -57,17 +58,17 @@ pub(crate) struct Buffers<T> {
     pub(crate) damps_massless: bool,
     /// Contacts on dofs without mass that close or open.
     pub(crate) switching: Box<Switching<T>>,
-    /// Contacts that get energy together.
+    /// Contacts that receive energy together.
     pub(super) given: Box<Given<T>>,
 }
 
-/// Rows that get energy together, and the impulses that give it.
+/// Rows that receive energy together, and the impulses that provide it.
 #[derive(Debug, Default)]
 pub(super) struct Given<T> {
     pub(super) rows: Vec<usize>,
     pub(super) energies: Vec<T>,
     pub(super) impulses: Vec<T>,
-    /// Those of a group that S couples.
+    /// Positions of the rows of one group that S couples.
     pub(super) group: Vec<usize>,
 }
 
@@ -81,7 +82,7 @@ impl<T: Real> Given<T> {
         }
     }
 
-    /// Forgets all rows.
+    /// Removes all rows.
     pub(super) fn clear(&mut self) {
         self.rows.clear();
         self.energies.clear();
@@ -90,8 +91,8 @@ impl<T: Real> Given<T> {
 }
 
 impl<T: Real> Buffers<T> {
-    /// Room for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), and for those of
-    /// `switching` dofs by contacts without mass, if these are corrected.
+    /// Reserves memory for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), and, if
+    /// contacts without mass are corrected, for velocity changes of `switching` dofs.
     pub(crate) fn new(rows: usize, damped: usize, switching: Option<usize>) -> Self {
         let reals = |n| Vec::with_capacity(n);
         let mut given = Given { rows: Vec::new(), energies: Vec::new(), impulses: Vec::new(), group: Vec::new() };
@@ -127,7 +128,7 @@ impl<T: Real> Buffers<T> {
         }
     }
 
-    /// Room for so many contacts.
+    /// Reserves memory for this many contacts.
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.rates.resize(rows, GapRates::default());
         self.gaps.resize(rows, T::zero());
@@ -158,13 +159,13 @@ impl<T: Real> Buffers<T> {
         sets.reserve(rows.saturating_sub(sets.len()));
     }
 
-    /// Notes the contacts before a stage, the first of its step or another one.
+    /// Stores the contacts before a stage; `first` marks the first stage of a step.
     pub(crate) fn begin(&mut self, contacts: &ContactState<T>, first: bool) {
         self.report(contacts, first);
         self.switching.begin(contacts, first);
     }
 
-    /// Notes the forces reported before a stage; within a step contacts that have opened keep their last one.
+    /// Stores the reported forces before a stage; contacts that open within a step keep their last force.
     fn report(&mut self, contacts: &ContactState<T>, first: bool) {
         if first {
             self.reported.clone_from(&contacts.lambda);
@@ -185,7 +186,7 @@ impl<T: Real> Buffers<T> {
         !self.closed.is_empty() || !self.opened.is_empty() || !self.released.is_empty()
     }
 
-    /// Whether damping carries corrections of v to the accelerations of all dofs.
+    /// Whether damping carries velocity corrections to the accelerations of all dofs.
     pub(crate) fn spreads(&self) -> bool {
         !self.change.is_empty()
     }

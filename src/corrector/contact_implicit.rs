@@ -1,12 +1,12 @@
-//! Contact forces that act fully implicitly, and the stabilized prediction that goes with them.
+//! Fully implicit contact forces, and the stabilized prediction that goes with them.
 
 use super::{Correction, Corrector, Extent, Prediction};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::{Rows, Tableau};
 
-/// The contact-implicit form of a one-step scheme (Kane, Repetto, Ortiz, Marsden, Comput. Methods Appl. Mech. Eng. 180,
-/// 1999): forces of contact act as one impulse at the end of the step and leave no trace in the acceleration.
+/// The contact-implicit form of a one-step scheme (Kane, Repetto, Ortiz, Marsden, Comput. Methods Appl. Mech. Eng.
+/// 180, 1999): contact forces act as one impulse at the end of the step and do not remain in the acceleration.
 ///
 /// With Newmark's rows, internal accelerations a_i and the contact's a_c = M⁻¹ Gᵀ λ_K:
 ///
@@ -14,13 +14,14 @@ use crate::tableau::{Rows, Tableau};
 /// u' = u + h v + h² ((½ − β) a_i + β a_i') + ½ h² a_c'      v' = v + h ((1 − γ) a_i + γ a_i') + h a_c'
 /// ```
 ///
-/// which is the step of the scheme itself with λ_K = 2 β λ, a ← a − M⁻¹ Gᵀ λ and v ← v + h (2β − γ) M⁻¹ Gᵀ λ: nothing
-/// else is solved. Any one-step scheme of one stage takes it, with its own response in place of 1, γ, β.
+/// which is the step of the scheme itself with λ_K = 2 β λ, a ← a − M⁻¹ Gᵀ λ and v ← v + h (2β − γ) M⁻¹ Gᵀ λ: no
+/// further problem is solved. It works with any one-step scheme of one stage, with its own response in place of 1, γ,
+/// β.
 ///
-/// Linear momentum is conserved. For β = ¼, γ = ½ the energy never rises. With damping it needs γ = 2β, where v is left
-/// as it is; otherwise building a simulation is refused, for the impulse that v gets has not been felt by the damping
-/// of the step. Known failure: contact force and velocity of the contact nodes oscillate, and the gap rate does not
-/// vanish in persistent contact; [`ContactStabilized`] mends the first.
+/// Linear momentum is conserved. For β = ¼, γ = ½ the energy never rises. With damping it needs γ = 2β, because then
+/// v is not changed; otherwise the build fails, because the damping of the step has not acted on the impulse added to
+/// v. Known failure: contact force and velocity of the contact nodes oscillate, and the gap rate does not vanish in
+/// persistent contact; [`ContactStabilized`] removes the force oscillation.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -52,18 +53,18 @@ impl<T: Real> Corrector<T> for ContactImplicit {
     }
 }
 
-/// The contact-stabilized scheme (Deuflhard, Krause, Ertel, Int. J. Numer. Methods Eng. 73, 2008): [`ContactImplicit`],
-/// and the displacements u + h v that a step starts from are first moved to the nearest admissible ones in the norm of
-/// the mass.
+/// The contact-stabilized scheme (Deuflhard, Krause, Ertel, Int. J. Numer. Methods Eng. 73, 2008):
+/// [`ContactImplicit`] with the predicted displacements u + h v first moved to the nearest admissible ones in the
+/// mass norm.
 ///
-/// The contact forces are then free of the spurious oscillation. [`improved`](Self::improved) moves them on contacts
-/// that were closed before only (Klapproth, Schiela, Deuflhard, SIAM J. Numer. Anal. 49, 2011), so that bodies may
-/// approach within a step as they do without contact.
+/// The contact forces then have no spurious oscillation. [`improved`](Self::improved) moves the prediction only on
+/// contacts that were already closed (Klapproth, Schiela, Deuflhard, SIAM J. Numer. Anal. 49, 2011), so that bodies
+/// may approach within a step as they do without contact.
 ///
-/// Linear momentum is conserved, and the energy never rises (β = ¼, γ = ½). Known failures: an impact loses the energy
-/// of the contact nodes' mass, as a plastic one; their velocity keeps the value that the stopped approach has left in
-/// it, because displacements alone are moved. Damping would act on that velocity for as long as contact lasts, so that
-/// building a simulation of bodies with damping is refused. Costs a contact problem in the norm of the mass a step.
+/// Linear momentum is conserved, and the energy never rises (β = ¼, γ = ½). Known failures: an impact loses the
+/// kinetic energy of the contact nodes, like a plastic one; their velocity keeps the value of the stopped approach,
+/// because only displacements are moved. Damping would act on that velocity as long as contact lasts, so the build
+/// fails for bodies with damping. Cost: one contact problem in the mass norm per step.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -81,7 +82,7 @@ impl ContactStabilized {
         Self { extent: Extent::All }
     }
 
-    /// Moves it on contacts that were closed before.
+    /// Moves the prediction on contacts that were already closed.
     pub const fn improved() -> Self {
         Self { extent: Extent::Closed }
     }
@@ -121,7 +122,7 @@ impl<T: Real> Corrector<T> for ContactStabilized {
     }
 }
 
-/// Refuses schemes that read a past before the last state, or go through intermediate ones: there the force of a step
+/// Rejects schemes that read states before the last one or have intermediate stages: in these the force of a step
 /// leaves more than an acceleration behind.
 pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static str> {
     match tableau.depth() == 1 && tableau.stages.len() == 1 {
@@ -130,7 +131,7 @@ pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static st
     }
 }
 
-/// Refuses schemes by which a constant force of contact, taken out of the acceleration, leaves v to be changed.
+/// Rejects schemes in which removing a constant contact force from the acceleration requires a change of v.
 pub(super) fn adds_no_velocity(tableau: &Tableau) -> std::result::Result<(), &'static str> {
     let moves = |row: fn(&Rows) -> f64| tableau.stages.iter().map(|stage| row(&stage.recovery)).sum::<f64>();
     match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < 1e-12 {
@@ -140,9 +141,9 @@ pub(super) fn adds_no_velocity(tableau: &Tableau) -> std::result::Result<(), &'s
     }
 }
 
-/// Takes the contact forces of closed rows out of the accelerations and makes them act as one impulse, fully in this
-/// step: a ← a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the
-/// scheme's (u, h v, h² a) to a multiplier.
+/// Removes the contact forces of closed rows from the accelerations and applies them as one impulse in this step: a ←
+/// a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
+/// (u, h v, h² a) to a multiplier.
 fn act_implicitly<T: Real>(step: &mut Correction<'_, T>) -> Result<()> {
     let rows = std::mem::take(&mut step.buffers.closed);
     let mut impulses = std::mem::take(&mut step.buffers.impulses);

@@ -1,5 +1,5 @@
-//! What a corrector works with: the jumps of a stage, the projection that removes them, pushes along rows, and the
-//! books on impulse and energy. What serves one corrector only is in the file of that corrector.
+//! What a corrector works with: the jumps of a stage, the projection that removes them, impulses and forces along
+//! rows, and their bookkeeping. Code that serves a single corrector is in the file of that corrector.
 
 mod energy;
 mod friction;
@@ -18,21 +18,21 @@ use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Linearity, System};
 pub(super) use restitution::Rebounds;
 
-/// One stage, after its contact problem, in the hands of a [`Corrector`](super::Corrector).
+/// One stage after its contact problem, passed to a [`Corrector`](super::Corrector).
 ///
-/// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* are the closed rows that are pressed (raw
-/// multiplier positive, or equality rows) and those that touch and approach; a row that touches and separates is left
-/// alone. Every push along a row is booked as an impulse of its contact, so that Σ h β p + Σ J is the change of
-/// momentum to rounding.
+/// Jumps are solved first (`solve_…`), then applied (`push_…`). *Engaged* rows are the closed rows that are pressed
+/// (raw multiplier positive, or equality rows) and the rows that touch and approach; a row that touches and separates
+/// is left alone. Every push along a row is booked as an impulse of its contact, so that Σ h β p + Σ J is the change
+/// of momentum to rounding.
 ///
-/// A corrector of a host has what those of this crate have: rows ([`closed`](Self::closed),
+/// A user's corrector has the same access as the built-in ones: rows ([`closed`](Self::closed),
 /// [`engaged`](Self::engaged), [`opened`](Self::opened), [`released`](Self::released)), forces
 /// ([`ContactState::raw_forces`] by [`contacts`](Self::contacts), [`previous_force`](Self::previous_force)), gaps and
-/// rates ([`starting_gaps`](Self::starting_gaps), [`rate`](Self::rate)), the numbers of the scheme
-/// ([`response`](Self::response), [`force_share`](Self::force_share), [`momentum_weights`](Self::momentum_weights)) and
-/// of the bodies ([`compliance`](Self::compliance), [`compliances`](Self::compliances)), and pushes of v
+/// rates ([`starting_gaps`](Self::starting_gaps), [`rate`](Self::rate)), coefficients of the scheme
+/// ([`response`](Self::response), [`force_share`](Self::force_share), [`momentum_weights`](Self::momentum_weights))
+/// and of the bodies ([`compliance`](Self::compliance), [`compliances`](Self::compliances)), and changes of v
 /// ([`apply_impulses`](Self::apply_impulses), [`exchange_energy`](Self::exchange_energy)), of a
-/// ([`apply_forces`](Self::apply_forces), [`report_force`](Self::report_force)) and of the past
+/// ([`apply_forces`](Self::apply_forces), [`report_force`](Self::report_force)) and of past states
 /// ([`move_past`](Self::move_past), [`project_past`](Self::project_past)).
 ///
 /// ```
@@ -69,7 +69,7 @@ pub struct Correction<'a, T: Real> {
     pub(crate) projection: &'a mut JumpProjection<T>,
     /// The factorized effective matrix of the stage.
     pub(crate) operator: &'a mut Operator<T>,
-    /// Of dofs without mass that follow statically.
+    /// The block of dofs without mass that follow statically.
     pub(crate) block: Option<&'a mut MasslessBlock<T>>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
     pub(crate) system: Erased<'a, T>,
@@ -82,17 +82,17 @@ pub struct Correction<'a, T: Real> {
     pub(crate) was_closed: &'a [bool],
     /// Closed flags at the start of the step.
     pub(crate) closed_at_start: &'a [bool],
-    /// Contacts that friction held before this stage; empty without friction.
+    /// Contacts that stuck before this stage; empty without friction.
     pub(crate) was_sticking: &'a [bool],
     pub(crate) massless: &'a [usize],
     pub(crate) prescribed: &'a [usize],
     pub(crate) buffers: &'a mut Buffers<T>,
-    /// Change of kinetic energy by corrections of velocity, without those of contacts that close in this step: they are
-    /// part of the impact.
+    /// Change of kinetic energy by velocity corrections, without the corrections of contacts that close in this step:
+    /// these are part of the impact.
     pub(crate) energy: &'a mut T,
 }
 
-/// The numbers of the scheme that a correction needs.
+/// The coefficients of the scheme that a correction needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scheme<'a> {
     /// Change of (u, h v, h² a) by a unit multiplier on a unit mass, in units of h².
@@ -103,21 +103,21 @@ pub(crate) struct Scheme<'a> {
     pub(crate) balance: f64,
     /// Momentum covector over the past after this stage.
     pub(crate) covector: &'a [[f64; 3]],
-    /// Which entries of the past later rows read.
+    /// Which entries of past states later rows read.
     pub(crate) read: &'a [[bool; 3]],
     /// Whether the next stage starts from a.
     pub(crate) reads_acceleration: bool,
-    /// Whether the balance holds at the state, and u follows from velocities alone.
+    /// Whether the balance holds at the state and u follows from velocities alone.
     pub(crate) keeps_balance: bool,
     /// This stage, from 0, and the number of stages of a step.
     pub(crate) stage: usize,
     pub(crate) stages: usize,
-    /// The length of this stage, a fraction of the step.
+    /// The length of this stage as a fraction of the step.
     pub(crate) length: f64,
 }
 
 impl Scheme<'_> {
-    /// Whether the state of the stage is that of the step.
+    /// Whether the state of the stage is also the state of the step.
     fn is_last(&self) -> bool {
         self.stage + 1 == self.stages
     }
@@ -131,7 +131,7 @@ enum Jump {
 }
 
 impl Jump {
-    /// The rates of the dofs that it is made of, and what the gap of a row adds of its own.
+    /// The rates of the dofs in the jump, and the rate or acceleration that the gap function itself adds.
     fn terms<'m, T: Real>(self, motion: &'m Motion<T>, gap: &GapRates<T>) -> (&'m [T], T) {
         match self {
             Self::Velocity => (&motion.v, gap.rate),
@@ -140,12 +140,12 @@ impl Jump {
     }
 }
 
-/// What pressed contacts may do with the velocities that they are given.
+/// Whether pressed contacts may separate under the computed velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
-    /// Nothing: their jumps vanish both ways.
+    /// They stay closed: their jumps vanish in both directions.
     Stays,
-    /// They may part, as those do that touch.
+    /// They may separate, as touching contacts do.
     MayPart,
 }
 
@@ -159,7 +159,7 @@ impl<T: Real> std::fmt::Debug for Erased<'_, T> {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Lets those correctors act for which there is something: jumps, or contacts without mass that close or open.
+    /// Calls each corrector that has something to correct: jumps, or contacts without mass that close or open.
     pub(crate) fn correct(&mut self, correctors: &[Box<dyn Corrector<T> + '_>]) -> Result<()> {
         let [jumps, switches] = [self.buffers.has_jumps(), self.buffers.switching.is_pending()];
         for corrector in correctors {
@@ -171,14 +171,14 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Whether a row is pressed: its jumps vanish both ways.
+    /// Whether a row is pressed: its jumps vanish in both directions.
     fn is_pressed(&self, row: usize) -> bool {
         self.contacts.lambda_raw[row] > T::zero() || self.constraints.0.law(row).is_equality()
     }
 
-    /// Finds the impulses that make the gap rates of the closed rows vanish (pressed rows) or not negative (touching
-    /// rows), and the engaged rows. Rows that close under a law with restitution get the rates with which they leave,
-    /// and are not engaged then.
+    /// Finds the engaged rows and the impulses that make the gap rates of the closed rows vanish (pressed rows) or
+    /// nonnegative (touching rows). Rows that close under a law with restitution get their rebound rates and are then
+    /// not engaged.
     ///
     /// # Errors
     ///
@@ -205,10 +205,9 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// The jump that the scheme's rows make of a gap which is met only up to a few roundings: by so much rows that
-    /// depend on one another may contradict each other.
+    /// The jump caused by the rounding of a gap in the scheme. Dependent rows may contradict each other by this much.
     fn rounding_of_gap(&self, row: usize, jump: Jump) -> T {
-        /// Roundings of a gap that it may miss.
+        /// Tolerated error of a gap, in roundings.
         const ROUNDINGS: f64 = 32.0;
         let [by_u, by_v, by_a] = self.scheme.response;
         let per_gap = T::of(ROUNDINGS)
@@ -220,15 +219,15 @@ impl<T: Real> Correction<'_, T> {
         per_gap * self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row])
     }
 
-    /// A share of the rates that a jump is made of. Nodes that face each other, each of them on the facets of the
-    /// other, have rows that differ by the angle between these facets, and so do their rates: a square of it in S that
-    /// is below ε^⅔ counts as none ([`DenseCholesky`](crate::dense::DenseCholesky)).
+    /// A fraction ε^⅓ of the rates in a jump. If two nodes face each other and each lies on the facets of the other,
+    /// their rows and rates differ by the angle between these facets. S contains the square of this angle, and pivots
+    /// below ε^⅔ count as zero ([`DenseCholesky`](crate::dense::DenseCholesky)).
     fn share_of_rate(&self, row: usize, jump: Jump) -> T {
         let (values, own) = jump.terms(self.new, &self.buffers.rates[row]);
         T::epsilon().cbrt() * (self.g.magnitude(row, values) + own.abs())
     }
 
-    /// The multipliers of `rows` that remove a jump, under the bounds of the rows.
+    /// The multipliers of `rows` that remove a jump, within their admissible sets.
     fn solve_jumps(&mut self, rows: &[usize], jump: Jump, x: &mut Vec<T>) -> Result<()> {
         let mut sets = std::mem::take(&mut self.buffers.sets);
         sets.clear();
@@ -263,8 +262,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the change of damping
-    /// forces to a, as [`apply_impulses`](Self::apply_impulses) does.
+    /// Applies the impulses of [`solve_velocity_jumps`](Self::solve_velocity_jumps) to v, and the resulting change of
+    /// damping forces to a, as [`apply_impulses`](Self::apply_impulses) does.
     ///
     /// # Errors
     ///
@@ -288,9 +287,9 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies impulses to v along rows, v ← v + δv with δv = M⁻¹ Gᵀ impulses, and with damping the change of its
-    /// forces to a. They are booked as impulses of their contacts, and the energy they take, seen from the obstacle, as
-    /// dissipated by these.
+    /// Applies impulses to v along rows, v ← v + δv with δv = M⁻¹ Gᵀ impulses, and, with damping, the resulting
+    /// change of damping forces to a. The impulses are booked for their contacts; the energy that they take, relative
+    /// to the obstacle, is booked as dissipated by these contacts.
     ///
     /// ```text
     /// a ← a − M⁻¹ C δv               by schemes that read no a, and one-step ones whose balance holds at the state
@@ -298,28 +297,28 @@ impl<T: Real> Correction<'_, T> {
     /// a ← a − (w_ā/h²) A⁻¹ C δv      by all others, and in systems with damped dofs without mass: it holds to order h
     /// ```
     ///
-    /// A scheme that starts its next step from a lets it act for a part of that step. M⁻¹ C δv is the rate of change of
-    /// δv at this instant; with h C large beside M it changes v by many times δv, though the damping would have stopped
-    /// the bodies by then. The trapezoidal rule and Bathe's schemes take it back within that step, since their damping
-    /// answers to the mean velocity of the step, by which u moves. In other schemes u, or the balance, is moved by a
-    /// itself. (w_ā/h²) A⁻¹, with the stage's own matrix A, is M⁻¹ for small steps, and δv/h at most for large ones;
-    /// momentum is conserved as before. It costs a solve where v changes.
+    /// A scheme that starts its next step from a applies it over a part of that step. M⁻¹ C δv is the instantaneous
+    /// rate of change of δv; if h C is large compared with M, it changes v by many times δv, although damping would
+    /// have stopped the bodies by then. The trapezoidal rule and Bathe's schemes recover from this within the step,
+    /// because their damping acts on the mean velocity of the step, by which u moves. In other schemes a itself moves
+    /// u or enters the balance. (w_ā/h²) A⁻¹, with the matrix A of the stage, tends to M⁻¹ for small steps and gives
+    /// at most δv/h for large ones; momentum is conserved as before. This costs one solve whenever v changes.
     ///
     /// # Errors
     ///
-    /// [`Error::ContactNotFinite`] if a rate of the gaps is, and those of the linear solver, which direct ones do not
-    /// have.
+    /// [`Error::ContactNotFinite`] if a gap rate is not finite, and the errors of the linear solver; direct solvers
+    /// have none.
     pub fn apply_impulses(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         self.read_rates()?;
         self.apply(rows, impulses)
     }
 
-    /// Reads what the rates of the gaps have of their own.
+    /// Reads the gap rates that the constraints add.
     pub(super) fn read_rates(&mut self) -> Result<()> {
         self.constraints.0.rates(self.t, &self.new.u, &self.new.v, &mut self.buffers.rates)
     }
 
-    /// [`apply_impulses`](Self::apply_impulses) with the rates of the gaps read already.
+    /// [`apply_impulses`](Self::apply_impulses) if the gap rates have been read already.
     pub(super) fn apply(&mut self, rows: &[usize], impulses: &[T]) -> Result<()> {
         if impulses.iter().all(|&impulse| impulse == T::zero()) {
             return Ok(());
@@ -332,10 +331,10 @@ impl<T: Real> Correction<'_, T> {
         for (&row, &impulse) in rows.iter().zip(impulses.iter()) {
             contacts.impulse[row] += T::of(scheme.covector[0][1]) * impulse;
         }
-        // Change of kinetic energy: impulse times the mean of the bodies' own rates before and after, without the
-        // obstacle's.
+        // Change of kinetic energy: impulse times the mean rate of the bodies before and after, without the
+        // obstacle's rate.
         for ((&row, &impulse), &before) in rows.iter().zip(impulses.iter()).zip(jump.iter()) {
-            // (A state between stages drops out of the past: what its v loses is no loss of the step.)
+            // A state between stages is dropped from the past: its loss is no loss of the step.
             if !scheme.is_last() {
                 continue;
             }
@@ -344,8 +343,8 @@ impl<T: Real> Correction<'_, T> {
             if closed_at_start[contact] || !contacts.closed[contact] {
                 **energy += gain;
             }
-            // An obstacle that moves does work; what is lost is lost in its frame. (What friction takes is no energy of
-            // an impact.)
+            // A moving obstacle does work, so dissipation is measured in its frame. Friction work is not booked as
+            // impact energy.
             if !g.is_tangential(row) {
                 contacts.dissipated[row] -= gain + impulse * rates[row].rate;
             }
@@ -358,7 +357,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Adds to a what the damping forces make that a change of v has changed.
+    /// Adds to a the effect of the damping forces after a change of v.
     pub(super) fn damp_change(&mut self, change: &[T]) -> Result<()> {
         if self.buffers.change.is_empty() {
             return Ok(());
@@ -367,13 +366,13 @@ impl<T: Real> Correction<'_, T> {
         self.damp()
     }
 
-    /// [`damp_change`](Self::damp_change) of the change in the buffer for it, which is not kept.
+    /// [`damp_change`](Self::damp_change) with the change already in its buffer, which is overwritten.
     fn damp(&mut self) -> Result<()> {
         if self.evaluate_damping()? { self.accelerate_by_damping() } else { Ok(()) }
     }
 
-    /// Evaluates the damping forces that the velocities in the buffer for changes have, or have as a part of v, into
-    /// that for damping. Says whether there is damping.
+    /// Evaluates the change of the damping forces caused by the velocity change in `change`, into `damping`. Returns
+    /// whether there is damping.
     fn evaluate_damping(&mut self) -> Result<bool> {
         let Self { buffers, new, system, .. } = self;
         let Buffers { change, damping, before, .. } = &mut **buffers;
@@ -381,7 +380,7 @@ impl<T: Real> Correction<'_, T> {
         let Some(force) = system.0.damping_force() else { return Ok(false) };
         match linearity {
             Linearity::Linear => force.evaluate(&new.u, change, damping)?,
-            // Forces that are not linear in v are asked for twice.
+            // Forces that are nonlinear in v are evaluated twice.
             Linearity::Nonlinear => {
                 force.evaluate(&new.u, &new.v, damping)?;
                 for (change, &v) in change.iter_mut().zip(&new.v) {
@@ -394,17 +393,17 @@ impl<T: Real> Correction<'_, T> {
         Ok(true)
     }
 
-    /// Adds to a what the change of damping forces in `damping` makes.
+    /// Adds to a the effect of the force change in `damping`.
     fn accelerate_by_damping(&mut self) -> Result<()> {
         let Self { buffers, projection, operator, new, scheme, h, massless, prescribed, .. } = self;
         let Buffers { damping: change, damps_massless, .. } = &mut **buffers;
-        // (Not asked of this change: where it reaches them by rounding, or hardly, either answer must be the same.)
+        // The choice must not depend on the change itself: it may reach massless dofs by rounding only.
         if !*damps_massless && (scheme.keeps_balance || !scheme.reads_acceleration) {
             projection.apply_inverse(change)?;
             T::axpy(-T::one(), change, &mut new.a);
             return Ok(());
         }
-        // Dofs without mass respond too, so that internal damping keeps its momentum, but have no acceleration.
+        // Dofs without mass respond too, so that internal damping conserves momentum, but they have no acceleration.
         for &dof in *prescribed {
             change[dof] = T::zero();
         }
@@ -416,7 +415,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or not negative
+    /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or nonnegative
     /// (touching rows).
     ///
     /// # Errors
@@ -437,15 +436,15 @@ impl<T: Real> Correction<'_, T> {
     /// Applies the forces of [`solve_acceleration_jumps`](Self::solve_acceleration_jumps) to a and to the reported
     /// contact force.
     ///
-    /// Where bodies have damping and steps start from a, the forces take back what raw multipliers have given, and the
-    /// rest y of them is reduced to min(1, s/d)² y, with one factor for all rows that S couples: s = yᵀ S y is the power
-    /// of inertia, d that of the damping force of the velocity that y makes in a step. A step that resolves the damping
-    /// keeps all of y. In a longer step y would act for a part of the next step although it belongs to velocities that
-    /// are gone by then (theory, section 7.1).
+    /// If bodies have damping and steps start from a, the forces first cancel the contribution of the raw
+    /// multipliers. The remainder y is reduced to min(1, s/d)² y, with one factor for all rows that S couples: s = yᵀ
+    /// S y is the power of inertia, d the power of the damping force due to the velocity that y produces in a step. A
+    /// step that resolves the damping keeps all of y. In a longer step y would act during a part of the next step
+    /// although the velocities that it belongs to have decayed by then (theory, section 7.1).
     ///
     /// # Errors
     ///
-    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    /// The errors of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
     pub fn push_acceleration(&mut self) -> Result<()> {
         if self.rubs() {
             return self.push_rubbing_acceleration();
@@ -457,8 +456,8 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// [`push_forces`](Self::push_forces) of what [`limit_forces`](Self::limit_forces) leaves of the forces of the
-    /// problem just solved.
+    /// Reduces the forces of the last problem with [`limit_forces`](Self::limit_forces) and applies them with
+    /// [`push_forces`](Self::push_forces).
     fn push_limited_forces(&mut self, rows: &[usize], forces: &mut [T]) -> Result<()> {
         self.limit_forces(rows, forces, T::of(self.scheme.acceleration / self.scheme.balance))?;
         self.push_forces(rows, forces)
@@ -477,11 +476,12 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Reduces the forces that remove jumps of acceleration where the step does not resolve the damping; the part that
-    /// takes back `given` times the raw multipliers stays.
+    /// Reduces the forces that remove acceleration jumps if the step does not resolve the damping. The part that
+    /// cancels `given` times the raw multipliers is kept.
     ///
-    /// The groups of rows that S couples are judged together. Those that pass are set aside and the others judged again
-    /// without them: damping that a step resolves then reduces nothing, whatever groups it couples.
+    /// All groups of rows that S couples are tested together. Groups that pass are set aside and the others are
+    /// tested again without them, so that damping that the step resolves reduces no force, whichever groups it
+    /// couples.
     pub(super) fn limit_forces(&mut self, rows: &[usize], forces: &mut [T], given: T) -> Result<()> {
         if self.buffers.change.is_empty() || !self.scheme.reads_acceleration {
             return Ok(());
@@ -493,7 +493,7 @@ impl<T: Real> Correction<'_, T> {
             let raw = given * contacts.lambda_raw[row];
             force + if force < T::zero() { raw.max(T::zero()).min(-force) } else { raw.min(T::zero()).max(-force) }
         }));
-        // The change of velocity that goes with one of acceleration in a step.
+        // Change of velocity per change of acceleration in a step.
         let [_, by_v, by_a] = self.scheme.response;
         let time = T::of(self.h * by_v / by_a);
         while self.buffers.straight.iter().any(|&rest| rest != T::zero()) {
@@ -517,14 +517,15 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Sets the forces of those groups to zero whose inertia is not below the resistance of their damping, and says
-    /// whether there are any. The others get the quotient of both in place of the accelerations of their rows.
+    /// Sets the forces of the groups whose inertia is at least the resistance of their damping to zero, and returns
+    /// whether there are any. For the other groups, the accelerations of their rows are replaced by the ratio of
+    /// inertia to resistance.
     fn set_aside_resolved(&mut self, rows: &[usize]) -> Result<bool> {
         let Self { buffers, projection, g, new, h, .. } = self;
         let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
         projection.apply_inverse(damping)?;
         let mut found = false;
-        // (The groups are those of the problem that gave the forces.)
+        // The groups are those of the problem that gave the forces.
         let groups = projection.groups();
         for group in (0..groups.len()).map(|group| groups.group(group)) {
             let largest = group.iter().fold(T::zero(), |largest, &position| rest[position].abs().max(largest));
@@ -556,12 +557,12 @@ impl<T: Real> Correction<'_, T> {
         Ok(found)
     }
 
-    /// Applies forces to a along rows, a ← a + M⁻¹ Gᵀ forces, and books their impulses. Reported forces are left as
-    /// they are ([`report_force`](Self::report_force), [`force_share`](Self::force_share)).
+    /// Applies forces to a along rows, a ← a + M⁻¹ Gᵀ forces, and books their impulses. Reported forces are
+    /// unchanged; see [`report_force`](Self::report_force) and [`force_share`](Self::force_share).
     ///
     /// # Errors
     ///
-    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    /// The errors of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
     pub fn apply_forces(&mut self, rows: &[usize], forces: &[T]) -> Result<()> {
         let weight = T::of(self.momentum_weights()[2]);
         self.projection.push(self.g, (rows, forces), T::one(), &mut self.new.a)?;
@@ -571,21 +572,21 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Writes S = G M⁻¹ Gᵀ of some rows, entry (i, j) at i + j n for n rows: the change of the gap rate of the i-th by
-    /// a unit impulse along the j-th.
+    /// Writes S = G M⁻¹ Gᵀ of some rows, entry (i, j) at i + j n for n rows: the change of the gap rate of row i by a
+    /// unit impulse along row j.
     ///
     /// # Errors
     ///
-    /// Those of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
+    /// The errors of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
     pub fn compliances(&mut self, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
         self.projection.assemble(self.g, rows, s)
     }
 
-    /// Gaps of all rows where the stage starts; empty if nothing is known of the past.
+    /// Gaps of all rows at the start of the stage; empty if there are no past states.
     ///
     /// # Errors
     ///
-    /// What a constraint says of the start of the stage.
+    /// The errors of the constraints at the start of the stage.
     pub fn starting_gaps(&mut self) -> Result<&[T]> {
         let Self { buffers, constraints, past, new, .. } = self;
         let Some(start) = past.first() else { return Ok(&[]) };
@@ -610,7 +611,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::ContactNotFinite`] if a rate of the gaps is.
+    /// [`Error::ContactNotFinite`] if a gap rate is not finite.
     pub fn rate(&mut self, row: usize) -> Result<T> {
         self.read_rates()?;
         Ok(self.g.product(row, &self.new.v) + self.buffers.rates[row].rate)
@@ -622,7 +623,7 @@ impl<T: Real> Correction<'_, T> {
         self.projection.close_rows(self.g, rows, |row| no_response(t, ids[row]))
     }
 
-    /// Solves S x + jump for the multipliers x of `rows` of their sets.
+    /// Finds the multipliers x of `rows`, within their admissible sets, with S x + jump admissible.
     fn solve(&mut self, rows: &[usize], sets: &[AdmissibleSet], x: &mut [T]) -> Result<()> {
         if sets.iter().all(|&set| set == AdmissibleSet::Free) {
             self.close(rows)?;

@@ -1,4 +1,4 @@
-//! The contact problem of S = G M⁻¹ Gᵀ, a group of rows at a time: S couples no two of them.
+//! The contact problem of S = G M⁻¹ Gᵀ, solved separately for each group of rows coupled by S.
 
 use super::JumpProjection;
 use crate::contact::{ContactId, ContactJacobian};
@@ -17,7 +17,7 @@ pub(super) struct GroupProblem<T> {
     multipliers: Vec<T>,
 }
 
-/// Some rows, what their multipliers may be, and what multipliers must remove, with its rounding.
+/// Rows, the admissible sets of their multipliers, and the jumps to remove with their rounding errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jumps<'j, T> {
     pub(super) rows: &'j [usize],
@@ -27,7 +27,7 @@ pub(super) struct Jumps<'j, T> {
 }
 
 impl<T: Real> GroupProblem<T> {
-    /// Room for the groups of up to so many rows, as far as they are not rare.
+    /// Reserves memory for groups of up to `rows` rows, at most `FORESEEN`.
     pub(super) fn new(rows: usize) -> Self {
         let rows = rows.min(FORESEEN);
         let reals = |n| Vec::with_capacity(n);
@@ -36,8 +36,8 @@ impl<T: Real> GroupProblem<T> {
         Self { rows: Vec::with_capacity(rows), s: reals(rows * rows), offset, sets, tolerance, multipliers }
     }
 
-    /// Finds the multipliers x with S x + jump in its sets; x holds a guess on entry. `id` names the contact of a row,
-    /// for the error at time t.
+    /// Finds the multipliers x with S x + jump admissible; x holds a guess on entry. `id` gives the contact of a row
+    /// for an error at time t.
     pub(super) fn solve(
         &mut self,
         (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),

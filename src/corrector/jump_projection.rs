@@ -12,15 +12,14 @@ use crate::sparse;
 
 /// The projection behind the λ_v/λ_a correction, usable on a host's own vectors.
 ///
-/// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the mass
-/// norm: momentum is conserved (rows of G that sum to zero), kinetic energy falls by `½ jumpᵀ S⁻¹ jump`, never rises.
-/// For a lumped mass everything is local to the contact nodes; for a consistent one all dofs around them change, found
-/// by conjugate gradients on M (by a factor, if M is a chain or badly conditioned). Rows that share nodes or dofs are
-/// projected together. Prescribed dofs are not moved.
+/// It removes the jump `G x − γ` of velocity or acceleration over the closed contacts with the least change in the
+/// mass norm. Momentum is conserved if the rows of G sum to zero; kinetic energy falls by `½ jumpᵀ S⁻¹ jump` and
+/// never rises. With a lumped mass only dofs of the contact nodes change. With a consistent mass all dofs around them
+/// change, found by conjugate gradients on M, or by a factor if M is a chain or badly conditioned. Rows that share
+/// nodes or dofs are projected together. Prescribed dofs are not moved.
 ///
 /// The correction of Zhang et al. (Eng. Mech. 40 (Suppl.), 2023, eqs. (12), (13), in the form derived in
-/// `docs/theory.md`), in a loop of one's own, after the contact problem of a step gave u, v, a and the raw multiplier
-/// p:
+/// `docs/theory.md`), in a custom loop, after the contact problem of a step gave u, v, a and the raw multiplier p:
 ///
 /// ```
 /// use contact_dynamics::contact::ContactJacobian;
@@ -50,17 +49,17 @@ use crate::sparse;
 pub struct JumpProjection<T: Real> {
     inverse: InverseMass<T>,
     dofs: usize,
-    /// For each row its column of M⁻¹ Gᵀ, made when it is first closed; consistent masses only.
+    /// For each row the slot of its column of M⁻¹ Gᵀ, computed when the row is first closed; consistent masses only.
     slots: Vec<usize>,
     columns: Vec<Column<T>>,
-    /// Number of columns that belong to the present G.
+    /// Number of columns computed for the present G.
     computed: usize,
-    /// Rows whose columns are being made.
+    /// Rows whose columns are being computed.
     missing: Vec<usize>,
     closed: Vec<usize>,
-    /// The closed rows by the dofs that they share. S couples no two groups.
+    /// The closed rows, grouped by shared dofs. S couples no two groups.
     groups: Groups,
-    /// √S of groups of one row, and the factors of the others; one a group each.
+    /// √S of groups of one row, and the factors of the others; one entry per group.
     roots: Vec<T>,
     factors: Vec<DenseCholesky<T>>,
     /// The right-hand side of a group.
@@ -78,25 +77,25 @@ struct Column<T> {
     extent: Extent,
 }
 
-/// How far a column goes.
+/// Which places a column stores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Extent {
-    /// The places near contact, which S is made of.
+    /// The places near contact, from which S is built.
     Near,
-    /// All that respond.
+    /// All places that respond.
     All,
 }
 
 /// A row without a column.
 const NONE: usize = usize::MAX;
 
-/// Up to so many rows are pushed along their columns, more of them by a solve for all at once: columns of hundreds of
-/// rows would take as much memory as a factor of M. So many columns of all places are kept.
+/// Up to this many rows are pushed along their columns; more rows are pushed by one solve for all, because columns of
+/// hundreds of rows would take as much memory as a factor of M. At most this many columns with all places are kept.
 const FEW: usize = FORESEEN;
 
 impl<T: Real> JumpProjection<T> {
-    /// Prepares the projection for up to `rows` contacts; `prescribed` dofs (ascending) do not respond, nor do those
-    /// without mass.
+    /// Prepares the projection for up to `rows` contacts. `prescribed` dofs (ascending) and dofs without mass do not
+    /// respond.
     ///
     /// # Errors
     ///
@@ -128,7 +127,7 @@ impl<T: Real> JumpProjection<T> {
             InverseMass::Lumped(_) => (0, if rows > 0 { dofs } else { 0 }),
             InverseMass::Consistent(_) => (rows, 0),
         };
-        // (Columns of small scenes take little memory, and have it at once.)
+        // Columns of small systems are reserved at once; they take little memory.
         let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
         Ok(Self {
             inverse,
@@ -147,7 +146,7 @@ impl<T: Real> JumpProjection<T> {
         })
     }
 
-    /// Forgets everything computed from an earlier G.
+    /// Discards everything computed from an earlier G.
     pub fn reset(&mut self) {
         self.slots.fill(NONE);
         self.computed = 0;
@@ -155,14 +154,14 @@ impl<T: Real> JumpProjection<T> {
     }
 
     /// Chooses the rows of G whose jumps are removed, and factorizes their S. Choosing the same rows again costs
-    /// nothing. Rows may depend on one another: of all multipliers those of least norm are then found.
+    /// nothing. Dependent rows get the multipliers of least norm.
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] for a row that G does not have, or with a consistent mass one beyond those announced;
-    /// [`Error::MissingDof`] for a dof of G that the mass does not have; [`Error::ContactNotFinite`] for a row whose S
-    /// is not a number (`feature` is the row of G). Of a consistent mass [`Error::LinearNotConverged`] and
-    /// [`Error::Singular`], if a solve with M fails.
+    /// [`Error::Incompatible`] for a row that G does not have, or, with a consistent mass, a row beyond the number
+    /// given to [`new`](Self::new); [`Error::MissingDof`] for a dof of G that the mass does not have;
+    /// [`Error::ContactNotFinite`] for a row whose S is not a number (`feature` is the row of G). With a consistent
+    /// mass also [`Error::LinearNotConverged`] and [`Error::Singular`], if a solve with M fails.
     pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.check_rows(g, rows)?;
         let contact = |feature| ContactId { constraint: 0, feature, candidate: 0 };
@@ -171,7 +170,7 @@ impl<T: Real> JumpProjection<T> {
 
     fn check_rows(&self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         let refuse = |reason| Err(Error::Incompatible { part: "the list of closed rows".into(), reason });
-        // Of a consistent mass columns of M⁻¹Gᵀ are stored, one for each row announced.
+        // A consistent mass stores columns of M⁻¹Gᵀ, one for each announced row.
         let stored = match self.inverse {
             InverseMass::Lumped(_) => usize::MAX,
             InverseMass::Consistent(_) => self.slots.len(),
@@ -190,7 +189,7 @@ impl<T: Real> JumpProjection<T> {
         Ok(())
     }
 
-    /// [`close`](Self::close) with rows that are known to be sound; `refuse` makes the error of a row whose S is not a
+    /// [`close`](Self::close) for rows that are already checked; `refuse` makes the error for a row whose S is not a
     /// number.
     pub(crate) fn close_rows(
         &mut self,
@@ -241,13 +240,13 @@ impl<T: Real> JumpProjection<T> {
     /// `x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ)` on the closed rows; `multipliers` becomes `S⁻¹ (G x − γ)` of the x given.
     ///
     /// `target` is γ, the velocity or acceleration of the obstacle along each closed row (zero between bodies). Both
-    /// slices have one entry a closed row, in the order given to [`close`](Self::close).
+    /// slices have one entry per closed row, in the order given to [`close`](Self::close).
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless x has one entry a dof, and target and multipliers one a closed row; those of
-    /// [`close`](Self::close) for a G that the closed rows do not fit, and for a solve with M that fails. x is not
-    /// changed then.
+    /// [`Error::Dimension`] unless x has one entry per dof, and target and multipliers one per closed row; the errors
+    /// of [`close`](Self::close) for a G that the closed rows do not fit, and for a failed solve with M. x is then
+    /// unchanged.
     pub fn remove_jump(
         &mut self,
         g: &ContactJacobian<T>,
@@ -288,7 +287,7 @@ impl<T: Real> JumpProjection<T> {
         for (group, &root) in roots.iter().enumerate() {
             let own = groups.group(group);
             if let &[only] = own {
-                // (A row that nothing answers to gets nothing.)
+                // A row without response gets no multiplier.
                 b[only] = if root > T::zero() { b[only] / root / root } else { T::zero() };
                 continue;
             }
@@ -376,14 +375,14 @@ impl<T: Real> JumpProjection<T> {
         Ok(())
     }
 
-    /// Finds what S of these rows is made of.
+    /// Computes the columns needed for S of these rows.
     fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
-        // (Few rows are pushed along the same columns.)
+        // Few rows are later pushed along the same columns.
         self.make_columns(g, rows, if rows.len() <= FEW { Extent::All } else { Extent::Near })
     }
 
-    /// Makes the columns of these rows that there are not yet, or that end too soon. A column is the same whenever it
-    /// is made.
+    /// Computes the columns of these rows that are missing or too short. The values of a column do not depend on when
+    /// it is computed.
     fn make_columns(&mut self, g: &ContactJacobian<T>, rows: &[usize], extent: Extent) -> Result<()> {
         let Self { inverse, slots, columns, computed, missing, .. } = self;
         let InverseMass::Consistent(inverse) = inverse else { return Ok(()) };
@@ -421,7 +420,7 @@ impl<T: Real> JumpProjection<T> {
         })
     }
 
-    /// Entries (i, j) of S = G M⁻¹ Gᵀ of as many `others` j as there is room for; rows must be prepared.
+    /// Entries (i, j) of S = G M⁻¹ Gᵀ for the first `out.len()` of the `others` j; rows must be prepared.
     fn couple(
         &self,
         g: &ContactJacobian<T>,
@@ -444,14 +443,14 @@ impl<T: Real> JumpProjection<T> {
         }
     }
 
-    /// How many dofs responses of a lumped mass are spread over.
+    /// Number of dofs over which responses of a lumped mass are spread.
     fn dofs_of_lumped(&self) -> usize {
         if matches!(self.inverse, InverseMass::Lumped(_)) { self.dofs } else { 0 }
     }
 }
 
 impl<T: Real> Column<T> {
-    /// Keeps the places near contact.
+    /// Keeps only the places near contact.
     fn shorten(&mut self, near: usize) {
         if self.values.len() > near {
             self.values.truncate(near);

@@ -1,4 +1,4 @@
-//! Velocity jumps that give the work of contact back.
+//! Velocity jumps that return the work of the contact forces.
 
 use super::contact_implicit::one_step;
 use super::{Correction, Corrector};
@@ -7,21 +7,22 @@ use crate::real::Real;
 use crate::tableau::Tableau;
 
 /// The velocity jump of Laursen and Love (Int. J. Numer. Methods Eng. 53, 2002): after a step the velocities along
-/// closed contacts jump so that kinetic energy changes by what the contact forces took from the bodies, to the digit.
+/// closed contacts jump so that the kinetic energy changes by exactly the work that the contact forces took from the
+/// bodies.
 ///
 /// ```text
 /// v ← v + τ M⁻¹ Gᵀ λ,      ½ τ² λᵀ S λ + τ λᵀ G v + λᵀ (g' − g) = 0
 /// ```
 ///
-/// with the root that separates. For schemes whose balance holds in the middle of the step, where λ (g' − g) is what
-/// contact does: with the midpoint rule, `Gssss::new(1.0, 1.0, 1.0)`, and with
-/// [`EnergyMomentum`](crate::EnergyMomentum) every step ends with the energy it began with, whatever the mesh and the
-/// step. Linear momentum is conserved. Contacts under [`PersistencySwitch`](crate::contact::ContactLaw) are refused:
-/// the law holds the rate of a gap while that rebounds, and energy would grow without bound.
+/// with the root that separates. It needs a scheme whose balance holds in the middle of the step, where λ (g' − g) is
+/// the work of contact. With the midpoint rule, `Gssss::new(1.0, 1.0, 1.0)`, and with
+/// [`EnergyMomentum`](crate::EnergyMomentum) every step ends with the energy it started with, for any mesh and step.
+/// Linear momentum is conserved. Contacts under [`PersistencySwitch`](crate::contact::ContactLaw) are rejected: the
+/// law holds the gap rate while the contact rebounds, and energy would grow without bound.
 ///
-/// Known failure: the contact nodes rebound elastically, one element deep, so that contact is lost and found again
-/// while the bodies stay together: forces come as a train of pulses, and the velocity of contact nodes is wrong by its
-/// own size.
+/// Known failure: the contact nodes rebound elastically, one element deep, so contact opens and closes repeatedly
+/// while the bodies stay together. Forces arrive as a train of pulses, and the velocity error of contact nodes is as
+/// large as the velocity itself.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -45,8 +46,8 @@ impl<T: Real> Corrector<T> for LaursenLove {
     }
 
     fn check_switch(&self) -> std::result::Result<(), &'static str> {
-        // (A rate held at the end of a step that begins with a rebound: the force acts on the gap that opens, and there
-        // is no velocity left that could give this work back.)
+        // The rate is held at the end of a step that begins with a rebound: the force acts over the opening gap, and
+        // no velocity is left that could return this work.
         Err("contacts rebound by it, and this law holds their rate while they leave: energy would grow without bound; \
              choose `ContactLaw::Rigid`, or `PersistencyCorrection`")
     }
@@ -57,7 +58,7 @@ impl<T: Real> Corrector<T> for LaursenLove {
     }
 }
 
-/// Work of the raw multipliers over the stage, each times the change of its gap.
+/// Work of the raw multipliers over the stage: the sum of multiplier times change of gap.
 fn contact_work<T: Real>(step: &mut Correction<'_, T>) -> Result<T> {
     if step.starting_gaps()?.is_empty() {
         return Ok(T::zero());
@@ -67,8 +68,8 @@ fn contact_work<T: Real>(step: &mut Correction<'_, T>) -> Result<T> {
     Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
 }
 
-/// Changes the kinetic energy, seen from the obstacle, by `energy` through impulses in proportion to the raw
-/// multipliers of the closed rows, as far as there is any.
+/// Changes the kinetic energy relative to the obstacle by `energy`, or as much of it as there is, by impulses
+/// proportional to the raw multipliers of the closed rows.
 fn exchange_by_forces<T: Real>(step: &mut Correction<'_, T>, energy: T) -> Result<()> {
     step.read_rates()?;
     let rows = std::mem::take(&mut step.buffers.closed);

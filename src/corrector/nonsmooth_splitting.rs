@@ -1,4 +1,4 @@
-//! The splitting of a motion into a smooth part and impulses: generalized-α becomes the nonsmooth generalized-α scheme.
+//! Splits a motion into a smooth part and impulses: generalized-α becomes the nonsmooth generalized-α scheme.
 
 use super::contact_implicit::{adds_no_velocity, one_step};
 use super::correction::Pressed;
@@ -12,7 +12,8 @@ use crate::tableau::Tableau;
 /// or any other one-step scheme: the scheme integrates the smooth motion, whose accelerations contain no contact force,
 /// and contact acts by impulses alone.
 ///
-/// Of a step, ã' the smooth acceleration, ν the impulses that keep the gaps, Λ those that keep their rates:
+/// Notation: ã' is the smooth acceleration, ν the impulses that enforce the gaps, Λ the impulses that enforce the gap
+/// rates:
 ///
 /// ```text
 /// M ã' = f(u', v')                                                    (balanced where the scheme does that)
@@ -21,21 +22,21 @@ use crate::tableau::Tableau;
 /// ```
 ///
 /// The step of the scheme itself, with its multiplier λ and its response r of (u, h v, h² a) to a multiplier, solves
-/// the first two with ã' = a' − r_a M⁻¹ Gᵀ λ (theory, section 16), and a projection of the velocity as in λ_v/λ_a the
-/// third: Λ = h r_v λ + its impulse. So the two problems are solved one after the other, which for linear systems is
-/// the decoupled form (Cosimo, Galvez, Cavalieri, Cardona, Brüls, Multibody Syst. Dyn. 48, 2020) without its splitting
-/// error. Differences to [`PersistencyCorrection`](super::PersistencyCorrection): a contact that presses may part in
-/// the same step, and the next step reads an acceleration without contact.
+/// the first two lines with ã' = a' − r_a M⁻¹ Gᵀ λ (theory, section 16). A velocity projection as in λ_v/λ_a solves
+/// the third: Λ = h r_v λ + the impulse of the projection. The two problems are solved one after the other; for
+/// linear systems this is the decoupled form (Cosimo, Galvez, Cavalieri, Cardona, Brüls, Multibody Syst. Dyn. 48,
+/// 2020) without its splitting error. Unlike with [`PersistencyCorrection`](super::PersistencyCorrection), a pressed
+/// contact may open in the same step, and the next step reads an acceleration without contact.
 ///
-/// The reported force is Λ/h, the mean of a step; in that of an impact it contains the impact. The acceleration of the
-/// state is that of the smooth motion: of a body at rest under its weight that of the fall. Linear momentum is
-/// conserved. Friction acts in the cones of ν (against the way made in the step, so that nothing creeps) and of Λ.
-/// With damping it needs γ = 2β, as [`ContactImplicit`](super::ContactImplicit) does: in all contact, not at impacts
-/// alone, velocities are changed by h (1 − γ/(2β)) of what a force of contact accelerates, which the damping of the
-/// step has not felt.
+/// The reported force is Λ/h, the mean over a step; in an impact step it contains the impact. The acceleration of the
+/// state is the smooth one: a body at rest under its weight reports the acceleration of free fall. Linear momentum is
+/// conserved. Friction lies in the cone of ν, opposed to the slip of the step so that sticking contacts do not creep,
+/// and in the cone of Λ. With damping it needs γ = 2β, as [`ContactImplicit`](super::ContactImplicit) does: in all
+/// contact, not only at impacts, the correction changes velocities by h (1 − γ/(2β)) times the acceleration of the
+/// contact force, and the damping of the step has not acted on that change.
 ///
-/// Known failure: the force of the step of an impact contains the momentum of the contact nodes and is the larger the
-/// smaller the step; an impact costs the energy of the contact nodes' mass, as with λ_v/λ_a.
+/// Known failure: in an impact step the force contains the momentum of the contact nodes, so it grows as the step
+/// shrinks; an impact costs the kinetic energy of the contact nodes, as with λ_v/λ_a.
 ///
 /// ```
 /// use contact_dynamics::corrector::NonsmoothSplitting;
@@ -92,8 +93,8 @@ impl<T: Real> Corrector<T> for NonsmoothSplitting {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Takes the contact forces of closed contacts out of the accelerations, friction with them, and reports the total
-    /// impulses of the velocities, which have been solved for, over h.
+    /// Removes the forces of closed contacts, including friction, from the accelerations, and reports the total
+    /// impulses of the velocity problem divided by h.
     fn split_forces(&mut self) -> Result<()> {
         let (h, [.., by_a]) = (T::of(self.h), self.response());
         let Rubbing { rows, totals, .. } = &mut *self.buffers.rubbing;

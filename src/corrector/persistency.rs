@@ -1,4 +1,4 @@
-//! The λ_v/λ_a correction: velocity and acceleration persist with the contact.
+//! The λ_v/λ_a correction: velocity and acceleration satisfy the persistency of contact.
 
 use super::{Correction, Corrector, Edits};
 use crate::error::Result;
@@ -22,8 +22,8 @@ pub enum Parts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum HistoryProjection {
-    /// What was before the step keeps the approach. (The states between the stages of a step are corrected as any
-    /// state.)
+    /// States before the step keep their approach. The states between the stages of a step are corrected like any
+    /// other.
     #[default]
     Off,
     /// Gap, gap rate and gap acceleration of the past states that later steps read are projected to zero.
@@ -41,22 +41,24 @@ pub enum HistoryProjection {
 /// p' = p − (w_ā/w_a) S⁻¹ (G a − γ_a)
 /// ```
 ///
-/// What damping changes in a is explained at [`apply_impulses`](Correction::apply_impulses), and what it leaves of λ_v
-/// where a step does not resolve it, at [`push_acceleration`](Correction::push_acceleration). p' is the reported force;
-/// the raw p keeps deciding release. Rows that touch without pressure are corrected on approach only. Linear momentum
-/// is conserved, and the correction never raises the kinetic energy: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n)
-/// of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed
-/// contact are projected too; multistep schemes need it, one-step schemes that read no past ignore it.
+/// [`apply_impulses`](Correction::apply_impulses) explains the effect of damping on a, and
+/// [`push_acceleration`](Correction::push_acceleration) the reduction of λ_v if a step does not resolve the damping.
+/// p' is the reported force; the raw p still decides release. Rows that touch without pressure are corrected only if
+/// they approach. Linear momentum is conserved, and the correction never raises the kinetic energy: an impact costs ½
+/// jumpᵀ S⁻¹ jump, which is 1/(2n) of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the
+/// past states of a newly closed contact are projected too; multistep schemes need it, one-step schemes that read no
+/// past ignore it.
 ///
-/// It applies to schemes that impose contact on the displacements of the state; with the others ([`ContactLevel`])
-/// building a simulation is refused.
+/// It works with schemes that impose contact on the displacements of the state; with others ([`ContactLevel`]) the
+/// build fails.
 ///
 /// [`ContactLevel`]: crate::tableau::ContactLevel
 ///
-/// Known failures: it cannot restore the energy of the contact nodes' mass, and at release the velocity keeps the
-/// overshoot that any scheme shows there. In the step in which contact opens the trapezoidal rule lets the force of the
-/// state before act for half a step over the gap that opens; where a step is long beside the waves that end contact
-/// (Courant numbers far above 1) that may still raise the energy of a run. Take a scheme with numerical damping there.
+/// Known failures: it cannot restore the kinetic energy of the contact nodes, and at release the velocity keeps the
+/// overshoot that every scheme shows there. In the step in which a contact opens, the trapezoidal rule applies the
+/// force of the previous state for half a step over the opening gap. If a step is long compared with the waves that
+/// end contact (Courant numbers far above 1), this may raise the energy of a run; use a scheme with numerical damping
+/// there.
 ///
 /// ```
 /// use contact_dynamics::corrector::Parts;
@@ -74,14 +76,14 @@ pub struct PersistencyCorrection {
 }
 
 impl PersistencyCorrection {
-    /// Velocity and acceleration, as in the paper. Of a scheme with several stages the state of each is corrected, also
-    /// those between two steps, which the later stages of the same step read as their past. What was before the step
-    /// stays as it is.
+    /// Velocity and acceleration, as in the paper. In a scheme with several stages the state of each stage is
+    /// corrected, including states between two steps that later stages of the same step read as their past. States
+    /// before the step stay as they are.
     pub const fn new() -> Self {
         Self { parts: Parts::Both, history: HistoryProjection::Off }
     }
 
-    /// The same with the projection of the past at activation.
+    /// The same with the projection of past states at activation.
     pub const fn with_history_projection() -> Self {
         Self { parts: Parts::Both, history: HistoryProjection::On }
     }
@@ -92,7 +94,7 @@ impl PersistencyCorrection {
         Self { parts, ..self }
     }
 
-    /// Chooses whether the past is projected.
+    /// Chooses whether past states are projected.
     #[must_use]
     pub const fn history(self, history: HistoryProjection) -> Self {
         Self { history, ..self }

@@ -1,5 +1,5 @@
-//! What a corrector works with before a stage is solved: the prediction of displacements, and its projection on the
-//! contact conditions.
+//! Data for a corrector before a stage is solved: the predicted displacements and their projection onto the contact
+//! conditions.
 
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
@@ -9,19 +9,19 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::state::Motion;
 
-/// One stage before it is solved, in the hands of [`Corrector::predict`](super::Corrector::predict).
+/// One stage before it is solved, passed to [`Corrector::predict`](super::Corrector::predict).
 #[derive(Debug)]
 pub struct Prediction<'a, T: Real> {
-    /// Time from the state before to that of the stage.
+    /// Time between the previous state and the state of the stage.
     pub(crate) h: f64,
     pub(crate) t: f64,
-    /// Weight of the unknown in the displacements of the balance over that in those of the state.
+    /// Weight of the unknown in the displacements of the balance, divided by its weight in the displacements of the state.
     pub(crate) balance_share: T,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) projection: &'a mut JumpProjection<T>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
     pub(crate) constraints: ErasedGaps<'a, T>,
-    /// The state before.
+    /// The previous state.
     pub(crate) start: &'a Motion<T>,
     pub(crate) new: &'a mut Motion<T>,
     pub(crate) balance: Option<&'a mut Motion<T>>,
@@ -30,18 +30,18 @@ pub struct Prediction<'a, T: Real> {
     pub(crate) prescribed: &'a [usize],
     pub(crate) ids: &'a [ContactId],
     pub(crate) buffers: &'a mut Buffers<T>,
-    /// u + h v, one entry a dof.
+    /// u + h v, one entry per dof.
     pub(crate) shifted: &'a mut [T],
 }
 
-/// On which contacts a prediction is projected.
+/// Which contacts project a prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Extent {
-    /// All that it violates.
+    /// All contacts that it violates.
     #[default]
     All,
-    /// Those that were closed before.
+    /// Contacts that were already closed.
     Closed,
 }
 
@@ -51,9 +51,9 @@ impl<T: Real> Prediction<'_, T> {
         self.t
     }
 
-    /// Moves u + h v to the nearest point, in the norm of the mass, that no contact forbids, and shifts the
-    /// displacements that the stage starts from by as much: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts of
-    /// dofs without mass are left out, and all under other laws than rigid ones.
+    /// Moves u + h v to the nearest admissible point in the mass norm and shifts the displacements at the start of
+    /// the stage by the same amount: D = M⁻¹ Gᵀ μ with 0 ≤ g(u + h v + D) ⊥ μ ≥ 0. Contacts on dofs without mass and
+    /// contacts under other than rigid laws are left out.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl<T: Real> Prediction<'_, T> {
         result
     }
 
-    /// u + h v + M⁻¹ Gᵀ μ, with supports where they will be.
+    /// u + h v + M⁻¹ Gᵀ μ, with prescribed dofs at their new values.
     fn advance(&mut self, rows: &[usize], mu: &[T]) -> Result<()> {
         self.shifted.copy_from_slice(&self.start.u);
         T::axpy(T::of(self.h), &self.start.v, self.shifted);
@@ -113,7 +113,7 @@ impl<T: Real> Prediction<'_, T> {
         self.projection.push(self.g, (rows, mu), T::one(), self.shifted)
     }
 
-    /// Gaps at the shifted displacements; curved ones are linearized there.
+    /// Gaps at the shifted displacements; curved gaps are linearized there.
     fn read_gaps(&mut self) -> Result<()> {
         let Self { t, start, shifted, buffers, constraints, .. } = self;
         let there = (*t, [&**shifted, &start.v, &start.a]);

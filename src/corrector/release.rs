@@ -1,36 +1,36 @@
-//! What velocities become where a contact opens.
+//! Velocity corrections for contacts that open.
 
 use super::buffers::Given;
 use super::{Correction, Corrector, Edits};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
-/// Gives back at release what corrections took at impact: the release counterpart of the λ_v/λ_a correction, to be
-/// added after it.
+/// Returns at release the energy that corrections took at impact: the release counterpart of the λ_v/λ_a correction,
+/// to be added after it.
 ///
-/// An impact stops the mass m_c of the contact nodes, and their energy ½ m_c ġ² is gone (theory, sections 10 and 16).
-/// Nothing in the bodies has lost it: the exact solution has no such mass. At the end of the first step in which the
-/// contact is open its nodes get the impulse that restores [`dissipated`](crate::ContactState::dissipated) to the
-/// kinetic energy,
+/// An impact stops the mass m_c of the contact nodes and so removes their energy ½ m_c ġ² (theory, sections 10 and
+/// 16). The exact solution has no such mass and loses no energy. At the end of the first step in which the contact is
+/// open, its nodes get the impulse that restores [`dissipated`](crate::ContactState::dissipated) to the kinetic
+/// energy,
 ///
 /// ```text
 /// v ← v + M⁻¹ G_rowᵀ j,      ½ S j² + j ⟦v⟧ = dissipated,      ⟦v⟧ = G_row v + ∂g/∂t
 /// ```
 ///
-/// with past states, where the scheme reads them, moved as if they had had that velocity as well. For bars this is also
-/// the velocity that the exact solution jumps to. Contacts that open in the same step and move the same nodes get these
-/// impulses times one factor, by which their energies together are what they took together. Accelerations need no
-/// correction: those of the first open step hold no contact force. Linear momentum is conserved. ⟦v⟧ and what was taken
-/// are relative, so that a velocity common to all changes nothing. Kinetic energy never exceeds what it was before the
-/// impact by more than the scheme makes of it, and without numerical damping the run keeps what is given back
+/// If the scheme reads past states, these are moved as if they had had that velocity too. For bars this is also the
+/// velocity to which the exact solution jumps. If contacts that open in the same step move the same nodes, one factor
+/// scales their impulses so that together they return the energy that they took together. Accelerations need no
+/// correction: in the first open step they contain no contact force. Linear momentum is conserved. ⟦v⟧ and the
+/// dissipated energy are relative, so a common velocity changes nothing. The kinetic energy exceeds its value before
+/// the impact at most by the error of the scheme, and without numerical damping the run keeps the returned energy
 /// (`docs/theory.md`, section 16).
 ///
-/// Known failure: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping removes
-/// again. A contact that is pushed shut for good keeps what it took, and so does one of bodies that stay together
-/// without force: where it opens by rounding alone, by less than ε^⅔ of the speed that the impact took, nothing is
-/// given back. Schemes that read a past want it projected at
-/// impact ([`with_history_projection`](crate::PersistencyCorrection::with_history_projection)): else contacts may open
-/// and close again, and such a run of Park's scheme may end with .02 % of the energy less than without release.
+/// Known failures: the energy returns in the shortest waves of the mesh, which a scheme with numerical damping
+/// removes again. A contact that is pushed shut permanently never returns its energy, nor does a contact of bodies
+/// that stay together without force: if it opens only by rounding, slower than ε^⅔ of the impact speed, no energy is
+/// returned. Schemes that read past states need these projected at impact
+/// ([`with_history_projection`](crate::PersistencyCorrection::with_history_projection)); otherwise contacts may open
+/// and close again, and such a run of Park's scheme may end with .02 % less energy than without release.
 ///
 /// ```
 /// use contact_dynamics::corrector::Release;
@@ -51,7 +51,7 @@ impl<T: Real> Corrector<T> for Release {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        // (All from the same velocities: contacts that open together have no order.)
+        // All impulses use the same velocities: contacts that open together have no order.
         let mut given = std::mem::take(&mut *step.buffers.given);
         given.clear();
         let result = give_back(step, &mut given);
@@ -60,7 +60,7 @@ impl<T: Real> Corrector<T> for Release {
     }
 }
 
-/// Gives back at all contacts that open what each of them took.
+/// Returns the dissipated energy at every contact that opens.
 fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
     for i in 0..step.released().len() {
         let row = step.released()[i];
@@ -81,27 +81,27 @@ fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Res
 /// Comput. Methods Appl. Mech. Eng. 8, 1976; Taylor, Papadopoulos, Int. J. Numer. Methods Eng. 36, 1993), in a form
 /// that conserves momentum.
 ///
-/// At impact, and as long as it lasts, velocity and acceleration of both sides are the common ones, as by
-/// [`PersistencyCorrection`](super::PersistencyCorrection). At release the stress p that the contact has held runs off
-/// as a wave, and changes the velocity of side i by p/(ρ_i c_i): the gap opens at the rate λ (1/Z₁ + 1/Z₂), with the
-/// impedances Z_i = ρ_i c_i A of the bodies behind the contact and λ the last force reported. The nodes get this
-/// relative velocity from one impulse j along the row,
+/// At impact and during contact, velocity and acceleration of both sides are the common ones, as with
+/// [`PersistencyCorrection`](super::PersistencyCorrection). At release the contact stress p travels away as a wave
+/// and changes the velocity of side i by p/(ρ_i c_i): the gap opens at the rate λ (1/Z₁ + 1/Z₂), with the impedances
+/// Z_i = ρ_i c_i A of the bodies behind the contact and λ the last reported force. One impulse j along the row gives
+/// the nodes this relative velocity,
 ///
 /// ```text
 /// v ← v + M⁻¹ Gᵀ j,      S j = λ (1/Z₁ + 1/Z₂)        (S = G M⁻¹ Gᵀ)
 /// ```
 ///
-/// which takes from one side the momentum that it gives to the other, whatever the bodies. With contact nodes of mass
-/// m_i = ½ τ_i Z_i, whose elements a wave crosses in τ_i, it is j = ½ λ (τ₁ m₂ + τ₂ m₁)/(m₁ + m₂): the papers' own
-/// condition where τ₁ = τ₂, and then
-/// [`new`](Self::new) says it with τ alone, j = ½ τ λ. Where they differ, the papers' velocities of the two sides would
-/// not conserve momentum on the nodes; here each side has its share of the relative velocity by its mass.
+/// Each side loses the momentum that the other side gains, for any bodies. For contact nodes of mass m_i = ½ τ_i Z_i,
+/// where τ_i is the transit time of a wave through the contact element, j = ½ λ (τ₁ m₂ + τ₂ m₁)/(m₁ + m₂). For τ₁ =
+/// τ₂ = τ this is the papers' own condition, j = ½ τ λ, and [`new`](Self::new) needs only τ. For different τ_i the
+/// papers' velocities of the two sides would not conserve momentum on the nodes; here the masses divide the relative
+/// velocity between the sides.
 ///
-/// Energy changes at release by ½ S j² + j ⟦v⟧, which may be a rise.
+/// The energy changes at release by ½ S j² + j ⟦v⟧, which may be positive.
 ///
-/// Known failure: where the force falls to zero over several steps, as waves on a mesh make it, there is hardly any
-/// left to be released, and the condition does next to nothing. Nor does it where a contact has opened by rounding
-/// alone, by less than ε^⅔ of the speed that j would give: bodies that touch have none.
+/// Known failure: waves on a mesh reduce the force to zero over several steps, so that hardly any force is left at
+/// release and the condition has almost no effect. It also has no effect if a contact has opened only by rounding,
+/// slower than ε^⅔ of the speed that j would give: bodies that touch have no such speed.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -119,7 +119,7 @@ fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Res
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaylorPapadopoulos(Waves);
 
-/// What is known of the waves behind the contacts.
+/// Data of the waves behind the contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Waves {
     /// Time through a contact element, the same on both sides.
@@ -129,7 +129,7 @@ enum Waves {
 }
 
 impl TaylorPapadopoulos {
-    /// With the time that a wave takes through a contact element, one for both sides of all contacts.
+    /// With the transit time of a wave through a contact element, the same for both sides of all contacts.
     ///
     /// # Errors
     ///
@@ -138,8 +138,8 @@ impl TaylorPapadopoulos {
         positive("the transit time of the contact elements", transit).map(|transit| Self(Waves::Transit(transit)))
     }
 
-    /// With the impedances ρ c A of the two sides (mass/time), A the area that belongs to a contact; of all contacts
-    /// the same. The impedance of what is rigid is infinite.
+    /// With the impedances ρ c A of the two sides (mass/time), A the area of a contact; the same for all contacts.
+    /// The impedance of a rigid side is infinite.
     ///
     /// # Errors
     ///
@@ -170,7 +170,7 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         super::PersistencyCorrection::new().correct(step)?;
-        // (All from the same velocities: contacts that open together have no order.)
+        // All impulses use the same velocities: contacts that open together have no order.
         let mut given = std::mem::take(&mut *step.buffers.given);
         given.clear();
         let result = self.run_off(step, &mut given);
@@ -180,7 +180,7 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
 }
 
 impl TaylorPapadopoulos {
-    /// Gives the contacts that open the impulses of the stress that they have held.
+    /// Applies the impulses of the released contact stress at contacts that open.
     fn run_off<T: Real>(&self, step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
         for i in 0..step.released().len() {
             let row = step.released()[i];
@@ -193,7 +193,7 @@ impl TaylorPapadopoulos {
                     if s > T::zero() { opening / s } else { T::zero() }
                 }
             };
-            // (What touches without force gets nothing, nor does what rounding alone has opened.)
+            // Contacts that touch without force, or have opened only by rounding, get no impulse.
             if step.parts_by_rounding(row, s * impulse)?.is_none() {
                 given.rows.push(row);
                 given.impulses.push(impulse);

@@ -1,5 +1,4 @@
-//! The contact problem of S = G M⁻¹ Gᵀ for contacts with friction among others, for total multipliers: a part of them
-//! is in the jumps already.
+//! The contact problem of S = G M⁻¹ Gᵀ with friction, in total multipliers: the jumps already contain a part of them.
 
 use super::{JumpProjection, rounding};
 use crate::contact::{ContactId, ContactJacobian};
@@ -8,7 +7,7 @@ use crate::dense::DenseCholesky;
 use crate::error::Result;
 use crate::real::Real;
 
-/// Whether friction of this size is that of a contact that slides: μ times its force, but for rounding.
+/// Whether a friction of this size is that of sliding: μ times the normal force, up to rounding.
 pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
     friction >= T::of(1.0 - 1e-8).min(T::one() - T::of(8.0) * T::epsilon()) * bound.max(T::zero())
 }
@@ -16,18 +15,18 @@ pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
 /// A contact of the problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Block<T> {
-    /// The row of its gap, or of one equation alone.
+    /// The row of its gap, or of a single equation.
     pub(crate) row: usize,
-    /// Number of its tangential rows, which stand behind that.
+    /// Number of its tangential rows, which follow the row of the gap.
     pub(crate) tangents: usize,
     pub(crate) set: AdmissibleSet,
-    /// Friction for a unit normal multiplier, where its direction is given: the contact slides.
+    /// Friction per unit normal multiplier if its direction is given, that is, if the contact slides.
     pub(crate) direction: Option<[T; 2]>,
     /// Addition to the diagonal of S in the row of the gap.
     pub(crate) compliance: T,
-    /// The normal multiplier, where it is known and what it does is part of the jumps.
+    /// The normal multiplier if it is known; its effect is then contained in the jumps.
     pub(crate) known: Option<T>,
-    /// Where its rows begin in the lists of the problem: found when it is pushed.
+    /// Start of its rows in the lists of the problem, set by `push`.
     pub(crate) place: usize,
 }
 
@@ -37,28 +36,28 @@ impl<T: Real> Block<T> {
         Self { row, tangents, set, direction: None, compliance: T::zero(), known: None, place: 0 }
     }
 
-    /// Where its rows are in the lists of the problem.
+    /// The range of its rows in the lists of the problem.
     pub(super) fn places(&self) -> std::ops::Range<usize> {
         self.place..self.place + 1 + self.tangents
     }
 }
 
-/// The problem and its memory: blocks, and lists with an entry a row, block after block.
+/// The problem and its memory: blocks, and lists with one entry per row, block after block.
 #[derive(Debug, Default)]
 pub(crate) struct Rubbing<T> {
     pub(super) blocks: Vec<Block<T>>,
     /// The rows, and the block of each.
     pub(crate) rows: Vec<usize>,
     owners: Vec<usize>,
-    /// G x of these rows, less what is asked for, and its rounding.
+    /// G x of these rows minus the required rates, and its rounding error.
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
-    /// The multipliers that the jumps contain.
+    /// The multipliers that the jumps already contain.
     base: Vec<T>,
-    /// The multipliers found, and what is to be added to those there are.
+    /// The total multipliers, and their increments over `base`.
     pub(crate) totals: Vec<T>,
     pub(super) increments: Vec<T>,
-    /// What is left of the jumps, and what of it is rounding.
+    /// The remaining jumps, and their rounding errors.
     pub(super) left: Vec<T>,
     pub(super) noise: Vec<T>,
     /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
@@ -66,12 +65,12 @@ pub(crate) struct Rubbing<T> {
     group: Group<T>,
 }
 
-/// How the friction of what slides enters a problem.
+/// How the friction of sliding contacts enters a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Friction {
-    /// With the normal multiplier that is solved for.
+    /// Proportional to the unknown normal multiplier.
     Follows,
-    /// As it is in the totals; or nothing slides.
+    /// Fixed at its value in the totals; also used if nothing slides.
     Lags,
 }
 
@@ -80,7 +79,7 @@ enum Friction {
 struct Group<T> {
     rows: Vec<usize>,
     s: Vec<T>,
-    /// The unknowns: for each the place of its row in the group. Of what slides there is one, the normal multiplier.
+    /// The unknowns: the position of each one's row in the group. A sliding contact has one, its normal multiplier.
     unknowns: Vec<usize>,
     delassus: Vec<T>,
     offset: Vec<T>,
@@ -95,7 +94,7 @@ struct Group<T> {
 type Solved<T> = std::result::Result<(), ContactFailure<T>>;
 
 impl<T: Real> Rubbing<T> {
-    /// Forgets all blocks.
+    /// Removes all blocks.
     pub(crate) fn clear(&mut self) {
         let Self { blocks, rows, owners, jump, tolerance, base, totals, increments, left, noise, .. } = self;
         blocks.clear();
@@ -106,12 +105,13 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// Appends a contact, whose rows are [demanded](Self::demand) next: that of its gap, and those of its friction.
+    /// Appends a contact. Its rows must be [appended](Self::demand) next: first the normal row, then the tangential
+    /// ones.
     pub(crate) fn push(&mut self, block: &Block<T>) {
         self.blocks.push(Block { place: self.rows.len(), ..*block });
     }
 
-    /// Appends a row: its jump, what of it is rounding, and the multiplier that it contains.
+    /// Appends a row: its jump, the rounding error of the jump, and the multiplier that the jump contains.
     pub(crate) fn demand(&mut self, row: usize, jump: T, tolerance: T, base: T) {
         self.rows.push(row);
         self.owners.push(self.blocks.len().saturating_sub(1));
@@ -120,8 +120,8 @@ impl<T: Real> Rubbing<T> {
         self.base.push(base);
     }
 
-    /// Keeps the directions of the friction found. A contact that slides without any, since all that it has been given
-    /// pulls, may press again in what follows: its friction is then against the slip.
+    /// Stores the directions of the friction found. A sliding contact without friction, whose normal multiplier would
+    /// pull, may press again in the next problem: its friction is then opposed to the slip.
     pub(super) fn keep_directions(&mut self) {
         let Self { blocks, totals, left, noise, directions, .. } = self;
         directions.clear();
@@ -139,7 +139,7 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// The direction kept of a contact; none if it was not in that problem. (Rows ascend.)
+    /// The stored direction of a contact; zero if it was not in the earlier problem. Rows ascend.
     pub(super) fn direction(&self, row: usize) -> [T; 2] {
         match self.directions.binary_search_by_key(&row, |&(row, _)| row) {
             Ok(place) => self.directions[place].1,
@@ -147,8 +147,8 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// Finds the totals, group by group: S couples no two of them. Multipliers press if they have the sign of
-    /// `presses`. `id` names the contact of a row, for an error at time t.
+    /// Finds the totals group by group; S couples no two groups. Multipliers press if they have the sign of
+    /// `presses`. `id` gives the contact of a row for an error at time t.
     pub(crate) fn solve(
         &mut self,
         (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
@@ -164,7 +164,7 @@ impl<T: Real> Rubbing<T> {
         let mut group = std::mem::take(&mut self.group);
         let mut result = Ok(());
         for number in 0..projection.groups().len() {
-            // (Positions of a group ascend, and a block is in one group.)
+            // Positions of a group ascend, and a block is in one group.
             group.rows.clear();
             group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
             if let Err(error) = projection.assemble(g, &group.rows, &mut group.s) {
@@ -184,8 +184,8 @@ impl<T: Real> Rubbing<T> {
         result
     }
 
-    /// Solves for the rows at these positions. Where a contact that slides would be pulled it has no friction, and the
-    /// problem is solved again.
+    /// Solves for the rows at these positions. A sliding contact whose multiplier would pull gets no friction, and
+    /// the problem is solved again.
     fn solve_group(
         &mut self,
         positions: &[usize],
@@ -226,8 +226,8 @@ impl<T: Real> Rubbing<T> {
         Ok(())
     }
 
-    /// Takes back friction beyond its cone that was accepted as rounding, which beside much heavier bodies is far more
-    /// than that of the forces at the contact itself.
+    /// Scales friction back into its cone if it was accepted outside as rounding. Next to much heavier bodies this
+    /// rounding far exceeds the rounding of the local contact forces.
     fn keep_in_cones(&mut self, positions: &[usize], presses: T) {
         for &position in positions {
             let block = self.blocks[self.owners[position]];
@@ -244,8 +244,8 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// Solves where the equations with the friction of what slides have no solution, since some of it would be pulled:
-    /// it keeps the friction of a pass while the others are solved for, until it has that of its own force.
+    /// Solves by iteration with lagged friction if the equations with following friction have no solution because a
+    /// sliding contact would pull. Each iteration fixes the friction of sliding contacts and solves for the others.
     fn solve_lagging(
         &mut self,
         positions: &[usize],
@@ -253,11 +253,11 @@ impl<T: Real> Rubbing<T> {
         solver: &mut dyn ContactSolver<T>,
         presses: T,
     ) -> Solved<T> {
-        /// Passes, each of which takes over half of what the last one has found. What is left then is accepted: the
-        /// friction that is reported is in its cone, and the jump that it leaves is one of accelerations.
+        /// Largest number of iterations, each relaxed by one half. The error after the last one is accepted: the
+        /// reported friction is in its cone, and the remaining jump is a jump of accelerations.
         const PASSES: usize = 60;
-        /// Growth of what a pass changes at which passes diverge, as they may where rows are nearly the same and what
-        /// the one is pulled by the other presses: what slides is then given no friction.
+        /// Growth of the change per iteration that counts as divergence. It may occur with nearly equal rows, of
+        /// which one pulls while the other presses. Sliding contacts then get no friction.
         const DIVERGES: f64 = 1e2;
         let half = T::of(0.5);
         for &position in positions {
@@ -312,7 +312,7 @@ impl<T: Real> Rubbing<T> {
         Ok(())
     }
 
-    /// Finds what is left of the jumps of a group.
+    /// Computes the remaining jumps of a group.
     fn measure(&mut self, positions: &[usize], group: &Group<T>) {
         let size = positions.len();
         for (i, &position) in positions.iter().enumerate() {
@@ -328,8 +328,8 @@ impl<T: Real> Rubbing<T> {
 }
 
 impl<T: Real> Group<T> {
-    /// Writes down the problem of the rows at these positions, S of which is known: an unknown for each row, but one
-    /// for each contact that slides, whose friction comes with its normal multiplier.
+    /// Sets up the problem of the rows at these positions, with S given: one unknown per row, but a single unknown
+    /// per sliding contact, whose friction is proportional to the normal multiplier.
     fn pose(&mut self, all: &Rubbing<T>, positions: &[usize], friction: Friction) {
         let size = positions.len();
         if size > self.reserved {
@@ -384,8 +384,8 @@ impl<T: Real> Group<T> {
         multipliers.resize(unknowns.len(), T::zero());
     }
 
-    /// Solves. Equations alone, with a symmetric W, have a solution of least norm whatever rounding has made of rows
-    /// that depend on one another.
+    /// Solves the problem. Equations alone, with a symmetric W, are solved in the least norm, however rounding has
+    /// changed dependent rows.
     fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
         let Self { delassus, offset, sets, tolerance, multipliers, factor, .. } = self;
         let size = offset.len();
@@ -401,7 +401,7 @@ impl<T: Real> Group<T> {
         solver.solve(&ContactProblem::of(delassus, offset, sets, tolerance, 0), multipliers).map(|_| ())
     }
 
-    /// A contact that slides, and whose friction leaves it no way out.
+    /// A sliding contact that friction jams.
     fn jammed(&self, all: &Rubbing<T>, positions: &[usize]) -> Option<ContactFailure<T>> {
         let (size, unknowns) = (positions.len(), self.unknowns.len());
         let one = |(row, &at): (usize, &usize)| {

@@ -1,61 +1,62 @@
-//! Contacts on dofs without mass that close or open in a step: what they exert less than the mean of their forces, and
-//! the impulses that return what is left.
+//! Contacts on dofs without mass that close or open in a step: the reduction of their mean forces, and the impulses
+//! that return the remaining work.
 
 use crate::real::Real;
 use crate::state::ContactState;
 use std::ops::Range;
 
-/// What has closed or opened on dofs without mass.
+/// Contacts on dofs without mass that have closed or opened.
 #[derive(Debug)]
 pub(crate) struct Switching<T> {
-    /// Gaps and raw multipliers where the stage starts, one a candidate; none without a corrector that asks.
+    /// Gaps and raw multipliers at the start of the stage, one entry per candidate; `None` if no corrector needs
+    /// them.
     pub(super) start: Option<[Vec<T>; 2]>,
-    /// What contacts exert less than their mean forces in this stage, one a row.
+    /// Reductions of the mean contact forces in this stage, one per row.
     pub(super) excess: Vec<Excess<T>>,
     /// Rows that have closed or opened in this stage.
     pub(super) rows: Vec<usize>,
-    /// Those of this step.
+    /// Contacts that have closed or opened in this step.
     pub(super) switches: Vec<Switch<T>>,
     /// A change of v, and M times it.
     pub(super) change: Vec<T>,
     pub(super) momentum: Vec<T>,
 }
 
-/// A force that a contact does not exert over a stage, and the work that it does not do.
+/// The part of the mean force that a contact does not exert over a stage, and the work that it thereby does not do.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Excess<T> {
     pub(crate) force: T,
     pub(crate) work: T,
-    /// What the force missed before it was changed last.
+    /// Error of the force before its last change.
     miss: T,
 }
 
-/// The parts of a miss by which an excess may move.
+/// Bounds of the fraction of a miss by which an excess may change.
 const SMALLEST_PART: f64 = 0.05;
 const LARGEST_PART: f64 = 4.0;
 
-/// The most directions in which a contact rubs.
+/// Largest number of tangential rows of a contact.
 const TANGENTS: usize = 2;
 
 /// A contact that has closed or opened in this step.
 #[derive(Debug)]
 pub(super) struct Switch<T> {
     pub(super) row: usize,
-    /// The most that its impulse can have been too large by, h λ.
+    /// Largest impulse that the contact may have exerted in excess.
     pub(super) most: T,
-    /// The most by which it may have been too small, for less was exerted already.
+    /// Largest impulse that the contact may have exerted too little, because its force was already reduced.
     pub(super) least: T,
-    /// Friction over the force of the gap: it is there as long as that is.
+    /// Friction divided by the normal force; it acts as long as the normal force does.
     friction: [T; TANGENTS],
-    /// The impulse that gives back what the contact has taken, J, and what the bodies get by it alone.
+    /// The impulse J that returns the work taken by the contact, and the energy that this impulse alone returns.
     pub(super) impulse: T,
     pub(super) returned: T,
-    /// What its friction, smaller as well, does to them.
+    /// Work of the corresponding friction impulse.
     pub(super) by_friction: T,
 }
 
 impl<T: Real> Switch<T> {
-    /// A contact that has closed or opened, with its friction over the force of its gap.
+    /// A contact that has closed or opened, with the ratio of its friction to its normal force.
     pub(super) fn new(row: usize, [most, least]: [T; 2], along: impl Iterator<Item = T>) -> Self {
         let mut friction = [T::zero(); TANGENTS];
         for (share, own) in friction.iter_mut().zip(along) {
@@ -64,7 +65,7 @@ impl<T: Real> Switch<T> {
         Self { row, most, least, friction, impulse: T::zero(), returned: T::zero(), by_friction: T::zero() }
     }
 
-    /// J along the row of the gap, and its share along those of friction.
+    /// J along the normal row, and the friction impulses along the tangential rows.
     pub(super) fn impulses(&self, tangents: Range<usize>) -> impl Iterator<Item = (usize, T)> + use<T> {
         let (impulse, friction) = (self.impulse, self.friction);
         let along = tangents.zip(friction).map(move |(tangent, share)| (tangent, share * impulse));
@@ -73,7 +74,7 @@ impl<T: Real> Switch<T> {
 }
 
 impl<T: Real> Switching<T> {
-    /// For so many rows of a system of so many dofs, if a corrector asks for it.
+    /// Memory for `rows` rows of a system of `dofs` dofs; `None` if no corrector needs it.
     pub(super) fn new(rows: usize, dofs: Option<usize>) -> Self {
         let vector = || dofs.map_or(Vec::new(), |dofs| vec![T::zero(); dofs]);
         let rows = if dofs.is_some() { rows } else { 0 };
@@ -87,7 +88,7 @@ impl<T: Real> Switching<T> {
         }
     }
 
-    /// Room for so many rows.
+    /// Reserves memory for this many rows.
     pub(super) fn make_room(&mut self, rows: usize) {
         let Some(start) = &mut self.start else { return };
         for values in start {
@@ -98,12 +99,12 @@ impl<T: Real> Switching<T> {
         self.switches.reserve((2 * rows).saturating_sub(self.switches.len()));
     }
 
-    /// Whether a corrector asks for it.
+    /// Whether a corrector needs these data.
     pub(crate) fn is_on(&self) -> bool {
         self.start.is_some()
     }
 
-    /// Notes the contacts where a stage starts, the first of its step or another one.
+    /// Stores the contacts at the start of a stage; `is_first` marks the first stage of a step.
     pub(crate) fn begin(&mut self, contacts: &ContactState<T>, is_first: bool) {
         let Some([gaps, forces]) = &mut self.start else { return };
         gaps.clone_from(&contacts.gap);
@@ -116,27 +117,28 @@ impl<T: Real> Switching<T> {
         }
     }
 
-    /// The gap of a row where the stage starts.
+    /// The gap of a row at the start of the stage.
     pub(crate) fn gap(&self, row: usize) -> T {
         self.start.as_ref().map_or(T::zero(), |[gaps, _]| gaps[row])
     }
 
-    /// The force of a row where the stage starts, and where it ends, and what of their mean is not exerted.
+    /// The force of a row at the start and at the end of the stage, and the reduction of their mean.
     pub(crate) fn forces(&mut self, row: usize, contacts: &ContactState<T>) -> (T, T, &mut Excess<T>) {
         let before = self.start.as_ref().map_or(T::zero(), |[_, forces]| forces[row]);
         (before, contacts.lambda_raw[row], &mut self.excess[row])
     }
 
-    /// Whether a row may close or open in the stage, or exerts less.
+    /// Whether a row closes or opens in the stage, or has a reduced force.
     pub(crate) fn switches(&self, contacts: &ContactState<T>) -> bool {
         let Some([_, forces]) = &self.start else { return false };
         let mut rows = self.excess.iter().zip(forces).zip(&contacts.lambda_raw);
         rows.any(|((excess, &before), &after)| excess.force != T::zero() || (before > T::zero()) != (after > T::zero()))
     }
 
-    /// Moves the excess of all rows by a part of what it misses, that of Irons and Tuck (Int. J. Numer. Meth. Eng. 1,
-    /// 1969) behind another one: a contact that opens and presses less comes out farther and asks for less, one that
-    /// closes and presses less goes in farther and asks for more. Says which part.
+    /// Adds a fraction of each row's miss to its excess: one half in the first iteration (`before` is `None`), then
+    /// the factor of Irons and Tuck (Int. J. Numer. Meth. Eng. 1, 1969) from the last fraction. A reduced force lets
+    /// an opening contact open farther, which lowers its miss; it lets a closing contact penetrate deeper, which
+    /// raises its miss. Returns the fraction.
     pub(crate) fn move_excess(&mut self, misses: &[T], before: Option<T>) -> T {
         let mut part = T::of(0.5);
         if let Some(before) = before {
@@ -155,12 +157,12 @@ impl<T: Real> Switching<T> {
         part
     }
 
-    /// Lets all rows exert what they have.
+    /// Removes all reductions, so that all rows exert their full forces.
     pub(crate) fn forget_excess(&mut self) {
         self.excess.fill(Excess::default());
     }
 
-    /// What rows exert less, with the friction that belongs to it.
+    /// Force reductions of all rows, with the corresponding friction.
     pub(crate) fn excess_forces<'s>(&'s self, contacts: &'s ContactState<T>) -> impl Iterator<Item = (usize, T)> + 's {
         let rows = self.excess.iter().enumerate().filter(|(_, excess)| excess.force != T::zero());
         rows.flat_map(move |(row, excess)| {
@@ -169,14 +171,14 @@ impl<T: Real> Switching<T> {
                 Some([_, before]) if after[row] <= T::zero() => before,
                 _ => after,
             };
-            // (A row that has come to exert nothing at all has no friction either.)
+            // A row whose force has become zero has no friction either.
             let share = if all[row] > T::zero() { excess.force / all[row] } else { T::zero() };
             let along = contacts.tangents.of(row).map(move |tangent| (tangent, share * all[tangent]));
             std::iter::once((row, excess.force)).chain(along)
         })
     }
 
-    /// Books what rows exert less over a time, and the work that they have given back so.
+    /// Subtracts the impulses of the force reductions over a time, and books the work that they return.
     pub(crate) fn book_excess(&self, time: T, contacts: &mut ContactState<T>) {
         for (row, excess) in self.excess.iter().enumerate() {
             contacts.dissipated[row] += excess.work;
@@ -188,7 +190,7 @@ impl<T: Real> Switching<T> {
         contacts.impulse = impulses;
     }
 
-    /// Notes a row on dofs without mass after the contact of a stage was solved.
+    /// Checks a row on dofs without mass after the contact problem of a stage: stores it if it has closed or opened.
     pub(crate) fn note(&mut self, row: usize, contacts: &ContactState<T>) {
         let Some([gaps, forces]) = &self.start else { return };
         let (gap, force) = match (forces[row] > T::zero(), contacts.lambda_raw[row] > T::zero()) {

@@ -1,4 +1,4 @@
-//! The work of contacts without mass in the step in which they close or open, taken back.
+//! Returns the work that contacts without mass do in the step in which they close or open.
 
 use super::switching::{Switch, Switching};
 use super::{Correction, Corrector};
@@ -10,45 +10,49 @@ use crate::tableau::Tableau;
 
 /// Returns the work that contacts on dofs without mass do in the step in which they close or open.
 ///
-/// Such contacts do no work as long as they last, or are open. A scheme that changes velocities by the mean of two
-/// accelerations, however, has them act all through the step in which they close or open, with the mean of a force that
-/// is there and one that is none. The energy that the scheme conserves changes by
+/// Such contacts do no work while they stay closed or open. A scheme that changes velocities by the mean of two
+/// accelerations, however, applies the mean of a contact force and zero over the whole step in which they close or
+/// open. The conserved energy of the scheme changes by
 ///
 /// ```text
 /// ½ (λ + λ') (g' − g)  =  −½ g λ'  where the contact closes,   ½ g' λ  where it opens
 /// ```
 ///
-/// to rounding (theory, section 15.1). An impact takes the one and gives the other; what is left has either sign, and
-/// adds up over many impacts as a random walk. The impulse over the step was too large, for the force of a contact that
-/// closes is there for the last part of the step only, that of one that opens for the first. So
+/// to rounding (theory, section 15.1). An impact takes the first amount and returns the second. The difference has
+/// either sign and adds up over many impacts as a random walk. The impulse over the step was too large: the force of
+/// a closing contact acts only in the last part of the step, the force of an opening contact only in the first.
+/// Therefore
 ///
 /// ```text
 /// J = W/ġ within [−h λ, 0],      v' ← v' + α Σ J y
 /// ```
 ///
-/// with W what the contact has taken from the bodies (½ g λ', or −½ g' λ), ġ the rate of its gap if its dofs followed
-/// the others statically, y what a unit impulse of the contact makes of the velocities of the dofs with mass, and one α
-/// near 1 for those that give and one for those that take, by which the kinetic energy changes by Σ J ġ to rounding.
-/// What a contact cannot return so (where ġ is small, or has the wrong sign) it owes, and returns when it closes or
-/// opens again: [`dissipated`](crate::ContactState::dissipated) has it, positive where the bodies are to get it.
-/// Momentum changes by the impulses, which are booked as those of the contacts:
-/// [`impulses`](crate::ContactState::impulses) is what was exerted over a step, [`forces`](crate::ContactState::forces)
-/// what is there at its end. Friction on such contacts gets the same share of its impulse.
+/// with W the energy that the contact has taken from the bodies (½ g λ', or −½ g' λ), ġ the rate of its gap if its
+/// dofs followed the others statically, and y the velocity change of the dofs with mass per unit impulse of the
+/// contact. The contacts that return energy share one factor α near 1, and those taking it back another, chosen so
+/// that the kinetic energy changes by Σ J ġ to rounding. If ġ is small or has the wrong sign, the contact keeps the
+/// rest of W and returns it when it closes or opens again: [`dissipated`](crate::ContactState::dissipated) stores it,
+/// positive if the bodies are to receive it. The impulses change the momentum and are booked as contact impulses:
+/// [`impulses`](crate::ContactState::impulses) is the impulse exerted over a step,
+/// [`forces`](crate::ContactState::forces) the force at its end. Friction on such contacts gets the same share of its
+/// impulse.
 ///
-/// Implicit steps of linear systems are solved again with what such contacts exert too much left out, all through the
-/// step, until the energy stays as it is but for a thousandth of the work (theory, section 15.2); what is left is
-/// returned as above. That works whatever frequencies the step does not resolve.
+/// Implicit steps of linear systems are solved again with the excess force of such contacts removed over the whole
+/// step, until the energy error is a thousandth of the work (theory, section 15.2); the impulses above return the
+/// remainder. This also works for frequencies that the step does not resolve.
 ///
-/// Costs nothing in steps in which nothing closes or opens, two or three solves with the matrix of the stage in others,
-/// and in implicit ones one to eight solves of the step, with its contact.
+/// Cost: none in steps in which no such contact closes or opens, two or three solves with the matrix of the stage in
+/// others, and in implicit steps one to eight solves of the step with its contact problem.
 ///
-/// Known failure: nonlinear systems have impulses alone. Their modes far faster than the step (ω h ≫ 1) that open and
-/// close many contacts in every step leave more than can be returned: energy and forces grow, if less than without the
-/// correction. Choose a scheme that damps them, as [`GeneralizedAlpha`](crate::GeneralizedAlpha).
+/// Known failure: nonlinear systems get the impulses only. If many contacts open and close in every step by modes far
+/// faster than the step (ω h ≫ 1), the impulses cannot return all of the work: energy and forces grow, though less
+/// than without the correction. Choose a scheme that damps these modes, such as
+/// [`GeneralizedAlpha`](crate::GeneralizedAlpha).
 ///
-/// For the trapezoidal rule, Newmark's schemes with γ = ½ (central differences, [`CdLagrange`](crate::CdLagrange) among
-/// them) and [`Bathe`](crate::Bathe) with ρ∞ = 1; rows under [`ContactLaw::Rigid`](crate::ContactLaw::Rigid). Part of
-/// the default for these, where contact dofs have no mass, and of the presets `conservative()` and `explicit()`.
+/// For the trapezoidal rule, Newmark's schemes with γ = ½ (central differences, including
+/// [`CdLagrange`](crate::CdLagrange)) and [`Bathe`](crate::Bathe) with ρ∞ = 1; rows under
+/// [`ContactLaw::Rigid`](crate::ContactLaw::Rigid). It is part of the default of these schemes if contact dofs have
+/// no mass, and of the presets `conservative()` and `explicit()`.
 ///
 /// ```
 /// use contact_dynamics::corrector::{Corrector, WorkBalance};
@@ -92,7 +96,7 @@ impl<T: Real> Corrector<T> for WorkBalance {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Counts what has closed or opened in this stage: its work, and by how much its impulse may have been too large.
+    /// Books the work of contacts that have closed or opened in this stage, and bounds the excess of their impulses.
     fn count_switches(&mut self) {
         let Self { buffers, contacts, scheme, h, .. } = self;
         let Switching { start: Some([gaps, forces]), excess, rows, switches, .. } = &mut *buffers.switching else {
@@ -109,7 +113,7 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
-    /// Changes the velocities by the impulses of this step, so that the bodies get back what contact has taken.
+    /// Changes the velocities by the impulses of this step that return the work taken by contact.
     fn return_work(&mut self) -> Result<()> {
         if self.buffers.switching.switches.is_empty() {
             return Ok(());
@@ -134,7 +138,7 @@ impl<T: Real> Correction<'_, T> {
             let along =
                 switch.impulses(tangents).skip(1).map(|(tangent, impulse)| impulse * self.g.product(tangent, change));
             switch.by_friction = along.sum();
-            // What a contact cannot give back stays with it.
+            // A contact keeps the energy that it cannot return.
             *taken -= switch.returned;
         }
         for gives in [true, false] {
@@ -143,8 +147,8 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Gives the bodies back what contacts have taken, or takes back what they have given, by one multiple of their
-    /// impulses, for these act on each other.
+    /// Applies the impulses of the contacts that return energy, or of those taking it back, all scaled by one
+    /// factor because the contacts act on each other.
     fn give(&mut self, switches: &[Switch<T>], gives: bool, change: &mut [T], momentum: &mut [T]) -> Result<()> {
         let group = || {
             let belongs = |returned: T| if gives { returned > T::zero() } else { returned < T::zero() };
@@ -156,7 +160,7 @@ impl<T: Real> Correction<'_, T> {
         self.spread(group(), change)?;
         momentum.fill(T::zero());
         self.system.0.mass().add_product(T::one(), change, momentum);
-        // Energies are those seen from the obstacles, whose own motion does work.
+        // Energies are relative to the obstacles, whose own motion does work.
         let by_obstacles: T = group().map(|switch| switch.impulse * self.buffers.rates[switch.row].rate).sum();
         let first = dot(momentum, &self.new.v);
         let second = T::of(0.5) * dot(momentum, change);
@@ -182,7 +186,7 @@ impl<T: Real> Correction<'_, T> {
         self.damp_change(change)
     }
 
-    /// Books a part of what some contacts were to return as still taken.
+    /// Books a fraction of the planned returns as still taken.
     fn keep<'s>(&mut self, switches: impl Iterator<Item = &'s Switch<T>>, part: T)
     where
         T: 's,
@@ -192,7 +196,7 @@ impl<T: Real> Correction<'_, T> {
         }
     }
 
-    /// The velocities with which dofs without mass follow the others statically, as if no contact held them.
+    /// The velocities if dofs without mass follow the others statically and no contact holds them.
     fn static_rates(&mut self, rates: &mut [T]) -> Result<()> {
         let Self { block, operator, system, new, scheme, prescribed, h, .. } = self;
         if let Some(block) = block {
@@ -206,7 +210,7 @@ impl<T: Real> Correction<'_, T> {
         operator.solve(rates)
     }
 
-    /// The change of v that impulses of contacts on dofs without mass make of the dofs with mass.
+    /// The velocity change of the dofs with mass by impulses of contacts on dofs without mass.
     fn spread<'s>(&mut self, switches: impl Iterator<Item = &'s Switch<T>>, change: &mut [T]) -> Result<()>
     where
         T: 's,
@@ -238,8 +242,8 @@ impl<T: Real> Correction<'_, T> {
     }
 }
 
-/// The root of c₀ + c₁ x + c₂ x² that is nearer to zero, and what is left there: where there is none the vertex, and
-/// zero where neither is a number.
+/// The root of c₀ + c₁ x + c₂ x² nearer to zero, and the residual there. Without a real root the vertex; zero if the
+/// root is not finite.
 fn nearest<T: Real>([zeroth, first, second]: [T; 3]) -> (T, T) {
     let discriminant = first * first - T::of(4.0) * second * zeroth;
     if discriminant < T::zero() {

@@ -4,15 +4,15 @@ use super::{Correction, Corrector};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Sets the accelerations of all dofs that pressed contacts act on to zero, and takes the inertia of the relative
-/// acceleration out of the reported force: the naive stabilization that is common in Schwarz couplings and for
+/// Sets the accelerations of all dofs under pressed contacts to zero, and removes the inertia of the relative
+/// acceleration from the reported force: the naive stabilization that is common in Schwarz couplings and for
 /// obstacles at rest.
 ///
-/// Between equal bodies that meet head on it is the acceleration part of the λ_v/λ_a correction. Velocities are left as
-/// they are. Linear momentum is not conserved where bodies differ, nor for an obstacle that accelerates: what is left
-/// of a is removed, though nothing pushes. The impulse of a contact books the relative part alone, so that it misses
-/// the change of momentum of the schemes that read a. Where rows are oblique to the dofs, tangential accelerations
-/// vanish too. Contacts that hold their bodies by no more than the rounding of gaps and rates are left alone.
+/// Between equal bodies that meet head on it is the acceleration part of the λ_v/λ_a correction. Velocities are
+/// unchanged. Linear momentum is not conserved if the bodies differ or the obstacle accelerates: the remaining
+/// acceleration is set to zero without a force. Only the relative part is booked as a contact impulse, so the impulse
+/// misses the momentum change in schemes that read a. If rows are oblique to the dofs, tangential accelerations
+/// vanish too. Contacts that hold their bodies only within the rounding of gaps and rates are skipped.
 ///
 /// ```
 /// use contact_dynamics::Corrector;
@@ -34,7 +34,7 @@ impl<T: Real> Corrector<T> for ZeroAcceleration {
         let mut place = 0;
         for i in 0..step.engaged().len() {
             let (row, force) = (step.engaged()[i], step.jump_forces()[i]);
-            // (Engaged rows are some of the closed ones, in their order.)
+            // Engaged rows are a subset of the closed ones, in the same order.
             while step.closed()[place] != row {
                 place += 1;
             }

@@ -7,9 +7,9 @@ use crate::error::Result;
 use crate::real::Real;
 
 impl<T: Real> Correction<'_, T> {
-    /// Applies an impulse along a row that changes the kinetic energy by `energy`, seen from the obstacle and as far as
-    /// there is one: the bodies leave each other faster, or with a negative energy slower. Returns the impulse; zero,
-    /// and nothing is done, for an energy below the rounding of the velocities.
+    /// Applies an impulse along a row that changes the kinetic energy relative to the obstacle by `energy`. With a
+    /// positive energy the bodies separate faster, with a negative one slower; at most the available energy is taken.
+    /// Returns the impulse, which is zero for an energy below the rounding of the velocities.
     ///
     /// # Errors
     ///
@@ -25,12 +25,12 @@ impl<T: Real> Correction<'_, T> {
     /// The impulse of [`exchange_energy`](Self::exchange_energy).
     fn impulse_of(&mut self, row: usize, energy: T) -> Result<T> {
         let (s, rate) = (self.compliance(row)?, self.rate(row)?);
-        // The gap rate is a small difference of larger numbers; this is their rounding.
+        // The gap rate is a small difference of large numbers; this is its rounding error.
         let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
         if !(s > T::zero() && T::of(2.0) * s * energy.abs() > noise * noise && energy.is_finite()) {
             return Ok(T::zero());
         }
-        // ½ S j² + j rate = energy, without cancellation; beyond what the rate holds, all of it.
+        // ½ S j² + j rate = energy, without cancellation. If the rate has less energy than asked, all of it is taken.
         let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
         Ok(match rate > T::zero() {
             true if root > T::zero() => T::of(2.0) * energy / (root + rate),
@@ -38,15 +38,14 @@ impl<T: Real> Correction<'_, T> {
         })
     }
 
-    /// Applies impulses that give energies (positive) to the bodies at several rows, all found from the same
-    /// velocities. Where they act on each other one factor makes up for that: together they change the energy by the
-    /// sum.
+    /// Applies impulses that add (positive) energies to the bodies at several rows, all computed from the same
+    /// velocities. Coupled impulses are scaled by one factor, so that together they change the energy by the sum.
     pub(in crate::corrector) fn exchange_energies(&mut self, given: &mut Given<T>) -> Result<()> {
         let Given { rows, energies, impulses, group } = given;
         for (&row, &energy) in rows.iter().zip(&*energies) {
             impulses.push(self.impulse_of(row, energy)?);
         }
-        // (One row alone leaves the projection its factor.)
+        // A single row leaves the projection its factor.
         let mut groups = 0;
         if rows.len() > 1 {
             self.projection.sort(self.g, rows);
@@ -68,7 +67,7 @@ impl<T: Real> Correction<'_, T> {
         self.apply(rows, impulses)
     }
 
-    /// The factor of the impulses at some places by which they give the sum of their energies.
+    /// The factor by which impulses at these places add the sum of their energies.
     fn factor_of(&mut self, places: &[usize], rows: &[usize], [energies, impulses]: [&[T]; 2]) -> Result<T> {
         let (mut energy, mut first, mut second) = (T::zero(), T::zero(), T::zero());
         for &place in places {
@@ -90,10 +89,11 @@ impl<T: Real> Correction<'_, T> {
         Ok(if factor.is_finite() { factor } else { T::one() })
     }
 
-    /// Whether a contact that took `energy` at impact does not give it back, for it opens by rounding alone: bodies
-    /// that stay together without force do so by the sign of the last bit. Measured by the speed that was taken, which
-    /// is relative. (The force of the impact itself is none that holds them together, and with damping not zero.) What
-    /// opens beside a row that presses and is a multiple of its own is one contact with it, to which the energy passes.
+    /// Whether a contact that took `energy` at impact does not return it, because it opens only by rounding: bodies
+    /// that stay together without force open by the sign of the last bit. The rounding is measured by the speed that
+    /// the impact took, which is relative. The force of the impact itself does not count as a holding force; with
+    /// damping it is not zero. If a pressed row is a multiple of this row, both are one contact, and the energy
+    /// passes to the pressed row.
     pub(in crate::corrector) fn withholds(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let speed = (T::of(2.0) * s * energy).sqrt();
@@ -108,8 +108,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
     }
 
-    /// Whether a closed row holds its bodies by more than rounding: its force moves the gap within a step, or the
-    /// impulse of its velocity jump the gap rate, by more than these are known to. (Of rates that is a share of ε^⅔.)
+    /// Whether a closed row holds its bodies by more than rounding: within a step its force moves the gap, or the
+    /// impulse of its velocity jump moves the gap rate, by more than their rounding. For rates the rounding is a
+    /// share of ε^⅔.
     pub(in crate::corrector) fn holds(&mut self, row: usize, impulse: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let h = T::of(self.h);
@@ -118,13 +119,13 @@ impl<T: Real> Correction<'_, T> {
         let magnitude = self.g.magnitude(row, &self.new.u);
         let of_gap = self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]) + h * of_rate;
         let by_force = T::of(self.scheme.response[0].abs()) * h * h * s * self.contacts.lambda_raw[row].abs();
-        // (Written so that NaN holds.)
+        // Written so that NaN counts as holding.
         let by_rounding = by_force <= of_gap && s * impulse.abs() <= of_rate;
         Ok(!by_rounding)
     }
 
-    /// If a contact has opened by no more than rounding, in its gap and in its rate, beside a `speed` of which it may
-    /// miss a share of ε^⅔: how fast that is.
+    /// If gap and gap rate of an opened contact are within rounding, where the rate may be wrong by a share of ε^⅔ of
+    /// `speed`: returns the rounding of the rate.
     pub(in crate::corrector) fn parts_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
         let rate = self.rate(row)?;
         let own = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());

@@ -1,5 +1,5 @@
-//! Jumps over contacts with friction: the unknowns are the total impulses of the stage, and the corrected forces, both
-//! in the cone. What spikes in a raw multiplier is taken back, and μ times it with it (theory, section 18).
+//! Jumps over contacts with friction: the unknowns are the total impulses of the stage and the corrected forces, both
+//! in the friction cone. Removing a spike of a raw multiplier also removes μ times it (theory, section 18).
 
 use super::past::FARTHEST;
 use super::{Correction, Jump, Pressed};
@@ -16,7 +16,7 @@ impl<T: Real> Correction<'_, T> {
         !self.constraints.0.tangents().is_empty()
     }
 
-    /// Whether friction holds an engaged contact.
+    /// Whether an engaged contact sticks.
     pub(super) fn sticks(&self, row: usize) -> bool {
         self.contacts.sliding.get(row) == Some(&false) && !self.contacts.tangents.of(row).is_empty()
     }
@@ -24,7 +24,7 @@ impl<T: Real> Correction<'_, T> {
     /// [`solve_velocity_jumps`](Self::solve_velocity_jumps) where contacts have friction: total impulses in the cone.
     pub(in crate::corrector) fn solve_rubbing_velocity(&mut self, pressed: Pressed) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.closed);
-        // What raw multipliers have changed v by is M⁻¹ Gᵀ times this.
+        // Raw multipliers have changed v by M⁻¹ Gᵀ times this factor.
         let share = T::of(self.h * self.scheme.response[1]);
         let result = self.solve_rubbing(&rows, (Jump::Velocity, pressed), share);
         let Self { buffers, contacts, constraints, .. } = self;
@@ -41,17 +41,17 @@ impl<T: Real> Correction<'_, T> {
                 let bound = T::of(constraints.0.tangents().friction(row)) * totals[0];
                 let tangents = block.places().start + 1..block.places().end;
                 let noise = T::largest(&rubbing.noise[tangents.clone()]);
-                // (What has just come to rest has friction at its bound, and nothing that it slides against.)
+                // A contact that has just stopped sliding has friction at its bound but no slip rate.
                 contacts.sliding[row] = slides(length(&totals[1..]), bound) && length(&rubbing.left[tangents]) > noise;
             }
         }
-        // (Blocks of the accelerations ask for the direction of friction.)
+        // The acceleration problem needs the directions of friction.
         rubbing.keep_directions();
         self.buffers.closed = rows;
         result
     }
 
-    /// The same of the accelerations of the engaged rows: a contact that slides goes on along the direction it has.
+    /// The same for the accelerations of the engaged rows: a sliding contact keeps its direction.
     pub(super) fn solve_rubbing_acceleration(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.buffers.engaged);
         let share = T::of(self.scheme.acceleration / self.scheme.balance);
@@ -63,7 +63,7 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Solves for the totals of the contacts `rows`, of which raw multipliers have given `share` times theirs.
+    /// Solves for the totals of the contacts `rows`; raw multipliers already contribute `share` times their values.
     fn solve_rubbing(&mut self, rows: &[usize], (jump, pressed): (Jump, Pressed), share: T) -> Result<()> {
         self.read_rates()?;
         self.read_slip_rates()?;
@@ -83,7 +83,7 @@ impl<T: Real> Correction<'_, T> {
         solved
     }
 
-    /// Writes down the problem of the contacts `rows`, of which raw multipliers have given `share` times theirs.
+    /// Sets up the problem of the contacts `rows`; raw multipliers already contribute `share` times their values.
     fn pose_rubbing(&mut self, rows: &[usize], (jump, presses): (Jump, Pressed), share: T) {
         let Self { buffers, constraints, contacts, g, new, .. } = self;
         let Buffers { rubbing, rebounds, rates, slips, .. } = &mut **buffers;
@@ -107,7 +107,7 @@ impl<T: Real> Correction<'_, T> {
                     Jump::Velocity => (&new.v, rate.rate),
                     Jump::Acceleration => (&new.a, rate.acceleration),
                 };
-                // (Alone a row that stays closed takes any multiplier.)
+                // A row without friction that stays closed admits any multiplier.
                 let is_any = own.is_empty() && presses == Pressed::Stays;
                 let base = if is_any { T::zero() } else { share * contacts.lambda_raw[k] };
                 let size = g.magnitude(k, values) + own_rate.abs();
@@ -115,7 +115,7 @@ impl<T: Real> Correction<'_, T> {
                 rubbing.demand(k, g.product(k, values) + own_rate - asked, rounding(size), base);
             }
         }
-        // (The past takes each row for a block of its own.)
+        // The projection of past states makes each row a block of its own.
         rubbing.blocks.reserve(rubbing.rows.len() - rubbing.blocks.len());
     }
 
@@ -125,8 +125,8 @@ impl<T: Real> Correction<'_, T> {
         buffers.rubbing.solve((g, projection), &mut **solver, T::one(), (*t, |row: usize| ids[row]))
     }
 
-    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips where
-    /// contact sticks. Where it slides the past has had the friction of the impulse that this takes.
+    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips if the
+    /// contact sticks. If it slides, the past gets the friction of the normal impulse applied here.
     pub(super) fn project_rubbing_field(&mut self, k: usize, field: usize, engaged: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, new, .. } = self;
         let Buffers { gaps, past_slips, .. } = &mut **buffers;
@@ -134,7 +134,7 @@ impl<T: Real> Correction<'_, T> {
         constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
         constraints.0.slip_rates(motion.t, &motion.u, &motion.v, past_slips)?;
         if self.constraints.0.turn() {
-            // As of contacts without friction, see `see_straight`.
+            // As for contacts without friction, see `see_straight`.
             self.look_straight((k, field), engaged)?;
             let straight = self.solve_past((k, field), engaged, true)?;
             if self.solve_past((k, field), engaged, false)? > T::of(FARTHEST * FARTHEST) * straight {
@@ -181,9 +181,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Finds the multipliers that project one field of past state k onto the engaged contacts, whose gaps are those at
-    /// its place, or `straight`, as the rows that hold now see them. Says the square of the way of the past, in the
-    /// norm of the mass.
+    /// Finds the multipliers that project one field of past state k onto the engaged contacts, with the gaps at the
+    /// past state, or, if `straight`, the gaps measured with the current rows. Returns the squared distance that the
+    /// past moves in the mass norm.
     fn solve_past(&mut self, (k, field): (usize, usize), engaged: &[usize], straight: bool) -> Result<T> {
         let Self { past, constraints, buffers, projection, solver, g, contacts, t, new, .. } = self;
         let Buffers { rubbing, rebounds, gaps, straight: seen, slips, past_slips, .. } = &mut **buffers;
@@ -192,7 +192,7 @@ impl<T: Real> Correction<'_, T> {
         let tangents = constraints.0.tangents();
         let first = tangents.all().start;
         let slip = |row: usize| match field {
-            // From where it is now, back along the way of the obstacle.
+            // From the current position back along the motion of the obstacle.
             0 => {
                 let now = slips[row - first];
                 let way = g.row(row).map(|(dof, weight)| weight * (motion.u[dof] - new.u[dof])).sum::<T>();
@@ -223,7 +223,8 @@ impl<T: Real> Correction<'_, T> {
                 own.for_each(|row| rubbing.demand(row, slip(row), size(row, slip(row)), T::zero()));
             }
         }
-        // A body that has come from a gap had a positive impulse: its past displacement is moved back by that.
+        // A body that came from a positive gap has received a positive impulse: its past displacement is moved back
+        // accordingly.
         let presses = if field == 0 { -T::one() } else { T::one() };
         let ids = &contacts.ids;
         rubbing.solve((g, projection), &mut **solver, presses, (*t, |row: usize| ids[tangents.owner(row)]))?;
@@ -231,7 +232,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(rubbing.increments.iter().zip(changes).map(|(&multiplier, change)| multiplier * change).sum())
     }
 
-    /// Reads what slips have of their own.
+    /// Reads the slip rates that the constraints add.
     pub(super) fn read_slip_rates(&mut self) -> Result<()> {
         if self.constraints.0.tangents().is_empty() {
             return Ok(());
@@ -243,7 +244,7 @@ impl<T: Real> Correction<'_, T> {
         self.constraints.0.slip_rates(self.t, &self.new.u, &self.new.v, slips)
     }
 
-    /// Applies the impulses found along gaps and tangents.
+    /// Applies the impulses found along normals and tangents.
     pub(in crate::corrector) fn push_rubbing_velocity(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, increments) = (std::mem::take(rows), std::mem::take(increments));
@@ -255,7 +256,7 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Applies the forces found along gaps and tangents.
+    /// Applies the forces found along normals and tangents.
     pub(super) fn push_rubbing_acceleration(&mut self) -> Result<()> {
         let Rubbing { rows, increments, .. } = &mut *self.buffers.rubbing;
         let (rows, mut increments) = (std::mem::take(rows), std::mem::take(increments));

@@ -1,5 +1,5 @@
-//! What a corrector reads of a stage, rows, motion, forces and the numbers of the scheme, and the results that it may
-//! set directly.
+//! What a corrector reads from a stage (rows, motion, forces, coefficients of the scheme), and the results that it
+//! may set directly.
 
 use super::Correction;
 use crate::real::Real;
@@ -38,8 +38,8 @@ impl<T: Real> Correction<'_, T> {
         &self.buffers.opened
     }
 
-    /// In the last stage of a step the rows that were closed in this step, or at its start, and are open at its end;
-    /// none in other stages. Velocities between stages are not read again by every scheme: what is to last is given to
+    /// In the last stage of a step, the rows that were closed in this step or at its start and are open at its end;
+    /// none in other stages. Not every scheme reads velocities between stages again, so lasting changes are made to
     /// the state at the end.
     pub fn released(&self) -> &[usize] {
         &self.buffers.released
@@ -65,8 +65,8 @@ impl<T: Real> Correction<'_, T> {
         &self.new.a
     }
 
-    /// The accelerations, to be edited at will. Nothing is booked: what momentum this changes is for the corrector to
-    /// [book](Self::book_impulse). [`apply_forces`](Self::apply_forces) pushes and books.
+    /// The accelerations, to be edited directly. Nothing is booked: the corrector must [book](Self::book_impulse) the
+    /// momentum change. [`apply_forces`](Self::apply_forces) pushes and books.
     pub fn acceleration_mut(&mut self) -> &mut [T] {
         &mut self.new.a
     }
@@ -76,24 +76,24 @@ impl<T: Real> Correction<'_, T> {
         self.scheme.response
     }
 
-    /// w_ā/w_a: by how much the force on a row in the balance of the stage changes, where a is changed by a unit force.
+    /// w_ā/w_a: the change of the force on a row in the balance of the stage per unit force applied to a.
     pub fn force_share(&self) -> f64 {
         self.scheme.balance / self.scheme.acceleration
     }
 
-    /// Change of momentum, in the form that the scheme conserves, by unit changes of u, v and a of the new state of a
+    /// Change of momentum, in the form that the scheme conserves, per unit change of u, v and a of the new state of a
     /// unit mass.
     pub fn momentum_weights(&self) -> [f64; 3] {
         let [u, v, a] = self.scheme.covector[0];
         [u / self.h, v, a * self.h]
     }
 
-    /// Books an impulse of a contact, for a change that was made by [`acceleration_mut`](Self::acceleration_mut).
+    /// Books an impulse of a contact, for a change made through [`acceleration_mut`](Self::acceleration_mut).
     pub fn book_impulse(&mut self, row: usize, impulse: T) {
         self.contacts.impulse[row] += impulse;
     }
 
-    /// Sets the reported force of a row; the raw one stays, as it decides release.
+    /// Sets the reported force of a row; the raw force, which decides release, is unchanged.
     pub fn report_force(&mut self, row: usize, force: T) {
         self.contacts.lambda[row] = force;
     }

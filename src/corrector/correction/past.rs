@@ -1,17 +1,18 @@
-//! Edits of the past: its projection onto contacts that have just closed, and velocities given to it with those of the
-//! state.
+//! Edits of past states: projection onto newly closed contacts, and velocity changes applied together with those of
+//! the state.
 
 use super::{Buffers, Correction};
 use crate::error::Result;
 use crate::real::Real;
 
-/// How much farther than by the rows that hold now, in the norm of the mass, a projection may move the past.
+/// Largest accepted ratio of the distance that a projection moves the past, in the mass norm, to the distance with
+/// the current rows.
 pub(super) const FARTHEST: f64 = 2.0;
 
 impl<T: Real> Correction<'_, T> {
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
-    /// all past values that later rows read (`docs/theory.md`, history projection); the gap to where it is held, if the
-    /// law reads the gap at the start of a stage.
+    /// all past values that later rows read (`docs/theory.md`, history projection). If the law reads the gap at the
+    /// start of a stage, the gap is projected to its current value.
     ///
     /// # Errors
     ///
@@ -34,7 +35,7 @@ impl<T: Real> Correction<'_, T> {
             true => self.read_slip_rates(),
             false => self.close(&rows),
         };
-        // States not known yet, while a multistep scheme is started, have no covector.
+        // Past states not known yet, while a multistep scheme is started, have no covector.
         let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
         if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
             self.backup.keep(self.past);
@@ -61,9 +62,9 @@ impl<T: Real> Correction<'_, T> {
         let motion = &mut past[k - 1];
         let ago = T::of(new.t - motion.t);
         let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
-        // Of the past motion on its own part of a curved surface: u, v and a fit each other.
+        // The past motion uses its own part of a curved surface, so that u, v and a agree.
         constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
-        // Where a gap is held, under a law that reads it where a stage starts.
+        // The value at which a gap is held under a law that reads it at the start of a stage.
         let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
             true => contacts.gap[row],
             false => rebounds.past(row, field, ago),
@@ -86,8 +87,7 @@ impl<T: Real> Correction<'_, T> {
         let Buffers { rates, jump, tolerance: before, rebounds, .. } = &mut **buffers;
         let motion = &mut past[k - 1];
         let ago = T::of(self.t - motion.t);
-        // In a stage before the last the state that the step starts from loses what the later stages do not see any
-        // more.
+        // In a stage before the last, the state at the start of the step loses energy that later stages do not see.
         if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
             constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
             for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
@@ -110,10 +110,9 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Takes the jumps of one field of past state k as the rows that hold now see them, where by those of the past it
-    /// would move much farther. Rows that are nearly the same, but turned in between, may see pasts that contradict
-    /// each other: together they would throw it far. By rows that hold now it goes no farther than the bodies have
-    /// come.
+    /// Uses the jumps of one field of past state k measured with the current rows, if the rows of the past would move
+    /// it much farther. Rows that are nearly equal, but have turned in between, may contradict each other in the past
+    /// and together move it very far. With the current rows it moves no farther than the bodies have moved.
     fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
         self.look_straight((k, field), rows)?;
         let Self { buffers, projection, past, new, .. } = self;
@@ -133,7 +132,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Reads one field of past state k as the rows that hold now see it.
+    /// Computes one field of past state k with the current rows.
     pub(super) fn look_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
         let Self { past, constraints, buffers, g, contacts, new, .. } = self;
         let Buffers { rates, straight, .. } = &mut **buffers;
@@ -154,19 +153,20 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Lets the past have had the velocity all along that an impulse gives now: v_k += Δv, u_k −= k h Δv where later
-    /// rows read them. Otherwise a scheme that takes velocities from differences of displacements would see a part of
-    /// Δv only, or more than all of it. The impulse itself is applied by [`apply_impulses`](Self::apply_impulses) or
-    /// [`exchange_energy`](Self::exchange_energy), which come first.
+    /// Changes past states as if they had always had the velocity change of an impulse: v_k += Δv, u_k −= k h Δv if
+    /// later rows read them. Otherwise a scheme that computes velocities from differences of displacements would see
+    /// only a part of Δv, or more than Δv. The impulse itself must be applied first, by
+    /// [`apply_impulses`](Self::apply_impulses) or [`exchange_energy`](Self::exchange_energy).
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`](crate::Error::Incompatible) if later rows read the past, and the corrector's
-    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); those of
-    /// [`compliances`](Self::compliances).
+    /// [`Error::Incompatible`](crate::Error::Incompatible) if later rows read past states and the corrector's
+    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); the
+    /// errors of [`compliances`](Self::compliances).
     pub fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
-        // States not known yet, while a multistep scheme is started, have no covector; those between stages drop out.
+        // Past states not known yet, while a multistep scheme is started, have no covector; states between stages are
+        // dropped.
         let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));
         let first = scheme.stages;
         if (first..=places).any(|k| scheme.read[k][0] || scheme.read[k][1]) {

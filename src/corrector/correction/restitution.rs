@@ -1,4 +1,4 @@
-//! Restitution: contacts that close leave with a share of their approach, ġ′ = −e ġ⁻ (theory, section 7.5).
+//! Restitution: closing contacts rebound with a share of their approach rate, ġ′ = −e ġ⁻ (theory, section 7.5).
 
 use super::{Correction, Pressed};
 use crate::contact::{ContactJacobian, GapRates};
@@ -6,35 +6,35 @@ use crate::corrector::{Buffers, rounding, share_of_rounding};
 use crate::error::Result;
 use crate::real::Real;
 
-/// The contacts of a stage that leave with a share of their approach. One entry a row of G unless said otherwise.
+/// The rebounding contacts of a stage. One entry per row of G unless noted.
 #[derive(Debug, Default)]
 pub(in crate::corrector) struct Rebounds<T> {
     /// Whether there are any.
     any: bool,
-    /// The rate before the impact, and that with which a contact is to leave: zero if it is to stay.
+    /// The rate before the impact, and the required rate after it: zero if the contact is to stay.
     before: Vec<T>,
     target: Vec<T>,
     /// The share of the targets that adds no energy.
     share: T,
     /// The contacts that leave, ascending, and their tangential rows.
     leaving: Vec<usize>,
-    /// Rate and acceleration with which they do.
+    /// Their rates and accelerations.
     outgoing: Vec<[T; 2]>,
     forces: Vec<T>,
 }
 
 impl<T: Real> Rebounds<T> {
-    /// Whether contacts leave with a share of their approach.
+    /// Whether any contact rebounds.
     pub(in crate::corrector) fn any(&self) -> bool {
         self.any
     }
 
-    /// The rate that is asked of a row.
+    /// The required rate of a row.
     pub(super) fn asked(&self, row: usize) -> T {
         if self.any { self.share * self.target[row] } else { T::zero() }
     }
 
-    /// Whether a contact, or one of the rows of its friction, leaves.
+    /// Whether a contact leaves; also true for the rows of its friction.
     pub(super) fn leaves(&self, row: usize) -> bool {
         self.leaving.binary_search(&row).is_ok()
     }
@@ -44,7 +44,8 @@ impl<T: Real> Rebounds<T> {
         self.leaving.iter().copied().filter(|&row| !g.is_tangential(row))
     }
 
-    /// Where a row that leaves has been (`field` 0, less where it is now), its rate and its acceleration, a time ago.
+    /// Past value of a leaving row a time `ago`: displacement relative to now (`field` 0), rate (1) or acceleration
+    /// (2).
     pub(super) fn past(&self, row: usize, field: usize, ago: T) -> T {
         if !self.leaves(row) {
             return T::zero();
@@ -59,10 +60,10 @@ impl<T: Real> Rebounds<T> {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Finds the contacts that close, under a law with restitution, faster than they would come back within a step.
+    /// Finds the contacts that close, under a law with restitution, fast enough not to return within a step.
     ///
-    /// The rate before the impact is that at the gap zero, by rate and acceleration of the gap where the stage starts:
-    /// an elastic impact then neither gives nor takes what the gap still was worth in the potential.
+    /// The rate before the impact is evaluated at zero gap, from gap, rate and acceleration at the start of the
+    /// stage: an elastic impact then conserves energy, including the potential energy of the remaining gap.
     pub(super) fn find_rebounds(&mut self) -> Result<bool> {
         self.buffers.rebounds.any = false;
         self.buffers.rebounds.leaving.clear();
@@ -86,7 +87,7 @@ impl<T: Real> Correction<'_, T> {
         outgoing.clear();
         outgoing.resize(g.rows(), [T::zero(); 2]);
         *share = T::one();
-        // Gap and acceleration are kept where the ways of those that leave will be.
+        // `outgoing` temporarily holds gap and acceleration.
         for field in 0..3 {
             constraints.0.elsewhere(field, start.place(), (new.t, &new.u), gaps)?;
             for &row in closed.iter() {
@@ -106,7 +107,8 @@ impl<T: Real> Correction<'_, T> {
                 continue;
             }
             let approach = square.sqrt();
-            // What would be back within two steps, pulled by what its force balances too, stays: it would chatter.
+            // A contact that would return within two steps, pulled by loads that its force also balances, stays: it
+            // would chatter.
             let pulled = self.compliance(row)? * self.buffers.reported[row].max(T::zero()) - acceleration;
             let least = (h * pulled).max(self.noise_of_rate(row, h));
             let Rebounds { any, before, target, .. } = &mut *self.buffers.rebounds;
@@ -130,7 +132,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(rebounds.any)
     }
 
-    /// What of a rate may be rounding (as in the jumps of a step).
+    /// The rounding error of a rate, as in the jumps of a step.
     fn noise_of_rate(&self, row: usize, h: T) -> T {
         let Some(start) = self.past.first() else { return T::zero() };
         let share = share_of_rounding::<T>();
@@ -139,9 +141,9 @@ impl<T: Real> Correction<'_, T> {
         share * of_rates + share / rounding(T::one()) * of_gap / h
     }
 
-    /// Finds impulses with which the contacts of [`find_rebounds`](Self::find_rebounds) leave, and others stay or part:
-    /// all totals press. Where the law would add energy, as it may for different coefficients in one impact, and with
-    /// friction, contacts leave with the largest share of these rates that adds none.
+    /// Finds impulses with which the contacts of [`find_rebounds`](Self::find_rebounds) leave and others stay or
+    /// open; no total pulls. The law may add energy with friction or with different coefficients in one impact;
+    /// contacts then leave with the largest fraction of the target rates that adds none.
     pub(super) fn solve_rebounds(&mut self) -> Result<()> {
         /// Halvings of the share.
         const HALVINGS: usize = 45;
@@ -176,7 +178,7 @@ impl<T: Real> Correction<'_, T> {
         Ok(())
     }
 
-    /// Whether the impulses found add energy: X·(ẏ⁻ + ẏ′)/2 of all rows.
+    /// Whether the impulses add energy: X·(ẏ⁻ + ẏ′)/2 over all rows.
     fn rebounds_gain(&self) -> bool {
         let Buffers { rebounds, rubbing, .. } = &*self.buffers;
         let (mut work, mut size) = (T::zero(), T::zero());
@@ -188,7 +190,8 @@ impl<T: Real> Correction<'_, T> {
         work > T::epsilon().sqrt() * T::epsilon().sqrt().sqrt() * size
     }
 
-    /// Takes the forces of contacts that leave out of the accelerations and of what is reported: they act no more.
+    /// Removes the forces of leaving contacts from the accelerations and from the reported forces: they no longer
+    /// act.
     pub(super) fn release_rebounds(&mut self) -> Result<()> {
         let share = T::of(self.scheme.balance / self.scheme.acceleration);
         let Rebounds { leaving, forces, .. } = &mut *self.buffers.rebounds;
@@ -203,7 +206,7 @@ impl<T: Real> Correction<'_, T> {
         result
     }
 
-    /// Notes rate and acceleration with which contacts leave; says whether any does.
+    /// Stores rates and accelerations of leaving contacts; returns whether there are any.
     pub(super) fn note_outgoing(&mut self) -> Result<bool> {
         if self.buffers.rebounds.leaving.is_empty() {
             return Ok(false);
