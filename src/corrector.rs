@@ -63,86 +63,19 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     /// Name with options, as printed in tables.
     fn name(&self) -> String;
 
-    /// Whether [`correct`](Self::correct) edits past states; only then is a copy kept to undo a failed step.
-    fn edits(&self) -> Edits {
-        Edits::NewState
-    }
-
-    /// Checks once, at build, whether the corrector works with a scheme. Default: it does.
-    ///
-    /// # Errors
-    ///
-    /// The reason, for the [`Error::Incompatible`](crate::Error::Incompatible) that a builder returns.
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+    /// With what the corrector can act; read once, at build.
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
         let _ = tableau;
-        Ok(())
+        Requirements::default()
     }
 
-    /// Checks once, at build, whether the corrector works with a scheme if bodies have damping. Default: it does.
-    ///
-    /// # Errors
-    ///
-    /// The reason, as from [`check`](Self::check).
-    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        let _ = tableau;
-        Ok(())
-    }
-
-    /// Checks once, at build, whether the corrector works if contacts have friction. Default: it does not. Correctors
-    /// built from [`Correction::solve_velocity_jumps`] and the three matching methods can return `Ok`.
-    ///
-    /// # Errors
-    ///
-    /// The reason, as from [`check`](Self::check).
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none")
-    }
-
-    /// Checks once, at build, whether the corrector works with
-    /// [`ContactLaw::PersistencySwitch`](crate::contact::ContactLaw), which constrains the gap rate once the gap is
-    /// closed. Default: it does.
-    ///
-    /// # Errors
-    ///
-    /// The reason, as from [`check`](Self::check).
-    fn check_switch(&self) -> std::result::Result<(), &'static str> {
-        Ok(())
-    }
-
-    /// Checks once, at build, whether contacts under [`ContactLaw::Restitution`] rebound with the required share of
-    /// their approach rate, in a scheme that imposes contact on the displacements of the state. Default: they do not.
-    ///
-    /// [`ContactLaw::Restitution`]: crate::contact::ContactLaw::Restitution
-    ///
-    /// # Errors
-    ///
-    /// The reason, as from [`check`](Self::check).
-    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        let _ = tableau;
-        Err("the correction knows nothing of restitution: choose `PersistencyCorrection::with_history_projection`")
-    }
-
-    /// Whether the corrector removes the forces of closed contacts from the accelerations, so that only the smooth
-    /// motion remains. The accelerations at the start then contain no contact forces, and friction constrains the
-    /// slip of a stage, not its velocity, because the correction changes that. Default: the forces stay.
-    fn leaves_smooth_motion(&self) -> bool {
-        false
-    }
-
-    /// Whether the corrector acts on contacts on dofs without mass, and only on these; such contacts leave no jumps.
-    /// It is then called for every step in which one of them closes or opens, even if the scheme imposes other
-    /// contacts on velocities. Default: it does not.
-    fn corrects_massless(&self) -> bool {
-        false
-    }
-
-    /// Whether [`predict`](Self::predict) does anything; its memory is reserved only then.
-    fn predicts(&self) -> bool {
-        false
+    /// What the corrector does.
+    fn effects(&self) -> Effects {
+        Effects::default()
     }
 
     /// Acts on the prediction of the scheme before a stage is solved. Called for every stage of a run with contacts
-    /// if [`predicts`](Self::predicts) is true. Default: does nothing.
+    /// if [`Effects::predicts`] is true. Default: does nothing.
     ///
     /// # Errors
     ///
@@ -161,11 +94,73 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()>;
 }
 
+/// With what a [`Corrector`] can act. `Err` is the reason in the [`Error::Incompatible`](crate::Error::Incompatible) that
+/// `build` returns. The default fits a corrector without friction and restitution.
+///
+/// ```
+/// use contact_dynamics::corrector::Requirements;
+///
+/// let with_friction = Requirements { friction: Ok(()), ..Requirements::default() };
+/// assert!(with_friction.restitution.is_err());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Requirements {
+    /// The scheme. Default: any.
+    pub scheme: Verdict,
+    /// Damping of the bodies. Default: possible.
+    pub damping: Verdict,
+    /// Friction. Default: refused. Correctors built from [`Correction::solve_velocity_jumps`] and the three matching
+    /// methods can act with friction.
+    pub friction: Verdict,
+    /// Contacts under [`ContactLaw::PersistencySwitch`](crate::contact::ContactLaw), which constrains the gap rate once
+    /// the gap is closed. Default: possible.
+    pub persistency_switch: Verdict,
+    /// Contacts under [`ContactLaw::Restitution`](crate::contact::ContactLaw) rebound with the required share of their
+    /// approach rate, in a scheme that imposes contact on the displacements of the state. Default: they do not.
+    pub restitution: Verdict,
+}
+
+/// Whether a corrector can act with something, or the reason why not.
+pub type Verdict = std::result::Result<(), &'static str>;
+
+impl Default for Requirements {
+    fn default() -> Self {
+        Self {
+            scheme: Ok(()),
+            damping: Ok(()),
+            friction: Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none"),
+            persistency_switch: Ok(()),
+            restitution: Err(
+                "the correction knows nothing of restitution: choose `PersistencyCorrection::with_history_projection`",
+            ),
+        }
+    }
+}
+
+/// What a [`Corrector`] does besides changing the state of the stage. The default is none of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effects {
+    /// The states that [`correct`](Corrector::correct) edits. A copy of past states, to undo a failed step, is kept only
+    /// if it edits them.
+    pub edits: Edits,
+    /// The corrector removes the forces of closed contacts from the accelerations, so that only the smooth motion
+    /// remains. The accelerations at the start then contain no contact forces, and friction constrains the slip of a
+    /// stage, not its velocity, because the correction changes that.
+    pub leaves_smooth_motion: bool,
+    /// The corrector acts on contacts on dofs without mass, and only on these; such contacts leave no jumps. It is then
+    /// called for every step in which one of them closes or opens, even if the scheme imposes other contacts on
+    /// velocities.
+    pub corrects_massless: bool,
+    /// [`predict`](Corrector::predict) does something; its memory is reserved only then.
+    pub predicts: bool,
+}
+
 /// Which states a corrector changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Edits {
     /// Only the state of the stage.
+    #[default]
     NewState,
     /// Past states too.
     Past,
@@ -175,32 +170,11 @@ impl<T: Real, C: Corrector<T> + ?Sized> Corrector<T> for Box<C> {
     fn name(&self) -> String {
         (**self).name()
     }
-    fn edits(&self) -> Edits {
-        (**self).edits()
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        (**self).requirements(tableau)
     }
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        (**self).check(tableau)
-    }
-    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        (**self).check_damping(tableau)
-    }
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        (**self).check_friction()
-    }
-    fn check_switch(&self) -> std::result::Result<(), &'static str> {
-        (**self).check_switch()
-    }
-    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        (**self).check_restitution(tableau)
-    }
-    fn leaves_smooth_motion(&self) -> bool {
-        (**self).leaves_smooth_motion()
-    }
-    fn corrects_massless(&self) -> bool {
-        (**self).corrects_massless()
-    }
-    fn predicts(&self) -> bool {
-        (**self).predicts()
+    fn effects(&self) -> Effects {
+        (**self).effects()
     }
     fn predict(&self, step: &mut Prediction<'_, T>) -> Result<()> {
         (**self).predict(step)

@@ -1,6 +1,6 @@
 //! Fully implicit contact forces, and the stabilized prediction that goes with them.
 
-use super::{Correction, Corrector, Extent, Prediction};
+use super::{Correction, Corrector, Effects, Extent, Prediction, Requirements, Verdict};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::{Rows, Tableau};
@@ -36,16 +36,12 @@ impl<T: Real> Corrector<T> for ContactImplicit {
         "contact-implicit".into()
     }
 
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        one_step(tableau)
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        Requirements { scheme: one_step(tableau), damping: adds_no_velocity(tableau), ..Requirements::default() }
     }
 
-    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        adds_no_velocity(tableau)
-    }
-
-    fn leaves_smooth_motion(&self) -> bool {
-        true
+    fn effects(&self) -> Effects {
+        Effects { leaves_smooth_motion: true, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
@@ -96,25 +92,19 @@ impl<T: Real> Corrector<T> for ContactStabilized {
         }
     }
 
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        one_step(tableau)
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        let damping =
+            Err("it leaves the contact nodes the velocity of their approach while they stay where they are, \
+                           and damping would act on that; choose PersistencyCorrection");
+        Requirements { scheme: one_step(tableau), damping, ..Requirements::default() }
     }
 
-    fn check_damping(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
-        Err("it leaves the contact nodes the velocity of their approach while they stay where they are, and damping \
-             would act on that; choose PersistencyCorrection")
-    }
-
-    fn predicts(&self) -> bool {
-        true
+    fn effects(&self) -> Effects {
+        Effects { predicts: true, leaves_smooth_motion: true, ..Effects::default() }
     }
 
     fn predict(&self, step: &mut Prediction<'_, T>) -> Result<()> {
         step.project(self.extent)
-    }
-
-    fn leaves_smooth_motion(&self) -> bool {
-        true
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
@@ -124,7 +114,7 @@ impl<T: Real> Corrector<T> for ContactStabilized {
 
 /// Rejects schemes that read states before the last one or have intermediate stages: in these the force of a step
 /// leaves more than an acceleration behind.
-pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static str> {
+pub(super) fn one_step(tableau: &Tableau) -> Verdict {
     match tableau.depth() == 1 && tableau.stages.len() == 1 {
         true => Ok(()),
         false => Err("it needs a scheme of one stage that reads the last state alone"),
@@ -132,7 +122,7 @@ pub(super) fn one_step(tableau: &Tableau) -> std::result::Result<(), &'static st
 }
 
 /// Rejects schemes in which removing a constant contact force from the acceleration requires a change of v.
-pub(super) fn adds_no_velocity(tableau: &Tableau) -> std::result::Result<(), &'static str> {
+pub(super) fn adds_no_velocity(tableau: &Tableau) -> Verdict {
     let moves = |row: fn(&Rows) -> f64| tableau.stages.iter().map(|stage| row(&stage.recovery)).sum::<f64>();
     match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < 1e-12 {
         true => Ok(()),

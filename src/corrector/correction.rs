@@ -163,7 +163,7 @@ impl<T: Real> Correction<'_, T> {
     pub(crate) fn correct(&mut self, correctors: &[Box<dyn Corrector<T> + '_>]) -> Result<()> {
         let [jumps, switches] = [self.buffers.has_jumps(), self.buffers.switching.is_pending()];
         for corrector in correctors {
-            let concerns = if corrector.corrects_massless() { switches } else { jumps };
+            let concerns = if corrector.effects().corrects_massless { switches } else { jumps };
             if concerns {
                 corrector.correct(self)?;
             }

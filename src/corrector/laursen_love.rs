@@ -1,7 +1,7 @@
 //! Velocity jumps that return the work of the contact forces.
 
 use super::contact_implicit::one_step;
-use super::{Correction, Corrector};
+use super::{Correction, Corrector, Requirements};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
@@ -37,19 +37,19 @@ impl<T: Real> Corrector<T> for LaursenLove {
         "Laursen–Love".into()
     }
 
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        one_step(tableau)?;
-        match tableau.stages.iter().all(|stage| (stage.load - 0.5).abs() < 1e-12) {
-            true => Ok(()),
-            false => Err("it needs a scheme whose balance, with the force of contact, holds in the middle of the step"),
-        }
-    }
-
-    fn check_switch(&self) -> std::result::Result<(), &'static str> {
-        // The rate is held at the end of a step that begins with a rebound: the force acts over the opening gap, and
-        // no velocity is left that could return this work.
-        Err("contacts rebound by it, and this law holds their rate while they leave: energy would grow without bound; \
-             choose `ContactLaw::Rigid`, or `PersistencyCorrection`")
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        let is_midpoint = tableau.stages.iter().all(|stage| (stage.load - 0.5).abs() < 1e-12);
+        let midpoint = if is_midpoint {
+            Ok(())
+        } else {
+            Err("it needs a scheme whose balance, with the force of contact, holds in the middle of the step")
+        };
+        // With a rate held at the end of a step that begins with a rebound, the force does work along the opening gap,
+        // and no velocity is left to return this work.
+        let persistency_switch =
+            Err("contacts rebound by it, and this law holds their rate while they leave: energy would grow without \
+                 bound; choose `ContactLaw::Rigid`, or `PersistencyCorrection`");
+        Requirements { scheme: one_step(tableau).and(midpoint), persistency_switch, ..Requirements::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

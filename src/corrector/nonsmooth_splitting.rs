@@ -2,7 +2,7 @@
 
 use super::contact_implicit::{adds_no_velocity, one_step};
 use super::correction::Pressed;
-use super::{Correction, Corrector, Rubbing};
+use super::{Correction, Corrector, Effects, Requirements, Rubbing};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
@@ -69,20 +69,13 @@ impl<T: Real> Corrector<T> for NonsmoothSplitting {
         "nonsmooth splitting".into()
     }
 
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        one_step(tableau)
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        let (scheme, damping) = (one_step(tableau), adds_no_velocity(tableau));
+        Requirements { scheme, damping, friction: Ok(()), ..Requirements::default() }
     }
 
-    fn check_damping(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        adds_no_velocity(tableau)
-    }
-
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        Ok(())
-    }
-
-    fn leaves_smooth_motion(&self) -> bool {
-        true
+    fn effects(&self) -> Effects {
+        Effects { leaves_smooth_motion: true, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

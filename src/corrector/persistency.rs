@@ -1,6 +1,6 @@
 //! The λ_v/λ_a correction: velocity and acceleration satisfy the persistency of contact.
 
-use super::{Correction, Corrector, Edits};
+use super::{Correction, Corrector, Edits, Effects, Requirements};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
@@ -114,23 +114,12 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
         }
     }
 
-    fn edits(&self) -> Edits {
-        match self.history {
-            HistoryProjection::Off => Edits::NewState,
-            HistoryProjection::On => Edits::Past,
-        }
-    }
-
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        Ok(())
-    }
-
-    fn check_restitution(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
         let reads_past = |stage: usize| {
             let read = tableau.read_after(stage);
             read.is_ok_and(|read| read.iter().skip(1).flatten().any(|&read| read))
         };
-        match (self.parts, self.history) {
+        let restitution = match (self.parts, self.history) {
             (Parts::Both, HistoryProjection::On) => Ok(()),
             (Parts::Both, HistoryProjection::Off) if !(0..tableau.stages.len()).any(reads_past) => Ok(()),
             (Parts::Both, HistoryProjection::Off) => {
@@ -139,7 +128,16 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
             (Parts::Velocity | Parts::Acceleration, _) => {
                 Err("what leaves has neither its old velocity nor the force of the impact: choose both parts")
             }
-        }
+        };
+        Requirements { friction: Ok(()), restitution, ..Requirements::default() }
+    }
+
+    fn effects(&self) -> Effects {
+        let edits = match self.history {
+            HistoryProjection::Off => Edits::NewState,
+            HistoryProjection::On => Edits::Past,
+        };
+        Effects { edits, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Velocity corrections for contacts that open.
 
 use super::buffers::Given;
-use super::{Correction, Corrector, Edits};
+use super::{Correction, Corrector, Edits, Effects};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
@@ -46,8 +46,8 @@ impl<T: Real> Corrector<T> for Release {
         "release".into()
     }
 
-    fn edits(&self) -> Edits {
-        Edits::Past
+    fn effects(&self) -> Effects {
+        Effects { edits: Edits::Past, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
@@ -164,8 +164,8 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
         }
     }
 
-    fn edits(&self) -> Edits {
-        Edits::Past
+    fn effects(&self) -> Effects {
+        Effects { edits: Edits::Past, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Returns the work that contacts without mass do in the step in which they close or open.
 
 use super::switching::{Switch, Switching};
-use super::{Correction, Corrector};
+use super::{Correction, Corrector, Effects, Requirements};
 use crate::analysis;
 use crate::dense::dot;
 use crate::error::Result;
@@ -71,19 +71,16 @@ impl<T: Real> Corrector<T> for WorkBalance {
         "work balance".into()
     }
 
-    fn check(&self, tableau: &Tableau) -> std::result::Result<(), &'static str> {
-        match analysis::steps_by_means(tableau) {
+    fn requirements(&self, tableau: &Tableau) -> Requirements {
+        let scheme = match analysis::steps_by_means(tableau) {
             true => Ok(()),
             false => Err("it needs a scheme that changes velocities by the mean of two accelerations in every stage"),
-        }
+        };
+        Requirements { scheme, friction: Ok(()), ..Requirements::default() }
     }
 
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        Ok(())
-    }
-
-    fn corrects_massless(&self) -> bool {
-        true
+    fn effects(&self) -> Effects {
+        Effects { corrects_massless: true, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

@@ -196,7 +196,7 @@ impl<T: Real> Simulation<'_, T> {
             load,
             closed: &work.correction.buffers.closed,
             closed_at_start,
-            is_corrected: correctors.iter().any(|corrector| !corrector.corrects_massless()),
+            is_corrected: correctors.iter().any(|corrector| !corrector.effects().corrects_massless),
             corrections,
             h: history.clock.h,
         };

@@ -1,7 +1,7 @@
 //! Correctors of a host, written with what `Correction` offers to everybody, do what those of the crate do.
 
 use contact_dynamics::corrector::{
-    ContactImplicit, Correction, Edits, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
+    ContactImplicit, Correction, Edits, Effects, LaursenLove, Parts, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::{
     Composite, Corrector, Error, GeneralizedAlpha, Gssss, LinearRows, Newmark, Park, PersistencyCorrection, Result,
@@ -19,8 +19,8 @@ impl Corrector<f64> for Own {
     fn name(&self) -> String {
         "own".into()
     }
-    fn edits(&self) -> Edits {
-        Edits::Past
+    fn effects(&self) -> Effects {
+        Effects { edits: Edits::Past, ..Effects::default() }
     }
     fn correct(&self, step: &mut Correction<'_, f64>) -> Result<()> {
         (self.0)(step)

@@ -116,7 +116,7 @@ fn faulty(
     let entries = [(0, 0, 9.0), (0, 1, -9.0), (1, 0, -9.0), (1, 1, 18.0), (1, 2, -9.0), (2, 1, -9.0), (2, 2, 9.0)];
     let inner = LinearSystem::lumped(vec![1.0, 1.0, 0.4], matrix(3, &entries)).unwrap();
     // (The contact-stabilized scheme is refused where there is damping.)
-    let damped = correctors.iter().all(|corrector| corrector.check_damping(&scheme.tableau()).is_ok());
+    let damped = correctors.iter().all(|corrector| corrector.requirements(&scheme.tableau()).damping.is_ok());
     let inner = match damped {
         true => inner.damping(matrix(3, &entries.map(|(i, j, k)| (i, j, 0.005 * k)))).unwrap(),
         false => inner,

@@ -1,7 +1,7 @@
 //! Pointers to parts are parts, and forward every method: a part behind a pointer does and answers what the bare one
 //! does. The methods of a trait are read from its source, so that one that is new must be tried here too.
 
-use contact_dynamics::corrector::{Correction, Edits, Prediction};
+use contact_dynamics::corrector::{Correction, Edits, Effects, Prediction, Requirements};
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::observer::Wants;
 use contact_dynamics::ranks::Ranks;
@@ -245,41 +245,13 @@ impl Corrector<f64> for Remedy {
         self.0.note("name");
         "own".into()
     }
-    fn edits(&self) -> Edits {
-        self.0.note("edits");
-        Edits::Past
+    fn requirements(&self, _: &Tableau) -> Requirements {
+        self.0.note("requirements");
+        Requirements::default()
     }
-    fn check(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
-        self.0.note("check");
-        Ok(())
-    }
-    fn check_damping(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
-        self.0.note("check_damping");
-        Ok(())
-    }
-    fn check_friction(&self) -> std::result::Result<(), &'static str> {
-        self.0.note("check_friction");
-        Ok(())
-    }
-    fn check_switch(&self) -> std::result::Result<(), &'static str> {
-        self.0.note("check_switch");
-        Ok(())
-    }
-    fn check_restitution(&self, _: &Tableau) -> std::result::Result<(), &'static str> {
-        self.0.note("check_restitution");
-        Ok(())
-    }
-    fn leaves_smooth_motion(&self) -> bool {
-        self.0.note("leaves_smooth_motion");
-        true
-    }
-    fn corrects_massless(&self) -> bool {
-        self.0.note("corrects_massless");
-        false
-    }
-    fn predicts(&self) -> bool {
-        self.0.note("predicts");
-        true
+    fn effects(&self) -> Effects {
+        self.0.note("effects");
+        Effects { edits: Edits::Past, leaves_smooth_motion: true, predicts: true, ..Effects::default() }
     }
     fn predict(&self, _: &mut Prediction<'_, f64>) -> Result<()> {
         self.0.note("predict");

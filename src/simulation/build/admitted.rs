@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactId, ContactLaw, Measure};
 use crate::contact_solver::{AdmissibleSet, ContactSolver};
-use crate::corrector::Corrector;
+use crate::corrector::{Corrector, Verdict};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
@@ -108,9 +108,11 @@ pub(crate) fn admitted<T: Real>(
     // (Written out it takes longer than a step of a small system.)
     let solver = if no_sets.is_empty() { String::new() } else { format!("{solver:?}") };
     let mut admitted = Admitted { integrator: integrator.name(), solver, no_sets, ..Admitted::default() };
-    admitted.no_friction = correctors.iter().find_map(|corrector| corrector.check_friction().err());
-    admitted.uncorrected_switch =
-        correctors.iter().find_map(|corrector| corrector.check_switch().err().map(|reason| (corrector.name(), reason)));
+    admitted.no_friction = correctors.iter().find_map(|corrector| corrector.requirements(tableau).friction.err());
+    let with_name = |corrector: &dyn Corrector<T>, verdict: Verdict| Some((corrector.name(), verdict.err()?));
+    admitted.uncorrected_switch = correctors
+        .iter()
+        .find_map(|corrector| with_name(&**corrector, corrector.requirements(tableau).persistency_switch));
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     if tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact)) {
         admitted.no_prediction = Some(
@@ -120,8 +122,8 @@ pub(crate) fn admitted<T: Real>(
     }
     admitted.unrestored = correctors
         .iter()
-        .filter(|corrector| corrects && !corrector.corrects_massless())
-        .find_map(|corrector| corrector.check_restitution(tableau).err().map(|reason| (corrector.name(), reason)));
+        .filter(|corrector| corrects && !corrector.effects().corrects_massless)
+        .find_map(|corrector| with_name(&**corrector, corrector.requirements(tableau).restitution));
     for stage in &tableau.stages {
         if stage.contact_row().z == 0.0 && admitted.no_friction.is_none() {
             admitted.no_friction = Some(

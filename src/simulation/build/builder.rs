@@ -427,7 +427,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
         let mut projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
-        let is_smooth = self.correctors.iter().any(Corrector::leaves_smooth_motion);
+        let is_smooth = self.correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
         let is_resumed = resumed.is_some();
         let begun = if let Some((state, history)) = resumed {
             take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;

@@ -2,7 +2,7 @@
 //! paths, with an estimate of the local error.
 
 use crate::analysis::{self, LocalError};
-use crate::corrector::{Corrector, PersistencyCorrection, WorkBalance};
+use crate::corrector::{Corrector, PersistencyCorrection, Requirements, WorkBalance};
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
@@ -53,14 +53,12 @@ pub(crate) fn check_corrections<T: Real>(
     });
     let damped = system.damping_force().is_some();
     for corrector in correctors {
-        let mut checked = match level {
-            Some(reason) if !corrector.corrects_massless() => Err(reason),
-            _ => corrector.check(tableau),
+        let Requirements { scheme, damping, .. } = corrector.requirements(tableau);
+        let scheme = match level {
+            Some(reason) if !corrector.effects().corrects_massless => Err(reason),
+            _ => scheme,
         };
-        if damped {
-            checked = checked.and_then(|()| corrector.check_damping(tableau));
-        }
-        if let Err(reason) = checked {
+        if let Err(reason) = scheme.and(if damped { damping } else { Ok(()) }) {
             return refuse(&**corrector, reason);
         }
     }

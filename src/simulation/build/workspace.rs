@@ -91,8 +91,8 @@ impl<T: Real> Workspace<T> {
         let dofs = system.dofs();
         let &ContactSize { rows, entries, interface, may_press, curved } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
-        let balances = may_press && correctors.iter().any(Corrector::corrects_massless);
-        let edits_past = correctors.iter().any(|corrector| corrector.edits() == Edits::Past);
+        let balances = may_press && correctors.iter().any(|corrector| corrector.effects().corrects_massless);
+        let edits_past = correctors.iter().any(|corrector| corrector.effects().edits == Edits::Past);
         let room = |needed: bool| if needed && may_press { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
@@ -102,7 +102,7 @@ impl<T: Real> Workspace<T> {
         if curved && may_press {
             contact_rows.curved.mixing = Some(Box::new(Mixing::new(interface)));
         }
-        contact_rows.slides_by_way = correctors.iter().any(Corrector::leaves_smooth_motion);
+        contact_rows.slides_by_way = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
         Self {
             contact: ContactWork {
                 interface: InterfaceWork::new(interface),
@@ -129,7 +129,7 @@ impl<T: Real> Workspace<T> {
                 buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
                 projected_rows: 0,
-                shifted: vec![T::zero(); room(correctors.iter().any(Corrector::predicts))],
+                shifted: vec![T::zero(); room(correctors.iter().any(|corrector| corrector.effects().predicts))],
                 energy: T::zero(),
             },
             rate_check: RateCheck::new(rows),

@@ -258,7 +258,7 @@ impl<T: Real> Simulation<'_, T> {
         let (h, t) = (self.history.clock.h, self.time());
         let Self { system, constraints, g, contact_solver, correctors, scheme, startup, state, .. } = self;
         let (history, work) = (&mut self.history, &mut self.work);
-        let is_smooth = correctors.iter().any(Corrector::leaves_smooth_motion);
+        let is_smooth = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
         let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
