@@ -1,8 +1,8 @@
 //! The simulation: one system, one integrator, contacts and correctors, advanced step by step.
 //!
-//! In the order of a run: `build` puts its parts together, `start` finds its first state, `step` advances it by one
-//! step. A step consists of stages (`stage`), each solved with its effective matrix (`operator`) and the rows of contact
-//! (`rows`). `watch` follows energy and stability, `run` is what the caller has in hands.
+//! In the order of a run: `build` assembles the simulation from its parts, `start` computes the first state, `step`
+//! advances it by one step. A step consists of stages (`stage`), each solved with its effective matrix (`operator`)
+//! and the contact rows (`rows`). `watch` monitors energy and stability, `run` is the interface for the caller.
 
 mod build;
 mod operator;

@@ -1,10 +1,10 @@
-//! The rows of contact: gaps of all constraints as one list, and what a stage constrains of each row.
+//! The contact rows: gaps of all constraints as one list, and the quantity that a stage constrains in each row.
 //!
 //! - `constraints`, `part`, `laws`: all constraints as one list of rows, each constraint with its dofs, and their laws.
 //! - `gaps`, `rate_differences`: gaps of all rows and their rates.
 //! - `kept_depths`: limits the penetration recovered in a step.
-//! - `contact_rows`: what each row constrains in a stage; `slip`: the same of tangential rows; `curved_rows`: gaps that
-//!   are not linear in the displacements.
+//! - `contact_rows`: the quantity that each gap row constrains in a stage; `slip`: the same for tangential rows;
+//!   `curved_rows`: gaps that are not linear in the displacements.
 
 pub(super) mod constraints;
 pub(super) mod contact_rows;

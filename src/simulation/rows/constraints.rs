@@ -21,7 +21,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) ids: Vec<ContactId>,
     pub(crate) laws: Laws,
     pub(crate) tangents: Tangents,
-    /// The tangents before rows were read anew.
+    /// The tangents before the rows were read again.
     old_tangents: Tangents,
     pub(crate) magnitudes: Vec<T>,
     pub(crate) recoveries: Vec<T>,
@@ -32,30 +32,30 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) local: Local<T>,
     /// The free dofs that contact may ever act on, ascending.
     interface: Vec<usize>,
-    /// For each dof of the system its place on the interface.
+    /// Interface index of each dof of the system; `UNKNOWN` or `NO_RESPONSE` for dofs that are not on the interface.
     places: Vec<usize>,
     admitted: Admitted,
     /// Whether candidates have changed since the rows were last read.
     pub(crate) stale: bool,
-    /// Counts how often the rows have been read, and how often their names have changed by that.
+    /// Number of times the rows have been read, and version of their names.
     version: u64,
     names: Names,
-    /// The number of rows that there is to be memory for.
+    /// Number of rows to reserve memory for.
     room: usize,
-    /// How far the last search looks ahead.
+    /// Time by which the last search looked ahead.
     pub(crate) ahead: f64,
     pub(crate) differences: RateDifferences<T>,
-    /// Bonds that break in a step, and features of all that are broken of a constraint.
+    /// Bonds that break in a step, and features of all broken bonds of one constraint.
     overloads: Vec<(usize, f64)>,
     features: Vec<usize>,
-    /// What is added to gaps that were negative at the start: by feature, and by row (empty if there is none).
+    /// Offsets added to gaps that were negative at the start: by feature, and by row (empty if there are none).
     pub(crate) overclosures: Option<Overclosures<T>>,
     pub(crate) added: Vec<T>,
-    /// What is added to gaps in the step under way (empty if there is none).
+    /// Offsets added to gaps in the current step (empty if there are none).
     pub(crate) kept: Vec<T>,
 }
 
-/// The place of a dof that no constraint has listed among those it may act on.
+/// The interface index of a dof on which no constraint may act.
 const UNKNOWN: usize = usize::MAX - 1;
 
 impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
@@ -65,8 +65,8 @@ impl<T: Real> std::fmt::Debug for Constraints<'_, T> {
 }
 
 impl<'a, T: Real> Constraints<'a, T> {
-    /// The constraints after a search at (t, u, v), with bonds that are broken there, and room for the rows of their G
-    /// (kept apart: corrections read G while they evaluate gaps), which the next search reads.
+    /// The constraints after a search at (t, u, v) with the `broken` bonds, and a G that is empty until the next
+    /// search reads its rows. G is kept apart because corrections read it while they evaluate gaps.
     pub(crate) fn new(
         parts: Vec<Box<dyn ContactConstraint<T> + 'a>>,
         (t, u, v): (f64, &[T], &[T]),
@@ -102,7 +102,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
             interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
             let contacts = Contacts::of(&constraint);
-            // (The memory of the largest.)
+            // Reserves memory for the largest constraint.
             scratch.clear();
             constraint.contacts(&mut scratch);
             room += contacts.len() + contacts.rubbing_rows();
@@ -158,7 +158,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok((constraints, ContactJacobian::default()))
     }
 
-    /// The number of rows that there is to be memory for: more than there have ever been, and it grows by doubling.
+    /// Number of rows to reserve memory for: at least the largest number so far. It grows by doubling.
     pub(crate) fn room(&self) -> usize {
         self.room
     }
@@ -191,7 +191,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
             part.settle(motion.t, u);
             let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
-            // This is kept if a later part fails: the next search that succeeds reads the rows again.
+            // The flag stays set if a later part fails: the next successful search reads the rows again.
             part.stale |= found == Candidates::Changed;
             *stale |= part.stale;
         }
@@ -219,8 +219,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(())
     }
 
-    /// Breaks the bonds that do not stand the forces of a step that ends at t, and appends them to those that are
-    /// broken.
+    /// Breaks the bonds that cannot carry the forces of a step that ends at t, and appends them to `broken`.
     pub(crate) fn break_bonds(&mut self, forces: &[T], t: f64, broken: &mut Vec<BrokenBond>) {
         let Self { parts, overloads, features, stale, .. } = self;
         let mut rest = forces;
@@ -243,7 +242,7 @@ impl<'a, T: Real> Constraints<'a, T> {
     pub(crate) fn follow(&mut self, t: f64, u: &[T], jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
         for number in 0..self.parts.len() {
             let moved = self.follow_part(number, t, u);
-            // This is kept after an error, as in a search.
+            // The flag stays set after an error, as in a search.
             let changed = !matches!(moved, Ok(Candidates::Unchanged));
             self.parts[number].stale |= changed;
             self.stale |= changed;
@@ -261,27 +260,27 @@ impl<'a, T: Real> Constraints<'a, T> {
         part.follow(t, gather(&part.dofs, u, &mut local.u)).map_err(|error| of(number, error))
     }
 
-    /// Whether rows never move within a step.
+    /// Whether no rows move within a step.
     pub(crate) fn is_affine(&self) -> bool {
         self.parts.iter().all(|part| part.variation != Variation::Follows)
     }
 
-    /// Whether rows never change at all.
+    /// Whether no rows change at all.
     pub(crate) fn is_fixed(&self) -> bool {
         self.parts.iter().all(|part| part.variation == Variation::Never)
     }
 
-    /// The version of the rows: what was computed from rows of another version is out of date.
+    /// The version of the rows. Results computed from rows of another version are out of date.
     pub(crate) fn version(&self) -> u64 {
         self.version
     }
 
-    /// Whether the constraint of a row has left its rows as they were since a version.
+    /// Whether the constraint of a row has not changed its rows since a version.
     pub(crate) fn is_unchanged(&self, row: usize, since: u64) -> bool {
         self.parts[self.ids[row].constraint].version <= since
     }
 
-    /// The names of all rows, and which version of them these are.
+    /// The names of all rows, and their version.
     pub(crate) fn named(&self) -> (&[ContactId], Names) {
         (&self.ids, self.names)
     }
@@ -295,7 +294,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(Candidates::Changed)
     }
 
-    /// Reads names, laws and G of all rows, and refuses what does not fit the system.
+    /// Reads names, laws and G of all rows, and refuses rows that do not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
         let Self { parts, ids, names, laws, magnitudes, recoveries, places, admitted, .. } = self;
         jacobian.clear();
@@ -353,7 +352,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(())
     }
 
-    /// Reads the tangential rows of contacts with friction, which stand behind those of all gaps.
+    /// Reads the tangential rows of contacts with friction, which follow the rows of all gaps.
     fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
         let Self { parts, ids, names, laws, tangents, old_tangents, places, admitted, .. } = self;
         std::mem::swap(tangents, old_tangents);
@@ -386,18 +385,18 @@ impl<'a, T: Real> Constraints<'a, T> {
         Ok(())
     }
 
-    /// Adds the depths at the start to the gaps from now on.
+    /// Adds the initial overclosures to the gaps from now on.
     pub(crate) fn adjust(&mut self, overclosures: Overclosures<T>) {
         self.overclosures = Some(overclosures);
         self.distribute();
     }
 
-    /// What [`adjust`](Self::adjust) was given.
+    /// The overclosures given to [`adjust`](Self::adjust).
     pub(crate) fn overclosures(&self) -> Option<&Overclosures<T>> {
         self.overclosures.as_ref()
     }
 
-    /// Finds for every row what is added to its gap.
+    /// Finds the offset of the gap of each row.
     fn distribute(&mut self) {
         if let Some(overclosures) = &self.overclosures {
             self.added.clear();
@@ -410,7 +409,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         &self.interface
     }
 
-    /// The place of a dof on the interface; none of one that is prescribed, or that contact never acts on.
+    /// The interface index of a dof; none for a prescribed dof, and for a dof that contact never acts on.
     pub(crate) fn place(&self, dof: usize) -> Option<usize> {
         Some(self.places[dof]).filter(|&place| place < self.interface.len())
     }
@@ -425,7 +424,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         &self.tangents
     }
 
-    /// What the multipliers of a contact belong to.
+    /// The admissible set of the multipliers of a contact.
     pub(crate) fn set(&self, row: usize) -> AdmissibleSet {
         match self.tangents.of(row).len() {
             0 => self.laws[row].into(),
@@ -438,7 +437,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.ids[self.tangents.owner(row)]
     }
 
-    /// [`rows_of`](Self::rows_of) with the rows of friction of these contacts.
+    /// [`rows_of`](Self::rows_of) with the friction rows of these contacts.
     pub(crate) fn all_rows_of<'c>(
         &'c self,
         contacts: &'c ContactState<T>,
@@ -449,12 +448,12 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.rows_of(contacts).flat_map(rows)
     }
 
-    /// Number of candidates: of the rows of their gaps.
+    /// Number of candidates, and of gap rows.
     pub(crate) fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// (contact, row) of the contacts of a state that are still candidates: a search may have changed these since.
+    /// (contact, row) of the contacts of a state that are still candidates. A search may have changed the candidates.
     pub(crate) fn rows_of<'c>(&'c self, contacts: &'c ContactState<T>) -> impl Iterator<Item = (usize, usize)> + 'c {
         let (same, sorted) = (self.ids == contacts.ids, self.ids.is_sorted());
         let row = move |contact: usize, id: &ContactId| match (same, sorted) {
@@ -485,15 +484,15 @@ impl<'a, T: Real> Constraints<'a, T> {
     }
 }
 
-/// Lists the features of the bonds of a constraint that are broken, ascending.
+/// Lists the features of the broken bonds of a constraint, ascending.
 fn list_features(constraint: usize, broken: &[BrokenBond], features: &mut Vec<usize>) {
     features.clear();
     features.extend(broken.iter().filter(|bond| bond.constraint == constraint).map(|bond| bond.feature));
     features.sort_unstable();
 }
 
-/// Refuses (place, weight) pairs of a row that are not of the dofs that its constraint has listed, and weights that are
-/// no numbers.
+/// Refuses entries (place, weight) of a row on dofs on which the constraint may not act, and weights that are not
+/// finite.
 fn check_entries<T: Real>(
     entries: impl Iterator<Item = (usize, T)>,
     (dofs, places): (&[usize], &[usize]),

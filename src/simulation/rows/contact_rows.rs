@@ -1,4 +1,4 @@
-//! What each contact row constrains in a stage, and the buffers of the contact problem.
+//! The quantity that each contact row constrains in a stage, and the buffers of the contact problem.
 
 use crate::contact::{ContactJacobian, GapRates, Measure};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
@@ -11,19 +11,19 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::curved_rows::CurvedRowsWork;
 use crate::state::{Clock, Motion};
 
-/// Which rows a contact problem is about.
+/// The rows that a contact problem contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// All of them.
+    /// All rows.
     All,
-    /// Those that act on dofs without mass in an explicit stage: solved first, with the static balance of these dofs.
+    /// Rows that act on dofs without mass in an explicit stage: solved first, with the static balance of these dofs.
     Massless,
-    /// The others, solved after that.
+    /// The other rows, solved after these.
     Massive,
 }
 
 impl Part {
-    /// Whether the problem is about a row.
+    /// Whether the problem contains a row.
     pub(crate) fn takes(self, on_massless: &[bool], row: usize) -> bool {
         match self {
             Self::All => true,
@@ -33,17 +33,17 @@ impl Part {
     }
 }
 
-/// Buffers of the contact problem, one entry a row of G unless said otherwise: a candidate, or behind all of them a
-/// tangential row.
+/// Buffers of the contact problem, one entry per row of G unless said otherwise: candidates first, then tangential
+/// rows.
 pub(crate) struct ContactRowsWork<T> {
     pub(crate) rates: Vec<GapRates<T>>,
-    /// The same of slips, one a tangential row.
+    /// The same for slips, one per tangential row.
     pub(crate) slips: Vec<GapRates<T>>,
-    /// Whether slips are measured by the way in the stage, though velocities contain the unknown.
+    /// Whether slips are displacements in the stage although the velocities contain the unknown.
     pub(crate) slides_by_way: bool,
     /// Free dofs without mass.
     pub(crate) massless: Vec<usize>,
-    /// What is complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
+    /// The quantity complementary to the multiplier, as a length: the gap, or h times the gap rate at velocity level.
     pub(crate) y: Vec<T>,
     pub(crate) tolerance: Vec<T>,
     /// The weight of d in y.
@@ -53,34 +53,33 @@ pub(crate) struct ContactRowsWork<T> {
     pub(crate) shift: Vec<T>,
     /// Gaps where the balance holds, for compliant laws.
     pub(crate) balance_gap: Vec<T>,
-    /// −ġ there, for laws that read it.
+    /// −ġ where the balance holds, for laws that read it.
     pub(crate) approach: Vec<T>,
     pub(crate) curved: CurvedRowsWork<T>,
-    /// What each row constrains in this stage; for rows whose law reads it, the gap where the stage starts, and the gap
-    /// below which it counts as closed there.
+    /// The quantity that each row constrains in this stage. For laws that read the gap at the start of the stage:
+    /// this gap, and the gap below which the row counts as closed there.
     pub(crate) measure: Vec<Measure>,
     pub(crate) start_gap: Vec<T>,
     pub(crate) start_tolerance: Vec<T>,
-    /// Rows that may be pressed in this stage; at velocity level those whose gap is forecast to be closed.
+    /// Rows that may carry a force in this stage; at velocity level, rows whose forecast gap is closed.
     pub(crate) enabled: Vec<bool>,
-    /// By how much gaps are open, beyond rounding, of rows that are closed and hold a rate or an increment: so far they
-    /// may go on. (What rests would rise, rounding by rounding, until in millions of steps it was taken to be open, and
-    /// fell.)
+    /// Offset of closed rows that constrain a rate or an increment: the gap beyond rounding, by which they may still
+    /// close. Without this offset, rounding would slowly lift a resting contact until it counts as open.
     pub(crate) hover: Vec<T>,
     /// Rows in the contact problem.
     pub(crate) in_problem: Vec<bool>,
-    /// Rows of [`Part::Massless`]; empty where dofs without mass are solved for with the others.
+    /// Rows of [`Part::Massless`]; empty where dofs without mass are solved together with the others.
     pub(crate) on_massless: Vec<bool>,
-    /// Rows of the problem, and its data, one entry a row of the problem.
+    /// Rows of the problem. The data of the problem have one entry per row of it.
     pub(crate) problem: Vec<usize>,
-    /// Compliances of these rows, and the size of the diagonal of W, where W is applied and not formed.
+    /// Compliances of these rows, and magnitude of the diagonal of W, for problems whose W is applied and not formed.
     pub(crate) own: Vec<T>,
     pub(crate) scale: Vec<T>,
     /// The same rows, ascending.
     pub(crate) sorted: Vec<usize>,
-    /// Rows for which the contact solver has memory.
+    /// Number of rows for which the contact solver has reserved memory.
     pub(crate) reserved: usize,
-    /// Rows for which it is known that there was memory when they were first to be solved for; a few take little.
+    /// Number of rows for which the available memory has been checked; small problems are not checked.
     pub(crate) most: usize,
     /// Number of Delassus operators assembled so far: the newest version.
     pub(crate) versions: u64,
@@ -89,17 +88,17 @@ pub(crate) struct ContactRowsWork<T> {
     pub(crate) sets: Vec<AdmissibleSet>,
     pub(crate) multipliers: Vec<T>,
     pub(crate) known: KnownForces<T>,
-    /// What contact constrains, and where the gap is forecast, one entry a dof; empty for schemes that impose contact
-    /// on the displacements of the new state.
+    /// The values that contact constrains, and the displacements of the gap forecast, one entry a dof; empty for
+    /// schemes that impose contact on the displacements of the new state.
     pub(crate) target: Vec<T>,
     pub(crate) forecast: Vec<T>,
-    /// Prescribed motions at the time of either.
+    /// Prescribed motions at the time of the target or of the forecast.
     pub(crate) supports: Vec<[T; 3]>,
 }
 
 impl<T: Real> ContactRowsWork<T> {
     /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of
-    /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed ones.
+    /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed dofs.
     pub(crate) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
         let mut work = Self {
             rates: Vec::new(),
@@ -141,7 +140,7 @@ impl<T: Real> ContactRowsWork<T> {
         work
     }
 
-    /// Memory for so many rows, of so many weights.
+    /// Reserves memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, approach, .. } = self;
         for values in [y, tolerance, weight, compliance, shift, balance_gap, approach] {
@@ -171,7 +170,7 @@ impl<T: Real> ContactRowsWork<T> {
     }
 
     /// Lists the rows of the problem, group by group, and its data. Rows are divided by their weight, which makes W
-    /// symmetric whatever the rows constrain.
+    /// symmetric for every kind of row.
     pub(crate) fn list_problem(
         &mut self,
         constraints: &Constraints<'_, T>,
@@ -189,7 +188,7 @@ impl<T: Real> ContactRowsWork<T> {
         self.problem_tolerance.clear();
         sets.clear();
         for &j in problem.iter() {
-            // (A normal force that is known has no weight.)
+            // A row with a known normal force has no weight.
             let known = weight[j] == T::zero();
             offset.push(if known { T::zero() } else { (y[j] + shift[j]) / weight[j] });
             self.problem_tolerance.push(if known { T::zero() } else { tolerance[j] / weight[j] });
@@ -199,7 +198,7 @@ impl<T: Real> ContactRowsWork<T> {
         }
     }
 
-    /// Evaluates the gaps where a stage starts, if a law reads them; the rows are linearized there still.
+    /// Evaluates the gaps at the start of a stage, if a law reads them. The rows are still linearized there.
     pub(crate) fn read_start(
         &mut self,
         constraints: &mut Constraints<'_, T>,
@@ -224,7 +223,7 @@ impl<T: Real> ContactRowsWork<T> {
         Ok(())
     }
 
-    /// Decides what rows constrain whose law reads the gap at the start of the stage. y holds the gaps of its motion
+    /// Decides the measure of rows whose law reads the gap at the start of the stage. y holds the gaps of the motion
     /// without contact.
     pub(crate) fn decide(&mut self, constraints: &Constraints<'_, T>) {
         if !constraints.laws().read_start {
@@ -235,14 +234,14 @@ impl<T: Real> ContactRowsWork<T> {
             if *measure != Measure::Undecided {
                 continue;
             }
-            // A contact at rest has a gap that is small beside the way that its force prevents: that from the gap at
-            // the start to the gap of the free motion.
+            // The gap of a resting contact is small compared with the displacement that its force prevents, from the
+            // gap at the start to the gap of the free motion.
             let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
             *measure = constraints.law(row).measure(closed);
         }
     }
 
-    /// Turns the gaps in y, and their tolerances, into what is constrained by rows whose law reads the gap at the start
+    /// Converts the gaps in y, and their tolerances, to the measure of each row whose law reads the gap at the start
     /// of the stage. `lacking` is the part of d on the interface that the velocities do not contain yet.
     pub(crate) fn measure(
         &mut self,
@@ -269,7 +268,7 @@ impl<T: Real> ContactRowsWork<T> {
                     });
                     let own = rates[row].rate;
                     y[row] = h * (g.product(row, &new.v) + part + own) + hover[row];
-                    // Velocities that are differences of displacements have the rounding of those.
+                    // Velocities computed as differences of displacements have the rounding of the displacements.
                     let known = if stage.recovery.subtracts(1) { g.magnitude(row, &new.u) } else { T::zero() };
                     tolerance[row] = rounding(known + h * (g.magnitude(row, &new.v) + size + own.abs()));
                 }
@@ -278,18 +277,18 @@ impl<T: Real> ContactRowsWork<T> {
         Ok(())
     }
 
-    /// Keeps the gaps of the balance, to which the inertia of compliant laws is added next.
+    /// Stores the gaps of the balance before the inertia of compliant laws is added to them.
     pub(crate) fn keep_balance_gaps(&mut self) {
         self.curved.foreseen.copy_from_slice(&self.balance_gap);
     }
 
-    /// The weight of d in what a row constrains, if it is not that of the scheme.
+    /// The weight of d in the measure of a row, if it differs from the weight of the scheme.
     pub(crate) fn own_weight(&self, stage: &CompiledStage<T>, h: f64, row: usize) -> Option<T> {
         (self.measure[row] == Measure::Rate).then(|| T::of(h) * stage.recovery.weights()[1])
     }
 
-    /// Evaluates y of all rows at the target, and their tolerances: the rounding of y, and a fraction `approach` of the
-    /// way by which the gap changes in one step.
+    /// Evaluates y of all rows at the target, and their tolerances: the rounding of y, and a fraction `approach` of
+    /// the change of the gap in one step.
     pub(crate) fn evaluate(
         &mut self,
         level: &Level<'_, T>,
@@ -316,8 +315,8 @@ impl<T: Real> ContactRowsWork<T> {
         if approach > 0.0 {
             constraints.finite_rates(new.t, &new.u, &new.v, rates)?;
         }
-        // Far rows are those whose gap is beyond any tolerance of a row: at the end of a stage nothing more is asked.
-        // (Where rows are few, bounds over all dofs cost more than these rows do.)
+        // Far rows have a gap above the tolerance of any row: at the end of a stage no tighter tolerance is needed.
+        // With few rows, bounds over all dofs would cost more than the rows.
         let many = 16 * constraints.len() > values.len();
         let ends = approach > 0.0 && many && constraints.laws().are_uniform() && !level.is_velocity();
         let far = ends.then(|| {
@@ -345,14 +344,14 @@ impl<T: Real> ContactRowsWork<T> {
     }
 }
 
-/// A contact problem some normal multipliers of which are known: rows of their own, λ = the force.
+/// A contact problem in which some normal multipliers are known: their rows are the uncoupled equations λ = force.
 pub(crate) struct KnownForces<T> {
     delassus: Vec<T>,
     offset: Vec<T>,
 }
 
 impl<T: Real> KnownForces<T> {
-    /// The problem with the rows of which `force` knows the multiplier uncoupled from all others.
+    /// Poses the problem with the rows whose multiplier is given by `force` uncoupled from all others.
     pub(crate) fn pose<'p>(
         &'p mut self,
         problem: &ContactProblem<'p, T>,
@@ -361,8 +360,8 @@ impl<T: Real> KnownForces<T> {
         let (Self { delassus, offset }, size) = (self, problem.size());
         delassus.clear();
         offset.clear();
-        // (The diagonal of rows that stay as they are may be any number, that of a force which a static balance has
-        // found is in no unit of W: it is as large as the others' here.)
+        // The diagonal of an uncoupled row is arbitrary. The diagonal for a force found by a static balance is not in
+        // the unit of W, so the largest of the other diagonals is used.
         let unknown = (0..size).filter(|&i| force(i).is_none());
         let largest = unknown.fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
         let own = |i: usize| if largest > T::zero() { largest } else { problem.delassus(i, i) };
@@ -400,7 +399,7 @@ impl<T: Real> Level<'_, T> {
     }
 }
 
-/// The gap below which a contact counts as closed: 1e-10 of the way made in the step, plus its rounding.
+/// The gap below which a contact counts as closed: 1e-10 of the displacement in the step, plus its rounding.
 fn sliver<T: Real>(way: T) -> T {
     T::of(1e-10) * way + rounding(way)
 }

@@ -1,49 +1,50 @@
 //! Curved gaps within a stage: the gap condition holds where contact is imposed, the force acts along the rows where
 //! the balance holds.
 //!
-//! Contact is solved with linear rows on the interface. Afterwards rows are linearized again, at the resulting
-//! displacements, and the problem is solved once more, until rows and displacements fit. W = F A⁻¹ Fᵀ is made of the
-//! force rows F alone, which keeps it symmetric. Gaps are evaluated without linearization, so the iteration converges
-//! to the solution of the unsymmetric G A⁻¹ Fᵀ.
+//! Contact is solved with linear rows on the interface. Then the rows are linearized again, at the resulting
+//! displacements, and the problem is solved again, until rows and displacements agree. W = F A⁻¹ Fᵀ contains only the
+//! force rows F, which keeps it symmetric. Gaps are evaluated without linearization, so the iteration converges to
+//! the solution of the unsymmetric G A⁻¹ Fᵀ.
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::contact::mixing::Mixing;
 
-/// The most linearizations of curved rows in a contact problem.
+/// Maximum number of linearizations of curved rows in a contact problem.
 pub(crate) const FOLLOWED: usize = 48;
 
-/// The number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
-/// other, and either pushes it to the other side.
+/// Number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
+/// other, and either normal force pushes it to the other side.
 const LONG: usize = 12;
 
-/// The number of linearizations after which they are mixed. Nearly all stages fit by then, or alternate.
+/// Number of linearizations after which Anderson mixing starts. Nearly all stages converge or alternate before that.
 pub(crate) const SLOW: usize = 18;
 
-/// The relative miss of gaps and forces at which rows fit, in units of the rounding.
+/// The relative [`Miss`] of gaps and forces at which the iteration has converged, in units of the rounding.
 const FIT: f64 = 64.0;
 
-/// The relative miss that is accepted where it falls no more.
+/// The relative miss that is accepted once it no longer decreases.
 pub(crate) const NEAR: f64 = 1e-8;
 
-/// The miss of a gap, in its tolerances, that is accepted where it falls no more.
+/// The miss of a gap, in multiples of its tolerance, that is accepted once it no longer decreases.
 pub(crate) const NOISE: f64 = 8.0;
 
-/// Share of the forces that they may miss then where gaps miss no more than [`NEAR`].
+/// The relative miss of the forces that is accepted after [`LONG`] linearizations if gaps miss by at most [`NEAR`].
 const TIRED: f64 = 1e-5;
 
-/// Share of the forces that may alternate then, which is the angle between the sides: both normals are right there.
+/// The relative miss of alternating forces that is accepted then: the angle between two sides whose normals are both
+/// valid.
 const EDGE: f64 = 0.1;
 
-/// Share of the miss of the pass before the last that tells what alternates from what converges, however slowly.
+/// Rows alternate if they miss by at least this share of the miss two linearizations before. Otherwise they converge.
 const AGAIN: f64 = 0.999;
 
-/// The relative miss of gaps that tells such a node, which stays at the edge, from rows that find no rest on a curve:
-/// these miss gaps as they miss forces.
+/// The relative miss of gaps up to which alternating rows belong to a node on an edge. Rows that do not converge on a
+/// curved surface miss gaps as much as forces.
 const AT_EDGE: f64 = 1e-6;
 
-/// How much the gaps and forces of rows linearized at the result differ from those that were solved for.
+/// Differences between the gaps and forces of rows linearized at the result and the gaps and forces solved for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Miss {
     /// Difference of the gaps, relative to their change by d.
@@ -52,13 +53,13 @@ pub(crate) struct Miss {
     pub(crate) force: f64,
 }
 
-/// What differs most.
+/// The largest difference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Worst {
-    /// The contact.
+    /// Row of the contact.
     pub(crate) row: usize,
     pub(crate) what: &'static str,
-    /// By how much, relative, and how much is accepted where it falls no more.
+    /// The relative difference, and the difference that is accepted once it no longer decreases.
     pub(crate) change: f64,
     pub(crate) tolerance: f64,
 }
@@ -73,22 +74,23 @@ impl Worst {
 }
 
 impl Miss {
-    /// Before anything was solved.
+    /// The miss before the first solution.
     pub(crate) const ALL: Self = Self { gap: f64::INFINITY, force: f64::INFINITY };
 
     pub(crate) fn largest(self) -> f64 {
         self.gap.max(self.force)
     }
 
-    /// Whether rows fit, or nearly fit and miss no less than in the passes before, that `before` this one and the
-    /// `earlier` one, after so many `passes`; or are as near as they come where no smaller step may be taken instead.
+    /// Whether the iteration may end after `passes` linearizations. The miss is within rounding; or small and no
+    /// longer decreasing; or alternating; or small at the last linearization of a step that cannot be halved.
+    /// `before` is the miss of the last linearization, `earlier` the miss of the one before.
     pub(crate) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], may_halve: bool) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
         let force = if passes > LONG { TIRED } else { NEAR };
         let near = within(NEAR, force) && (now > 0.25 * before.largest() || passes == FOLLOWED);
-        // (Passes that are mixed may miss as much as before by chance.)
+        // With Anderson mixing a miss may repeat at random.
         let alternates =
             (LONG + 1..=SLOW).contains(&passes) && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
         let as_near_as_may_be = passes == FOLLOWED && !may_halve && within(AT_EDGE, TIRED);
@@ -98,21 +100,21 @@ impl Miss {
 
 /// Memory for curved rows.
 pub(crate) struct CurvedRowsWork<T> {
-    /// F, if it is not G: the rows where the balance holds.
+    /// F, if it differs from G: the rows where the balance holds.
     pub(crate) rows: ContactJacobian<T>,
-    /// Version of the constraints' rows that F is a copy of.
+    /// Version of the rows that F is a copy of.
     version: u64,
-    /// Whether F is not G.
+    /// Whether F differs from G.
     pub(crate) apart: bool,
-    /// Gaps where the balance holds, evaluated there; one a candidate.
+    /// Gaps evaluated where the balance holds, one per candidate.
     pub(crate) gaps: Vec<T>,
-    /// The gaps that the rows which were solved with foresee; one a candidate.
+    /// Gaps and slips predicted by the rows of the last solution, one per row.
     pub(crate) foreseen: Vec<T>,
-    /// What missed most after the last linearization.
+    /// The largest difference after the last linearization.
     pub(crate) worst: Worst,
-    /// What finds rest where passes come nearer slowly; there if rows may move within a step.
+    /// Anderson mixing of slowly converging linearizations; present if rows may move within a step.
     pub(crate) mixing: Option<Box<Mixing<T>>>,
-    /// Whether a smaller step may be taken instead of this one.
+    /// Whether the step may be halved instead.
     pub(crate) may_halve: bool,
 }
 
@@ -130,7 +132,7 @@ impl<T: Real> CurvedRowsWork<T> {
         }
     }
 
-    /// Memory for so many rows, of so many weights.
+    /// Reserves memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.gaps.resize(rows, T::zero());
         self.foreseen.resize(rows, T::zero());
@@ -172,7 +174,7 @@ impl<T: Real> CurvedRowsWork<T> {
 mod tests {
     use super::*;
 
-    /// Forces that do not settle as well as gaps are accepted after many linearizations, not before.
+    /// A larger miss of the forces is accepted after many linearizations only.
     #[test]
     fn forces_may_miss_more_once_rows_are_tired() {
         let miss = |force| Miss { gap: 1e-9, force };
@@ -183,7 +185,7 @@ mod tests {
         for passes in [SLOW + 1, FOLLOWED] {
             assert!(settled(0.5 * TIRED, passes) && !settled(2.0 * TIRED, passes), "{passes}");
         }
-        // Unless they still fall by more than a quarter from pass to pass.
+        // Not while each linearization still reduces it to less than a quarter.
         assert!(!miss(0.5 * TIRED).is_settled::<f64>(SLOW + 1, [miss(0.1), miss(0.2)], true));
     }
 }

@@ -1,4 +1,4 @@
-//! Gaps of all rows and their rates, here and elsewhere.
+//! Gaps of all rows and their rates, at the current motion and at other motions.
 
 use crate::contact::{ContactLaw, GapRates, Rates, Tangents, Variation};
 use crate::corrector::{Gaps, rounding};
@@ -24,7 +24,7 @@ impl<T: Real> Constraints<'_, T> {
         self.refuse_infinite(t, "the gap", out)
     }
 
-    /// Adds to gaps, or to derivatives of them, what is added in the run and in the step.
+    /// Adds the offsets of the run and of the step to gaps, or to their derivatives.
     fn shift(&self, t: f64, derivative: usize, out: &mut [T]) {
         if let Some(overclosures) = &self.overclosures {
             let share = T::of(overclosures.share(t)[derivative]);
@@ -75,7 +75,8 @@ impl<T: Real> Constraints<'_, T> {
         Ok(())
     }
 
-    /// What the gap rates of a constraint have of their own, as it says or from differences of its gaps.
+    /// The parts of the gap rates that do not come from v and a: as a constraint gives them, or from differences of
+    /// gaps.
     fn rates_of(&mut self, number: usize, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) -> Result<()> {
         if out.is_empty() {
             return Ok(());
@@ -101,7 +102,7 @@ impl<T: Real> Constraints<'_, T> {
         Ok(())
     }
 
-    /// What the slips of contacts with friction have of their own, one entry a tangential row.
+    /// The parts of the slip rates that do not come from v and a, one entry per tangential row.
     pub(crate) fn finite_slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
         let Self { parts, ids, tangents, slip_rates, local, .. } = self;
         let (mut contact, mut filled) = (0, 0);
@@ -147,7 +148,7 @@ impl<T: Real> Constraints<'_, T> {
         Ok(())
     }
 
-    /// Whether the constraint of a row has given its rates when they were asked for.
+    /// Whether the rates of a row are not differences of its gaps.
     pub(crate) fn gives_rates(&self, row: usize) -> bool {
         self.parts[self.ids[row].constraint].rates != Some(Rates::Differences)
     }
@@ -220,7 +221,7 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
                 self.rates = rates;
                 found
             });
-            // Back to the same rows, after an error too: G need not be read again.
+            // Linearizes the same rows again, after an error too: G need not be read again.
             let back = self.follow_part(number, here.0, here.1);
             self.parts[number].stale |= back.is_err();
             self.stale |= back.is_err();

@@ -1,4 +1,4 @@
-//! Depths that contacts keep for a step: what a search finds far inside of a body comes out slowly.
+//! Limits the penetration recovered per step by contacts that are deep inside a body.
 
 use crate::contact::{Candidates, ContactJacobian, ContactLaw, kept_depth};
 use crate::error::{Error, Result};
@@ -7,9 +7,9 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::state::Motion;
 
 impl<T: Real> Constraints<'_, T> {
-    /// [`search`](Self::search) at the start of a step, which measures gaps from where it finds the contacts that are
-    /// deeper than they may come out by ([`Contact::recovery`](crate::contact::Contact::recovery)), times the `share`
-    /// that the step is of a whole one: halves of a step would throw them out.
+    /// [`search`](Self::search) at the start of a step, then [`keep_depths`](Self::keep_depths) with the recovery of
+    /// each [contact](crate::contact::Contact::recovery). `share` is the step size over the size of a whole step:
+    /// without it, halved steps would recover penetration too fast.
     pub(crate) fn search_for_step(
         &mut self,
         motion: &Motion<T>,
@@ -21,8 +21,8 @@ impl<T: Real> Constraints<'_, T> {
         Ok(found)
     }
 
-    /// Measures gaps from where contacts are in a motion, as far as they are deeper than what they come out by, times
-    /// the share. (Of no share, as the step has left them that made the motion.)
+    /// Offsets each gap by the penetration at `motion` that exceeds `share` times the recovery of a whole step. A
+    /// share of 0 keeps the penetration that the last step has left.
     pub(crate) fn keep_depths(&mut self, motion: &Motion<T>, share: f64) -> Result<()> {
         self.kept.clear();
         if self.recoveries.iter().all(|recovery| recovery.is_infinite()) {
@@ -39,14 +39,14 @@ impl<T: Real> Constraints<'_, T> {
         evaluated.inspect_err(|_| self.kept.clear())
     }
 
-    /// Makes gaps of a state those that the step under way measures.
+    /// Converts gaps of a state to the offset gaps that the current step measures.
     pub(crate) fn measure_from_kept(&self, gaps: &mut [T]) {
         for (gap, &kept) in gaps.iter_mut().zip(&self.kept).filter(|(_, kept)| **kept > T::zero()) {
             *gap += kept;
         }
     }
 
-    /// Makes gaps that the step has measured those of a state.
+    /// Converts the offset gaps of the step to gaps of a state.
     pub(crate) fn measure_from_surfaces(&self, gaps: &mut [T]) {
         for (gap, &kept) in gaps.iter_mut().zip(&self.kept).filter(|(_, kept)| **kept > T::zero()) {
             *gap -= kept;
@@ -54,7 +54,8 @@ impl<T: Real> Constraints<'_, T> {
     }
 }
 
-/// How far a row comes out in a step, as its constraint says; all of it if what is deep presses as it is deep.
+/// The penetration that a row may recover in a step: as its constraint gives it, or infinite if its law needs no
+/// limit.
 pub(crate) fn recovery_of<T: Real>(said: T, law: ContactLaw) -> Result<T> {
     if said.is_nan() || said < T::zero() {
         let (name, range) = ("the depth by which a contact comes out in a step", "from 0");

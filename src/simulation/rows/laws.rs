@@ -1,4 +1,4 @@
-//! The laws of all rows, and what is known of them together: a phase that no law asks for costs nothing.
+//! The laws of all rows, and their common properties: a phase that no law needs costs nothing.
 
 use crate::contact::ContactLaw;
 
@@ -15,16 +15,16 @@ pub(crate) struct Laws {
     pub(crate) inertial: bool,
     /// Whether the force of any row depends on the rate of its gap.
     pub(crate) damped: bool,
-    /// Whether any row leaves with a share of its approach.
+    /// Whether any row rebounds.
     pub(crate) rebound: bool,
-    /// Whether any row holds both ways.
+    /// Whether any row is bilateral.
     pub(crate) equality: bool,
-    /// The most augmentations of a row.
+    /// The largest number of augmentations of a row.
     pub(crate) augmentations: usize,
 }
 
 impl Laws {
-    /// Memory for so many rows.
+    /// Reserves memory for `rows` rows.
     pub(crate) fn with_capacity(rows: usize) -> Self {
         Self { list: Vec::with_capacity(rows), ..Self::default() }
     }
@@ -48,7 +48,7 @@ impl Laws {
         self.augmentations = self.augmentations.max(law.augmentations());
     }
 
-    /// Whether every row constrains what the scheme asks for, with the weight of d that the scheme gives it.
+    /// Whether every row constrains the quantity of the scheme, with the weight of d of the scheme.
     pub(crate) fn are_uniform(&self) -> bool {
         !self.compliant && !self.read_start
     }

@@ -1,10 +1,10 @@
-//! One constraint of a run: its dofs, what it has said, and its local vectors.
+//! One constraint of a run: its dofs, the properties it has reported, and its local vectors.
 
 use crate::contact::{Candidates, ContactConstraint, ContactId, Contacts, Rates, Variation};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// A constraint with what it has said.
+/// A constraint with the properties it has reported.
 pub(crate) struct Part<'a, T: Real> {
     pub(crate) constraint: Box<dyn ContactConstraint<T> + 'a>,
     pub(crate) dofs: Vec<usize>,
@@ -15,16 +15,16 @@ pub(crate) struct Part<'a, T: Real> {
     pub(crate) place: (f64, Vec<T>),
     /// Whether its rows may have changed since they were read.
     pub(crate) stale: bool,
-    /// The version of the rows of all constraints with which its own were read.
+    /// The common version of all rows when its own were last read.
     pub(crate) version: u64,
-    /// What it has said of its rates, once it was asked; forgotten when its rows change.
+    /// How it gives its rates, once evaluated; reset when its rows change.
     pub(crate) rates: Option<Rates>,
-    /// The same of the rates of slip.
+    /// The same for its slip rates.
     pub(crate) slip_rates: Option<Rates>,
 }
 
 impl<T: Real> Part<'_, T> {
-    /// Moves the linearization to its own u.
+    /// Moves the linearization to its local displacements u.
     pub(crate) fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         if self.variation != Variation::Follows {
             return Ok(Candidates::Unchanged);
@@ -33,7 +33,7 @@ impl<T: Real> Part<'_, T> {
         self.constraint.follow(t, u)
     }
 
-    /// Notes where the rows are linearized.
+    /// Stores where the rows are linearized.
     pub(crate) fn settle(&mut self, t: f64, u: &[T]) {
         if self.variation == Variation::Follows {
             self.place.0 = t;
@@ -58,7 +58,7 @@ pub(crate) fn gather<'l, T: Real>(dofs: &[usize], x: &[T], local: &'l mut Vec<T>
     local
 }
 
-/// The error of a constraint, with its number in the names of contacts.
+/// Adds the number of the constraint to the contact in its error.
 pub(crate) fn of(constraint: usize, error: Error) -> Error {
     match error {
         Error::PassedThrough { t, h, contact, what, way, gap } => {

@@ -21,19 +21,20 @@ impl<T> Default for RateDifferences<T> {
     }
 }
 
-/// Shares of the time ahead by which gaps are differenced, once and twice.
+/// Time increments of the first and second differences of gaps, as shares of the time ahead.
 ///
-/// With δ such a time, the rate errs by δ²/6 |g⃛| and ε m/δ, the acceleration by δ²/12 |g⁗| and 4 ε m/δ², m being the
-/// size of what a gap is summed from. In f64 these are 2e-7 h² |g⃛| + 1e3 ε m/h and h²/3072 |g⁗| + 1e3 ε m/h²: next to
-/// what a scheme of order 2 leaves, and to the rounding of a gap over a step.
+/// With such an increment δ, the rate has the errors δ²/6 |g⃛| and ε m/δ, the acceleration δ²/12 |g⁗| and 4 ε m/δ²,
+/// where m is the magnitude of the terms of a gap. In f64 these are 2e-7 h² |g⃛| + 1e3 ε m/h and
+/// h²/3072 |g⁗| + 1e3 ε m/h², to be compared with the error of a scheme of order 2 and with the rounding of a gap
+/// over a step.
 fn shares<T: Real>() -> [f64; 2] {
     if T::epsilon().value() < 1e-10 { [1e-3, 1.0 / 16.0] } else { [1.0 / 16.0, 0.25] }
 }
 
 impl<T: Real> RateDifferences<T> {
-    /// Central differences of the gaps at t ± δ: with u held for the rate ∂g/∂t, along u ± δ v for the acceleration
-    /// Ġ v + ∂ġ/∂t. Differences that are rounding are zero. `home` is where the rows are linearized, if they follow:
-    /// they are there again afterwards.
+    /// Central differences of the gaps at t ± δ: with u held for the rate ∂g/∂t, along u ± δ v for the acceleration Ġ
+    /// v + ∂ġ/∂t. Differences within rounding are set to zero. `home` is where the rows are linearized, if they
+    /// follow u. They are linearized there again afterwards.
     pub(crate) fn find(
         &mut self,
         constraint: &mut dyn ContactConstraint<T>,
@@ -70,7 +71,7 @@ impl<T: Real> RateDifferences<T> {
             }
             constraint.gaps(t + s, moved, gaps)
         };
-        // Times that t can tell apart.
+        // Increments that are representable at t.
         let [single, double] = shares::<T>().map(|share| (t + (share * ahead).max(resolution(t))) - t);
         gaps(-single, T::zero(), before)?;
         gaps(single, T::zero(), after)?;

@@ -1,9 +1,9 @@
-//! What the tangential rows of contacts with friction constrain in a stage: the slip, as a length.
+//! The quantity that tangential rows of contacts with friction constrain in a stage: the slip, as a length.
 //!
-//! Coulomb's law does not change when the slip is scaled by a positive number. It is taken from the velocity that the
-//! stage ends with, scaled so that the unknown has the same weight as in the gap; W is symmetric then. Where velocities
-//! do not contain the unknown, dofs have no mass, or corrections take contact forces out of the accelerations, it is
-//! the way made in the stage. It is measured along the rows along which friction acts.
+//! Coulomb's law does not change when the slip is scaled by a positive number. The slip is computed from the velocity
+//! at the end of the stage, scaled so that the unknown has the same weight as in the gap; W is symmetric then. It is
+//! the displacement in the stage instead where velocities do not contain the unknown, dofs have no mass, or
+//! corrections remove contact forces from the accelerations. It is measured along the rows along which friction acts.
 
 use crate::contact::{ContactJacobian, GapRates, Tangents};
 use crate::corrector::{rounding, slides};
@@ -15,16 +15,16 @@ use crate::simulation::rows::contact_rows::{ContactRowsWork, Part};
 use crate::simulation::stage::contact::{ContactStep, ContactWork};
 use crate::state::{Clock, Motion};
 
-/// What the slip of a stage is taken from.
+/// The source of the slip of a stage.
 #[derive(Clone, Copy, Debug)]
 enum Source<T> {
-    /// The velocity of the state, times this.
+    /// The velocity of the state, times this factor.
     Velocity(T),
-    /// What contact constrains: h times a velocity.
+    /// The target of contact: h times a velocity.
     Target,
-    /// The way from the state to where contact is imposed.
+    /// The displacement from the state to where contact is imposed.
     WayAhead,
-    /// The way from where the stage starts to its state.
+    /// The displacement from the start of the stage to its state.
     Way,
 }
 
@@ -39,8 +39,8 @@ fn source<T: Real>(stage: &CompiledStage<T>, by_way: bool) -> (Source<T>, T) {
     }
 }
 
-/// Whether the slip of a contact is that of dofs without mass. (Where these are solved for with the others, it is that
-/// of a contact on such dofs.)
+/// Whether the slip of a contact is static: its friction acts on dofs without mass or, where these are solved
+/// together with the others, its gap does.
 fn is_static<T: Real>(
     part: Part,
     (tangents, g): (&Tangents, &ContactJacobian<T>),
@@ -53,8 +53,8 @@ fn is_static<T: Real>(
     }
 }
 
-/// When an obstacle has the velocity that a slip is measured against: with that of the state, at the target, or in the
-/// middle of the way to it. The state is that of t.
+/// The time at which the slip reads the velocity of an obstacle: the time t of the state, the time of the target, or
+/// the middle between both.
 fn time_of_slip<T: Real>(stage: &CompiledStage<T>, clock: Clock, t: f64) -> f64 {
     match &stage.contact {
         None => t,
@@ -64,27 +64,27 @@ fn time_of_slip<T: Real>(stage: &CompiledStage<T>, clock: Clock, t: f64) -> f64 
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Sets the weights of d in the slips: those of contacts that the problem is about.
+    /// Sets the weights of d in the slips of the contacts in the problem.
     pub(crate) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
         let tangents = self.constraints.tangents();
         for row in tangents.contacts() {
             let is_static = is_static(self.part, (tangents, &*self.g), &rows.massless, row);
             let (_, weight) = source(self.stage, rows.slides_by_way || is_static);
-            // (Explicit schemes know the force of a spring, and its friction is solved for all the same.)
+            // Explicit schemes know the force of a spring, but its friction is unknown.
             let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
             let rubs = match self.rubs_later(rows, row) {
                 true => self.part == Part::Massive,
                 false => rows.weight[row] > T::zero() || knows,
             };
             rows.weight[tangents.of(row)].fill(if rubs { weight } else { T::zero() });
-            // (Candidates may have come and gone: these were other rows before.)
+            // After a change of candidates these indices belong to other rows.
             rows.compliance[tangents.of(row)].fill(T::zero());
             rows.shift[tangents.of(row)].fill(T::zero());
         }
     }
 
-    /// Whether the friction of a contact on dofs without mass acts on dofs with mass alone. In an explicit stage it is
-    /// no part of the static balance, in which nothing would answer to it: it is found after that, when its normal
+    /// Whether the friction of a contact on dofs without mass acts on dofs with mass only. In an explicit stage it is
+    /// not part of the static balance, where nothing would respond to it. It is found afterwards, when its normal
     /// force is known.
     fn rubs_later(&self, rows: &ContactRowsWork<T>, row: usize) -> bool {
         let tangents = (self.constraints.tangents(), &*self.g);
@@ -113,14 +113,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
             let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
-            // (Of a motion along the normal a share of rounding is slip: so well are the directions known.)
+            // Directions are rounded: a motion along the normal contributes rounding to the slip.
             for k in tangents.of(row) {
                 let own = slips[k - tangents.all().start].rate;
                 (y[k], tolerance[k]) = match source {
                     Source::Velocity(scale) => {
                         let slip = forces.product(k, &new.v) + own;
                         let size = forces.magnitude(k, &new.v) + forces.magnitude(row, &new.v) + own.abs();
-                        // Velocities that are differences of displacements have the rounding of those.
+                        // Velocities computed as differences of displacements have the rounding of the displacements.
                         let known = if stage.recovery.subtracts(1) { forces.magnitude(k, &new.u) } else { T::zero() };
                         let d = &interface.increment;
                         let added = weight * forces.interface_magnitude(k, d);
@@ -137,8 +137,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                             Some(_) => [&new.u, &*target],
                             None => [past.first().map_or(&new.u, |start| &start.u), &new.u],
                         };
-                        // From the terms of the scheme, which have not the rounding of displacements: what sticks must
-                        // not creep by that. (Supports, and dofs that follow statically, are where they are.)
+                        // The terms of the scheme do not have the rounding of displacements, which would make
+                        // sticking contacts creep. Supports and dofs in static balance use their displacements.
                         let part = |dof: usize| {
                             let free = constraints.place(dof).zip(stage.way.past_at(past, dof));
                             let Some((place, past)) = free else {
@@ -164,8 +164,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Notes which contacts slide in a finished stage, and the slips (length/time) that say so: where contact is imposed
-    /// ahead of the state, and of dofs without mass, those of the way.
+    /// Stores which contacts slide in a finished stage, and the slips (length/time) that decide it. These are mean
+    /// slips where contact is imposed ahead of the state, and for dofs without mass.
     pub(crate) fn note_slips(
         &mut self,
         new: &Motion<T>,
@@ -183,7 +183,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let (forces, tangents) = (curved.forces(g), constraints.tangents());
         let (h, first) = (T::of(clock.h), tangents.all().start);
         for row in tangents.contacts() {
-            // From where to where, and the time that takes; a target at velocity level is h times a velocity.
+            // Ends of the displacement, and its time; a target at velocity level is h times a velocity.
             let start = past.first().filter(|_| is_static(*part, (tangents, g), massless, row));
             let (ends, time) = match (start, &stage.contact) {
                 (Some(start), _) => ([Some(&start.u), Some(&new.u)], T::of(stage.end - stage.start) * h),
@@ -195,7 +195,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             for k in tangents.of(row) {
                 let at = |end: Option<&Vec<T>>, dof: usize| end.map_or(T::zero(), |end| end[dof]);
                 let way = |(dof, weight): (usize, T)| weight * (at(ends[1], dof) - at(ends[0], dof));
-                // (A velocity that has vanished has the rounding of what it is the sum of.)
+                // A velocity of zero has the rounding of the terms it is the sum of.
                 let (slip, size) = if let [None, None] = ends {
                     (forces.product(k, &new.v), forces.magnitude(k, &new.v) + h * forces.magnitude(k, &new.a))
                 } else {
@@ -214,9 +214,9 @@ impl<T: Real> ContactStep<'_, '_, T> {
     }
 }
 
-/// Notes the slips of the velocities of a state after corrections. Those of a stage that imposes contact `ahead` of its
-/// state, and of dofs without mass, are means over what was before and comes after: where a contact stops sliding, or
-/// turns back, they stay those of the way, to which its friction belongs.
+/// Stores the slips of the velocities of a state after corrections. In a stage that imposes contact `ahead` of its
+/// state, and for dofs without mass, slips are means over a displacement. These means stay where a contact stops
+/// sliding or reverses, as its friction belongs to them.
 pub(crate) fn note_slips_of_state<T: Real>(
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
     new: &Motion<T>,
