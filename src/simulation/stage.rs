@@ -1,12 +1,12 @@
-//! What a stage is solved with, and its contact.
+//! The data with which a stage is solved, and the solution of its contact.
 //!
-//! In the order in which a stage visits them:
+//! In the order of execution:
 //!
 //! - `supports`, `vectors`: prescribed motions, the predicted motion and its residual.
 //! - `massless`, `massless_step`: dofs without mass.
-//! - `linear`, or `newton_step` with the settings in `newton` and the force in `path`: the stage is solved.
-//! - `contact`: its contact.
-//! - `excess_forces`: contacts on dofs without mass that press for a part of the stage.
+//! - `linear`, or `newton_step` with the settings in `newton` and the force in `path`: solve the stage.
+//! - `contact`: solves its contact.
+//! - `excess_forces`: contacts on dofs without mass that exert a force for a part of the stage.
 
 pub(super) mod contact;
 pub(super) mod excess_forces;
@@ -35,7 +35,7 @@ use crate::simulation::stage::vectors::StageVectors;
 use crate::state::{Clock, Motion};
 use crate::system::System;
 
-/// What a stage is solved with.
+/// The data with which a stage is solved.
 pub(crate) struct StageSolve<'s, 'a, T: Real> {
     pub(crate) stage: &'s CompiledStage<T>,
     pub(crate) clock: Clock,
@@ -50,7 +50,7 @@ pub(crate) struct StageSolve<'s, 'a, T: Real> {
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Adds the response to contact to the increment on the interface; `iterate` is the part of the unknown that
-    /// motions contain already. Says whether curved rows fit the result.
+    /// motions contain already. Returns whether curved rows fit the result.
     pub(crate) fn contact(
         &mut self,
         part: Part,
@@ -66,7 +66,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         contact.solve(&mut **system, operator, new, past, vectors, work)
     }
 
-    /// Refuses contact whose curved rows do not fit its result.
+    /// Refuses contact whose curved rows have not converged.
     pub(crate) fn refuse_unsettled(&self, settled: bool, t: f64, rows: &CurvedRowsWork<T>) -> Result<()> {
         if settled {
             return Ok(());

@@ -1,11 +1,11 @@
-//! The contact of a stage before its problem is solved: where it is imposed, what the rows constrain there, and the
-//! forces of compliant laws that do not depend on the unknown.
+//! The contact of a stage before its problem is solved: where it is imposed, the quantities that rows constrain
+//! there, and the forces of compliant laws that do not depend on the unknown.
 //!
-//! In the order in which a stage visits them:
+//! In the order of execution:
 //!
-//! - `multipliers`, `applied_rows`: the contact problem of the rows that press.
-//! - `solve`: the problem is solved, and again with rows linearized at its result.
-//! - `curved`, `mixing`: rows that turn within the stage, and linearizations that converge slowly.
+//! - `multipliers`, `applied_rows`: the contact problem of the rows that carry forces.
+//! - `solve`: solves the problem, and solves it again with rows linearized at its result.
+//! - `curved`, `mixing`: rows that turn within the stage, and acceleration of linearizations that converge slowly.
 //! - `closing`: which contacts are closed at the end, their forces and impulses.
 
 pub(in crate::simulation) mod applied_rows;
@@ -48,11 +48,11 @@ pub(crate) struct ContactWork<T> {
     pub(crate) sliding_at_start: Vec<bool>,
     /// Closed flags before the present stage.
     pub(crate) was_closed: Vec<bool>,
-    /// Which contacts friction held before the present stage; empty without friction.
+    /// Which contacts stuck before the present stage; empty without friction.
     pub(crate) was_sticking: Vec<bool>,
 }
 
-/// What the contact of a stage is solved with.
+/// The data with which the contact of a stage is solved.
 pub(crate) struct ContactStep<'s, 'a, T: Real> {
     pub(crate) stage: &'s CompiledStage<T>,
     pub(crate) clock: Clock,
@@ -67,7 +67,7 @@ pub(crate) struct ContactStep<'s, 'a, T: Real> {
     pub(crate) part: Part,
 }
 
-/// How depth and approach of a row of springs depend on its y: both change with d as the rows of the balance say.
+/// How depth and approach of a compliant row depend on its y: both change with d by the weights of the balance.
 pub(crate) fn course<T: Real>(stage: &CompiledStage<T>, h: f64, [gap, approach]: [T; 2]) -> Course<T> {
     let [by_u, by_v, _] = stage.balanced().weights();
     if by_u > T::zero() {
@@ -78,7 +78,7 @@ pub(crate) fn course<T: Real>(stage: &CompiledStage<T>, h: f64, [gap, approach]:
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Evaluates what contact constrains, without contact forces, and decides which rows may be pressed.
+    /// Evaluates the target of contact without contact forces, and decides which rows may carry a force.
     pub(crate) fn aim(
         &mut self,
         system: &mut dyn System<T>,
@@ -94,7 +94,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Some(aim) = &self.stage.contact else { return Ok(()) };
         let h = T::of(clock.h);
         let t = clock.at(aim.at);
-        // Only on the interface: nothing else is read, and most dofs are not there.
+        // Only on the interface: no other dofs are read.
         aim.row.predict_at(past, constraints.interface(), target);
         if let Some(d) = self.iterate {
             for &dof in constraints.interface() {
@@ -124,7 +124,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         constraints.finite_gaps(t_forecast, forecast, y)?;
         constraints.finite_rates(t, &new.u, &new.v, rates)?;
         for row in 0..constraints.len() {
-            // As at position level, a gap of 1e-10 of the way made in the step counts as touching.
+            // As at position level, a gap of 1e-10 of the displacement in the step counts as touching.
             let approach = (g.product(row, target) + h * rates[row].rate).abs();
             let rounded = constraints.gap_rounding(row, g.magnitude(row, forecast), y[row]);
             let law = constraints.law(row);
@@ -142,14 +142,14 @@ impl<T: Real> ContactStep<'_, '_, T> {
         [rigid, balance_u, balance_a]
     }
 
-    /// Whether the unknown moves the rate of a damped row alone, and not its gap: explicit schemes whose velocities
-    /// contain it.
+    /// Whether the unknown changes the rate of a damped row but not its gap. This holds in explicit schemes whose
+    /// velocities contain the unknown.
     pub(crate) fn slows(&self, law: &ContactLaw) -> bool {
         let [by_u, by_v, _] = self.stage.balanced().weights();
         law.is_damped() && by_u == T::zero() && by_v > T::zero()
     }
 
-    /// Sets the weights of d in y: those of the scheme, and of compliant laws.
+    /// Sets the weights of d in y, from the scheme and from compliant laws.
     pub(crate) fn weigh(&self, rows: &mut ContactRowsWork<T>) {
         let ([rigid, balance_u, balance_a], Self { stage, clock, .. }) = (self.weights(), self);
         if self.constraints.laws().are_uniform() && self.part == Part::All {
@@ -169,12 +169,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         self.weigh_slips(rows);
     }
 
-    /// Whether d is part of the displacements of the state: explicit schemes know these before it.
+    /// Whether the displacements of the state contain d. Explicit schemes know them before d.
     pub(crate) fn moves_state(&self) -> bool {
         self.stage.recovery.weights()[0] != T::zero()
     }
 
-    /// Adds d on the interface to the displacements, to those of the balance, and to what contact constrains.
+    /// Adds d on the interface to the displacements of the state and of the balance, and to the target of contact.
     pub(crate) fn place(&mut self, new: &mut Motion<T>, vectors: &mut StageVectors<T>, contact: &mut ContactWork<T>) {
         let dofs = self.constraints.interface();
         let ContactWork { interface, rows, .. } = contact;
@@ -190,7 +190,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Time and displacements of the balance.
+    /// Time and motion of the balance.
     pub(crate) fn balanced<'m>(&self, new: &'m Motion<T>, balance: Option<&'m Motion<T>>) -> (f64, &'m Motion<T>) {
         let motion = match (&self.stage.balance, balance) {
             (Some(_), Some(balance)) => balance,
@@ -236,7 +236,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let Self { stage, constraints, g, .. } = self;
         let ContactWork { interface, rows, .. } = contact;
         let known = self.iterate.is_some() || stage.balanced().reads_past(2);
-        // g̈ at ā: the predicted part, and the part of d.
+        // g̈ at ā: the predicted part, and the part that depends on d.
         let InterfaceWork { response, increment, .. } = interface;
         for ((&dof, a), &d) in constraints.interface().iter().zip(response.iter_mut()).zip(increment.iter()) {
             *a = if known { motion.a[dof] } else { T::zero() } + balance_a * d;
@@ -258,7 +258,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Evaluates with which rates the gaps of damped rows close where the balance holds, at the d of their gaps.
+    /// Evaluates the closing rates of damped rows where the balance holds, at the d of their gaps.
     pub(crate) fn approach(
         &mut self,
         new: &Motion<T>,
@@ -278,7 +278,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let moved = by_v * forces.interface_product(row, &interface.increment);
             let gap = rows.balance_gap[row];
             if by_u == T::zero() && -gap <= constraints.gap_rounding(row, g.magnitude(row, &motion.u), gap) {
-                // (A dashpot begins with all of its force: rounding is no depth.)
+                // A dashpot begins with all of its force, so rounding must not count as depth.
                 rows.balance_gap[row] = gap.max(T::zero());
             }
             rows.approach[row] = -(forces.product(row, &motion.v) + moved + rows.rates[row].rate);
@@ -286,8 +286,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes); says whether there are
-    /// any.
+    /// Applies the forces of compliant rows whose gap does not depend on d (explicit schemes). Returns whether there
+    /// are any.
     pub(crate) fn press_without_coupling(
         &mut self,
         operator: &mut Operator<T>,
@@ -318,7 +318,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
     pub(crate) fn restitution(&mut self, past: &[Motion<T>], rows: &mut ContactRowsWork<T>) -> Result<()> {
         let Self { stage, clock, constraints, g, .. } = self;
         let lead = stage.contact.as_ref().map_or(0.0, |target| target.at - stage.end);
-        // (Where the gap is constrained, the correction of velocities makes contacts leave.)
+        // Where the gap is constrained, the correction of velocities makes contacts rebound.
         let at_velocities = stage.contact.as_ref().is_some_and(|target| target.forecast.is_some());
         let (Some(start), true) = (past.first(), constraints.laws().rebound && at_velocities) else {
             return Ok(());

@@ -1,5 +1,5 @@
-//! Contacts on dofs without mass that close or open in a stage press for a part of it only: the stage is solved again
-//! without the excess of their mean forces.
+//! Contacts on dofs without mass that close or open in a stage exert a force for a part of it only: the stage is
+//! solved again without the excess of their mean forces.
 
 use crate::contact::{ContactJacobian, ContactLaw};
 use crate::corrector::{Gaps, JumpProjection, Switching};
@@ -14,55 +14,56 @@ use crate::simulation::stage::vectors::{StageVectors, predict};
 use crate::state::{ContactState, Motion};
 use crate::system::{Linearity, System};
 
-/// The most often that a stage is solved again.
+/// Maximum number of times that a stage is solved again.
 const PASSES: usize = 8;
 
-/// Which part of the work of all that closes or opens may be left to the velocities.
+/// The share of the work of all closing and opening contacts that may be left to the velocities.
 const LEFT: f64 = 1e-3;
 
-/// Takes from the mean contact forces of a stage, ½ (λ + λ'), what contacts that close or open in it do not exert: δ,
-/// by which the energy does not change (theory, section 15.2). For linear systems and schemes that find u and the
-/// forces together; δ is in [`Switching`].
+/// Subtracts from the mean contact forces of a stage, ½ (λ + λ'), the part δ that contacts which close or open in it
+/// do not exert, so that the energy does not change (theory, section 15.2). For linear systems and schemes that find
+/// u and the forces together; δ is stored in [`Switching`].
 #[derive(Debug)]
 pub(crate) struct ExcessForces<T: Real> {
     /// The static balance of the dofs without mass.
     statics: MasslessBlock<T>,
     /// Gaps at the end of the stage, one a row.
     gaps: Vec<T>,
-    /// What δ is to change by, one a row.
+    /// The required change of δ, one entry per row.
     misses: Vec<T>,
-    /// The way of the stage, and that with the mean velocity, which dofs without mass follow statically. One entry a
-    /// dof, as all below.
+    /// The displacement in the stage, and the displacement at the mean velocity that dofs without mass follow
+    /// statically. One entry a dof, as all below.
     way: Vec<T>,
     followed: Vec<T>,
-    /// −G̃ᵀ δ: forces on the dofs with mass, and on those without, from where they are passed on.
+    /// −G̃ᵀ δ: forces on the dofs with mass, and forces on dofs without mass, which pass them on.
     forces: Vec<T>,
-    /// What the forces change the acceleration by with which the stage starts, and that of the stage before; this is
-    /// empty if a step has one stage.
+    /// The change of the acceleration at the start of the stage by these forces, and the change of the stage before;
+    /// the latter is empty if a step has one stage.
     change: Vec<T>,
     carried: Vec<T>,
     /// Whether there is a change in this stage, and whether there was one in the stage before.
     is_shifted: bool,
     is_carried: bool,
-    /// How much of an impulse in v is momentum, at the end of a step.
+    /// The share of an impulse in v that is momentum at the end of a step.
     impulse_weight: T,
 }
 
-/// The parts of a constant acceleration in u and v at the end of a stage that moves by means, u through v alone.
+/// The weights of a change of the acceleration at the start of a stage in u and v at its end: v changes by the mean
+/// acceleration, u by the mean of v.
 fn shares<T: Real>(stage: &CompiledStage<T>, h: f64) -> [T; 2] {
     let length = h * (stage.end - stage.start);
     [0.25 * length * length, 0.5 * length].map(T::of)
 }
 
-/// Whether a stage takes the mean of two accelerations to u as a constant one: β = ¼.
+/// Whether u depends on the mean of two accelerations as on a constant acceleration: β = ¼.
 fn is_trapezoidal<T: Real>(stage: &CompiledStage<T>) -> bool {
     let ([by_u, _, by_a], length) = (stage.response, stage.end - stage.start);
     (by_u - 0.25 * length * length * by_a).abs() < 1e-12 * by_u.abs()
 }
 
 impl<T: Real> ExcessForces<T> {
-    /// For a linear system, its dofs without mass, and so many contacts. None where there are no such dofs, or
-    /// stiffness alone does not hold them, and for schemes whose forces are not those of the state.
+    /// For a linear system, its dofs without mass, and `rows` contacts. None if there are no such dofs or their
+    /// stiffness alone does not hold them, and for schemes whose forces are not the forces of the state.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
@@ -70,7 +71,7 @@ impl<T: Real> ExcessForces<T> {
         at: &Motion<T>,
         (interface, rows): (&[usize], usize),
     ) -> Result<Option<Box<Self>>> {
-        // (What goes from one stage to the next is a change of the acceleration at the start of the first.)
+        // Between stages only a change of the acceleration at the start of the first stage is passed on.
         let is_alone = program.stages.len() == 1;
         let is_plain = |stage: &CompiledStage<T>| {
             stage.balance.is_none() && !stage.recovery.reads_past(2) && (is_alone || is_trapezoidal(stage))
@@ -101,14 +102,14 @@ impl<T: Real> ExcessForces<T> {
         })))
     }
 
-    /// Room for so many rows.
+    /// Reserves memory for `rows` rows.
     pub(crate) fn make_room(&mut self, rows: usize) {
         for values in [&mut self.gaps, &mut self.misses] {
             values.reserve(rows.saturating_sub(values.len()));
         }
     }
 
-    /// Begins a stage, the first of its step or another one, and has it start as the one before has ended.
+    /// Begins a stage, the first of its step or a later one, which takes over the change of the stage before.
     pub(crate) fn begin(&mut self, is_first: bool) {
         self.is_carried = !is_first && self.is_shifted;
         if self.is_carried {
@@ -117,7 +118,7 @@ impl<T: Real> ExcessForces<T> {
         self.is_shifted = false;
     }
 
-    /// Adds to a predicted motion what the forces of the stage before, and those of this one, do to it.
+    /// Adds the effects of the forces of the stage before, and of this one, to a predicted motion.
     pub(crate) fn shift(&self, stage: &CompiledStage<T>, h: f64, new: &mut Motion<T>) {
         if self.is_shifted {
             for (share, out) in shares(stage, h).into_iter().zip([&mut new.u, &mut new.v]) {
@@ -125,15 +126,15 @@ impl<T: Real> ExcessForces<T> {
             }
         }
         if self.is_carried {
-            // (The state behind the start of this stage is that at the start of the step.)
+            // The state before the start of this stage is the state at the start of the step.
             for (share, out) in stage.recovery.shares_of_acceleration(1).into_iter().zip([&mut new.u, &mut new.v]) {
                 T::axpy(share, &self.carried, out);
             }
         }
     }
 
-    /// Solves a stage again until contacts that close or open in it leave the energy as it is, or nearly so. Says by
-    /// how much the energy has changed by what they exert less.
+    /// Solves a stage again until contacts that close or open in it leave the energy nearly unchanged. Returns the
+    /// change of the energy by the forces that they do not exert.
     pub(crate) fn solve_again(
         &mut self,
         solve: &mut StageSolve<'_, '_, T>,
@@ -145,7 +146,7 @@ impl<T: Real> ExcessForces<T> {
         let mut part = None;
         for pass in 0.. {
             let left = self.measure(solve, [start, new], &contact.trial, switching)?;
-            // (The last pass of those that have come no nearer is the stage as it was.)
+            // If the iteration does not improve, the last solution is the stage without any excess.
             if left <= T::of(LEFT) || pass > PASSES || pass == PASSES && left < T::one() {
                 break;
             }
@@ -162,7 +163,7 @@ impl<T: Real> ExcessForces<T> {
         Ok(if self.is_shifted { dot(&self.forces, &self.followed) } else { T::zero() })
     }
 
-    /// Books what the contacts of a stage exert less, once their impulses have been booked.
+    /// Books the excess forces of a stage, once the impulses of its contacts have been booked.
     pub(crate) fn book(
         &self,
         stage: &CompiledStage<T>,
@@ -175,8 +176,8 @@ impl<T: Real> ExcessForces<T> {
         }
     }
 
-    /// Finds how far δ is from what the stage asks for, and the work that it leaves undone. Says how much work the
-    /// misses make, as a part of that of all contacts that close or open.
+    /// Finds the required change of δ, and the work that δ does not do. Returns the work of the required changes as a
+    /// share of the work of all contacts that close or open.
     fn measure(
         &mut self,
         solve: &mut StageSolve<'_, '_, T>,
@@ -194,7 +195,8 @@ impl<T: Real> ExcessForces<T> {
             values.resize(constraints.len(), T::zero());
         }
         constraints.finite_gaps(new.t, &new.u, gaps)?;
-        // (The work of a constant force is that along the mean velocity, which β = ¼ makes the way itself.)
+        // The work of a constant force is its work along the mean velocity; for β = ¼ this is the displacement
+        // itself.
         let half = T::of(0.5 * clock.h * (stage.end - stage.start));
         way.fill(T::zero());
         T::axpy(half, &start.v, way);
@@ -207,7 +209,7 @@ impl<T: Real> ExcessForces<T> {
             let (before, after, excess) = switching.forces(row, contacts);
             let closes_or_opens = (before > T::zero()) != (after > T::zero());
             let is_balanced = || constraints.law(row) == ContactLaw::Rigid && g.acts_on(row, &statics.dofs);
-            // (What rests may close and open by rounding, in every step.)
+            // A resting contact may close and open by rounding in every step.
             let gap = if before > T::zero() { gaps[row] } else { at_start };
             let is_open = || gap > constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
             let counts = closes_or_opens && is_balanced() && is_open();
@@ -216,7 +218,7 @@ impl<T: Real> ExcessForces<T> {
                 continue;
             }
             let moved = gaps[row] - at_start;
-            // By how much the gap would have changed if no contact had held the dofs without mass.
+            // The change of the gap if no contact had held the dofs without mass.
             let free = moved - g.product(row, way) + g.product(row, followed);
             excess.work = excess.force * free;
             let (mean, work) = (T::of(0.5) * (before + after), T::of(0.5) * (before + after) * moved);
@@ -229,7 +231,7 @@ impl<T: Real> ExcessForces<T> {
         Ok(if missed > T::zero() { missed / all } else { T::zero() })
     }
 
-    /// Turns δ into a change of the acceleration with which the stage starts.
+    /// Converts δ to a change of the acceleration with which the stage starts.
     fn press_less(
         &mut self,
         g: &ContactJacobian<T>,
@@ -252,7 +254,7 @@ impl<T: Real> ExcessForces<T> {
         for &dof in statics.dofs.iter().chain(prescribed) {
             change[dof] = T::zero();
         }
-        // (The mean of two accelerations has half of each.)
+        // The mean of two accelerations contains half of each.
         for x in change.iter_mut() {
             *x = *x + *x;
         }

@@ -1,4 +1,4 @@
-//! A stage that is linear in its unknown, solved at once.
+//! A stage that is linear in its unknown, solved directly.
 
 use crate::error::Result;
 use crate::kernels::vector::Accumulate;
@@ -39,7 +39,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if T::recover(recovery.weights(), &vectors.increment, [&mut new.u, &mut new.v, &mut new.a], accumulate) {
             return Ok(());
         }
-        // (The step is undone, and with it what has been written.)
+        // The step is undone, and with it the values written.
         self.refuse_nan(&vectors.increment, "the increment")?;
         check_motion(self.clock.at(0.0), self.clock.h, [&new.u, &new.v, &new.a], Extent::All)
     }

@@ -22,15 +22,15 @@ pub(crate) struct MasslessBlock<T: Real> {
     pub(crate) operator: Operator<T>,
     /// The stage in which it is solved: d is the displacement itself.
     pub(crate) stage: CompiledStage<T>,
-    /// The dofs of the interface that have a mass, and their places there.
+    /// The dofs of the interface that have a mass, and their indices there.
     pub(crate) massive: Vec<(usize, usize)>,
-    /// The places of its own dofs on the interface; its size for those that are not on it.
+    /// The interface indices of its own dofs; the size of the interface for dofs that are not on it.
     pub(crate) places: Vec<usize>,
-    /// Version of the rows for which those on massless dofs have been found.
+    /// Version of the rows when rows on massless dofs were last found.
     pub(crate) sorted: u64,
 }
 
-/// Columns of K, one a massless dof: its couplings to all free dofs.
+/// Columns of K, one per massless dof: its couplings to all free dofs.
 #[derive(Debug)]
 pub(crate) struct Columns<T> {
     pointers: Vec<usize>,
@@ -39,7 +39,7 @@ pub(crate) struct Columns<T> {
 }
 
 impl<T: Real> Columns<T> {
-    /// From the tangent, or for an empty pattern by one evaluation of the force a column.
+    /// From the tangent, or for an empty pattern from one evaluation of the force per column.
     pub(crate) fn of(system: &mut dyn System<T>, dofs: &[usize], at: &Motion<T>) -> Result<Self> {
         let mut free = vec![true; system.dofs()];
         for &dof in system.prescribed() {
@@ -53,7 +53,7 @@ impl<T: Real> Columns<T> {
         let mut force = vec![T::zero(); system.dofs()];
         let (mut moved, mut u) = (force.clone(), at.u.clone());
         system.force(at.t, &u, &at.v, &mut force)?;
-        // A step as large as the displacements keeps the digits of the difference.
+        // An increment as large as the displacements keeps the digits of the difference.
         let size = at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs()));
         let size = if size > T::zero() { size } else { T::one() };
         for &dof in dofs {
@@ -110,12 +110,12 @@ impl<T: Real> Columns<T> {
         self.rows[range.clone()].iter().copied().zip(self.values[range].iter().copied())
     }
 
-    /// The couplings to other dofs alone.
+    /// The couplings to other dofs only.
     pub(crate) fn without(&self, dofs: &[usize]) -> Self {
         self.picked(0..dofs.len(), |row| dofs.binary_search(&row).is_err())
     }
 
-    /// The columns of some of the `dofs` that these are of.
+    /// The columns of a `part` of the `dofs` of these columns.
     pub(crate) fn of_part(&self, dofs: &[usize], part: &[usize]) -> Self {
         self.picked(part.iter().filter_map(|dof| dofs.binary_search(dof).ok()), |_| true)
     }
@@ -155,15 +155,16 @@ impl<T: Real> Columns<T> {
     }
 }
 
-/// A factor of K_bb that takes vectors of the whole system, and of its whole interface: other dofs do not respond.
+/// A factor of K_bb that solves for vectors of the whole system, and of its whole interface: other dofs do not
+/// respond.
 #[derive(Debug)]
 pub(crate) struct Embedded<T> {
     inner: Box<dyn Factorization<T>>,
     dofs: Vec<usize>,
-    /// Places on the interface of its own dofs, ascending, and the number of all dofs there.
+    /// Interface indices of its own dofs, ascending, and the number of all dofs there.
     places: Vec<usize>,
     interface: usize,
-    /// Scratch: one entry a dof of its own, and one a dof of its own on the interface.
+    /// Scratch: one entry per own dof, and one per own dof on the interface.
     vector: Vec<T>,
     on_interface: Vec<T>,
 }
@@ -317,8 +318,8 @@ impl<T: Real> MasslessBlock<T> {
 }
 
 impl<T: Real> MasslessBlock<T> {
-    /// Writes the velocities with which the dofs without mass follow those of the others, −K_bb⁻¹ K_bi v_i, without
-    /// loads and contact; the others keep theirs.
+    /// Writes the velocities of dofs without mass that follow statically from the others, −K_bb⁻¹ K_bi v_i, without
+    /// loads and contact; copies the velocities of the others.
     pub(crate) fn follow(&mut self, v: &[T], out: &mut [T]) -> Result<()> {
         out.copy_from_slice(v);
         for (j, &dof) in self.dofs.iter().enumerate() {
@@ -327,8 +328,8 @@ impl<T: Real> MasslessBlock<T> {
         self.operator.solve(out)
     }
 
-    /// Replaces forces on all dofs by those on the dofs with mass that are in balance with them: what acts on dofs
-    /// without mass goes on to their neighbors.
+    /// Replaces forces on all dofs by statically equivalent forces on the dofs with mass: forces on dofs without mass
+    /// are passed on to their neighbors.
     pub(crate) fn pass_on(&mut self, forces: &mut [T]) -> Result<()> {
         self.operator.solve(forces)?;
         for (j, &dof) in self.dofs.iter().enumerate() {
@@ -346,12 +347,12 @@ pub(crate) fn is_damped<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> 
     Ok(damping_forces(system, dofs)?.is_some_and(|force| force.iter().any(|&force| force != T::zero())))
 }
 
-/// Damping forces on all dofs where some dofs move, each in its own way. None for systems without damping.
+/// Damping forces on all dofs at distinct velocities of some dofs. None for systems without damping.
 pub(crate) fn damping_forces<T: Real>(system: &mut dyn System<T>, dofs: &[usize]) -> Result<Option<Vec<T>>> {
     let mut v = vec![T::zero(); system.dofs()];
     let (u, mut force) = (v.clone(), v.clone());
     for &dof in dofs {
-        // (Scattered values, so that nothing cancels.)
+        // Scattered values, so that nothing cancels.
         v[dof] = T::of(1.0 + (sparse::scattered(dof) >> 12) as f64 / (1_u64 << 52) as f64);
     }
     let Some(damping) = system.damping_force() else { return Ok(None) };

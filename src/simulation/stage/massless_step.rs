@@ -1,4 +1,4 @@
-//! Dofs without mass in an explicit stage: brought into static balance before anything else is solved.
+//! Dofs without mass in an explicit stage: brought into static balance before the other dofs are solved for.
 
 use crate::contact::Candidates;
 use crate::corrector::{Gaps, rounding};
@@ -11,15 +11,15 @@ use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::vectors::StageVectors;
 use crate::state::Motion;
 
-/// The most linearizations of rows at the displacements of the dofs without mass.
+/// Maximum number of linearizations of rows at the displacements of the dofs without mass.
 const LINEARIZATIONS: usize = 20;
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact.
-    /// The residual in `vectors.increment` becomes that of the other dofs in this configuration. Contacts on dofs
-    /// without mass may act on other dofs too: these forces are added to it.
+    /// The residual in `vectors.increment` becomes the residual of the other dofs in this configuration. Contacts on
+    /// dofs without mass may act on other dofs too: these forces are added to it.
     ///
-    /// The balance is linear, gaps may be curved: rows are linearized again until the displacements settle.
+    /// The balance is linear, gaps may be curved: rows are linearized again until the displacements converge.
     pub(crate) fn settle(
         &mut self,
         block: &mut MasslessBlock<T>,
@@ -77,7 +77,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 self.operator.follow(self.constraints.version());
                 return self.sort_rows(block, &mut contact.rows.on_massless);
             }
-            // The residual without contact is the negative of the contact forces that have balanced it.
+            // The residual without contact is the negative of the contact forces that balance it.
             for (&dof, &place) in block.dofs.iter().zip(&block.places) {
                 increment[dof] = if place < interface.forces.len() { -interface.forces[place] } else { T::zero() };
             }
@@ -93,8 +93,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Finds the rows that act on dofs without mass, and refuses laws there that depend on more than the gap, and
-    /// friction there of contacts whose normal force is found after these dofs, with the others.
+    /// Finds the rows that act on dofs without mass. Refuses laws there that depend on more than the gap, and
+    /// friction there if the normal force acts on dofs with mass and is found after the static balance.
     fn sort_rows(&self, block: &mut MasslessBlock<T>, on_massless: &mut [bool]) -> Result<()> {
         if block.sorted == self.constraints.version() {
             return Ok(());
@@ -124,11 +124,11 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 }
 
-/// Gives dofs without mass a velocity: that of the parabola through their last three displacements. (The rows of a
-/// scheme find v from a, which is zero on such dofs.)
+/// Computes the velocity of dofs without mass from the parabola through their last three displacements. The rows of a
+/// scheme compute v from a, which is zero on such dofs.
 ///
-/// `intervals` are the time from the `start` of the step until now, and that before it; `slopes` are the differences of
-/// the displacements over the latter, divided by it.
+/// `now` is the time since the `start` of the step, `before` the time interval before it; `slopes` are the
+/// differences of the displacements over that interval, divided by it.
 pub(crate) fn difference<T: Real>(
     massless: &[usize],
     slopes: &[T],

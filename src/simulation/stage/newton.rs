@@ -1,10 +1,10 @@
-//! Settings of Newton's method, what it reports of its iterations, and its memory.
+//! Settings of Newton's method, the report of its iterations, and its memory.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::stage::path::PathWork;
 
-/// When the effective matrix is formed and factorized anew.
+/// When the effective matrix is formed and factorized again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TangentUpdate {
     Iteration,
@@ -12,8 +12,8 @@ pub(crate) enum TangentUpdate {
 }
 
 impl TangentUpdate {
-    /// In how many iterations a residual that is not yet rounding falls below which share of what it was. (With a
-    /// tangent that stays it may fall by a fiftieth in each.)
+    /// A residual above rounding stagnates if it does not fall to this share of its value within this number of
+    /// iterations. With a constant tangent it may fall by only a fiftieth in each.
     pub(crate) fn falls(self) -> (usize, f64) {
         match self {
             Self::Iteration => (2, 0.5),
@@ -26,19 +26,21 @@ impl TangentUpdate {
 ///
 /// With r = f − M ā + Gᵀ λ and A the effective matrix, an iteration solves `A Δ = r` together with the contact
 /// conditions at the end of the step, 0 ≤ g ⊥ λ ≥ 0, and moves the unknown by Δ. Gaps that are not affine in u are
-/// linearized anew within the iteration, on the dofs of contact alone, until they are met: their curvature costs no
-/// factorization, and does not slow the convergence of the rest.
+/// linearized again within the iteration, on the contact dofs only, until the contact conditions hold: their
+/// curvature needs no factorization and does not slow down convergence.
 ///
 /// A stage is solved when both
 ///
 /// * ‖r‖ ≤ `force` · (‖f‖ + ‖Gᵀ λ‖), and
-/// * the increment to come, estimated by ‖Δ‖ ‖r‖ / ‖r before‖, is at most `displacement` times the whole increment
+/// * the next increment, estimated by ‖Δ‖ ‖r‖ / ‖r before‖, is at most `displacement` times the whole increment.
 ///
-/// (Euclidean norms over the free dofs; the increment is measured from the prediction, so that no common translation
-/// enters). Where forces cancel, in free flight or at rest, it is solved when increments are within `displacement` of
-/// the whole, and the residual has fallen by `force` or falls no more (to half in two iterations, to 0.85 in eight
-/// where the tangent stays); or when they are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are
-/// raised to it.
+/// Norms are Euclidean over the free dofs. The increment is measured from the prediction, so that no common
+/// translation enters.
+///
+/// Where forces cancel, in free flight or at rest, a stage is solved when increments are within `displacement` of the
+/// whole increment and the residual has fallen by the factor `force` or stagnates. It stagnates if it does not fall
+/// to one half in two iterations, or with a constant tangent to 0.85 in eight. A stage is also solved when increments
+/// are below the resolution of u, ε ‖u‖. Tolerances below 64 ε of the scalar are raised to it.
 ///
 /// ```
 /// use contact_dynamics::Newton;
@@ -67,14 +69,14 @@ impl Newton {
         Self { tangent: TangentUpdate::Iteration, line_search: false, force: 1e-9, displacement: 1e-8, iterations: 20 }
     }
 
-    /// The tangent of the prediction for all iterations of a stage: linear convergence, one factorization. Pays where a
-    /// factorization is dear and a step small.
+    /// The tangent of the prediction for all iterations of a stage: linear convergence, one factorization. Useful if
+    /// a factorization is expensive and steps are small.
     pub const fn modified() -> Self {
         Self { tangent: TangentUpdate::Stage, iterations: 60, ..Self::full() }
     }
 
-    /// Halves increments, down to an eighth, while they do not make the residual smaller, or lead to a state that the
-    /// host does not admit. It costs nothing where full increments are taken. Slender structures pass through larger
+    /// Halves increments, down to an eighth, while they do not reduce the residual or lead to a state that the host
+    /// does not admit. It costs nothing where full increments are accepted. Slender structures pass through larger
     /// residuals before they converge, and are better solved without it.
     #[must_use]
     pub const fn line_search(self) -> Self {
@@ -97,12 +99,13 @@ impl Newton {
         Ok(Self { force, displacement, ..self })
     }
 
-    /// The largest number of iterations of a stage; 20 by default (60 for [`modified`](Self::modified)). Beyond it the
-    /// step is undone, and [`Error::NewtonNotConverged`] returned.
+    /// The largest number of iterations of a stage; 20 by default (60 for [`modified`](Self::modified)). Beyond it
+    /// the step is undone, and [`Error::NewtonNotConverged`] is returned.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for zero and for more than a million, as memory for the report of each is reserved.
+    /// [`Error::Parameter`] for zero and for more than a million, as memory for the report of each iteration is
+    /// reserved.
     pub fn iterations(self, iterations: usize) -> Result<Self> {
         let (name, value) = ("Newton's number of iterations", iterations as f64);
         match (1..=1_000_000).contains(&iterations) {
@@ -111,7 +114,7 @@ impl Newton {
         }
     }
 
-    /// Tolerances in force and displacement that the scalar can meet.
+    /// Tolerances in force and displacement, raised to the resolution of the scalar.
     pub(crate) fn bounds<T: Real>(&self) -> [f64; 2] {
         [self.force, self.displacement].map(|tolerance| tolerance.max(64.0 * T::epsilon().value()))
     }
@@ -123,7 +126,7 @@ impl Newton {
 pub struct Iteration {
     /// ‖f − M ā + Gᵀ λ‖ after the iteration, over ‖f‖ + ‖Gᵀ λ‖.
     pub residual: f64,
-    /// ‖Δ‖ of the iteration over that of the whole increment so far.
+    /// ‖Δ‖ of the iteration over the norm of the whole increment so far.
     pub increment: f64,
 }
 
@@ -135,7 +138,7 @@ pub(crate) struct NewtonWork<T> {
     /// Residual without contact forces before an iteration, and the increment of the iteration.
     pub(crate) residual: Vec<T>,
     pub(crate) increment: Vec<T>,
-    /// For schemes that take the force of the whole path.
+    /// For schemes that evaluate the force along the whole path.
     pub(crate) path: Option<PathWork<T>>,
     pub(crate) report: Vec<Iteration>,
     /// The norm of the residual before the iterations of the stage, and after each.

@@ -13,7 +13,7 @@ use crate::simulation::stage::vectors::StageVectors;
 use crate::state::Motion;
 use crate::system::Path;
 
-/// The smallest share of an increment that a line search takes.
+/// The smallest share of an increment in a line search.
 const SHORTEST: f64 = 0.125;
 
 /// Norms at a trial state.
@@ -70,17 +70,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let before = Norms { residual, ..norms };
             let forces = &contact.interface.forces;
             let Some((share, found)) = self.advance(newton, new, past, vectors, forces, before)? else {
-                // The stage is linear in all but its gaps.
+                // The stage is linear in everything but its gaps.
                 return self.refuse_unsettled(settled, new.t, &contact.rows.curved);
             };
             norms = found;
-            // Rows were made to fit the whole increment.
+            // Rows fit the whole increment only.
             let settled = settled && (share >= 1.0 || self.constraints.len() == 0);
             if self.has_converged(newton, share * size, before.residual, norms, new)? && settled {
                 return Ok(());
             }
         }
-        // (There is at least one iteration.)
+        // There is at least one iteration.
         let last = newton.report.last().copied().unwrap_or_default();
         Err(Error::NewtonNotConverged {
             t: self.clock.at(0.0),
@@ -92,8 +92,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         })
     }
 
-    /// Reports an iteration whose increment has this `size`, and says whether it is the last one. `before` is the norm
-    /// of the residual before it, with the contact forces that it has found.
+    /// Reports an iteration whose increment has the norm `size`, and returns whether it is the last one. `before` is
+    /// the norm of the residual before it, with the contact forces of this iteration.
     fn has_converged(
         &self,
         newton: &mut NewtonWork<T>,
@@ -110,10 +110,10 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton.report.push(Iteration { residual: norms.relative(), increment: ratio(size, whole) });
         let [force, displacement] = newton.settings.bounds::<T>();
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
-        // Where forces cancel the residual has nothing to be compared with. Then increments must be small, and the
-        // residual must fall no more or have fallen far; or the increment must be below the resolution of the
-        // displacements. (Far from the origin much is small beside the displacements: that the residual falls slowly is
-        // not enough.)
+        // Where forces cancel, the residual has no scale. Then increments must be small, and the residual must
+        // stagnate or have fallen far; or the increment must be below the resolution of the displacements. Far from
+        // the origin many increments are small compared with the displacements: a slowly falling residual is not
+        // enough.
         newton.residuals.push(norms.residual);
         let (within, share) = newton.settings.tangent.falls();
         let earlier = newton.residuals.len().checked_sub(within + 1);
@@ -163,7 +163,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Leaves f − M ā at the trial motion in `vectors.increment`.
+    /// Writes f − M ā at the trial motion to `vectors.increment`.
     fn evaluate(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -174,12 +174,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
     ) -> Result<Norms> {
         let squares = self.squares(newton, new, past, vectors, forces);
         let [force, residual] = self.together.sum(squares)?.map(f64::sqrt);
-        // (Contact is the same on all ranks.)
+        // Contact is the same on all ranks.
         Ok(Norms { residual, force, contact: norm(forces) })
     }
 
-    /// Puts the residual without contact where the increment is going to be; returns what this rank has of the squares
-    /// of the force, and of the residual with contact forces.
+    /// Writes the residual without contact to `vectors.increment`. Returns the part of this rank in the squares of
+    /// the force, and of the residual with contact forces.
     fn squares(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -227,7 +227,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// The square of the length of what this rank owns of a vector.
+    /// The squared norm of the part of a vector that this rank owns.
     fn square(&self, x: &[T]) -> f64 {
         self.together.owned(x.len()).map(|part| square(&x[part])).sum()
     }
@@ -263,7 +263,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         factorized.map_err(|error| self.in_iteration(error, iteration))
     }
 
-    /// A matrix that is not positive definite, found by a factorization or by an iteration, is that of this iterate.
+    /// Converts the error of a matrix that is not positive definite to an error of this iterate.
     fn in_iteration(&self, error: Error, iteration: usize) -> Error {
         match error {
             Error::Singular { dof, .. } | Error::Indefinite { dof, .. } => {
@@ -273,7 +273,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
     }
 
-    /// Adds the response to contact to the increment on the interface. Says whether curved rows fit the result.
+    /// Adds the response to contact to the increment on the interface. Returns whether curved rows fit the result.
     fn press(
         &mut self,
         newton: &mut NewtonWork<T>,
@@ -289,8 +289,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         self.contact(Part::All, Some(&newton.d), new, past, vectors, contact)
     }
 
-    /// Moves by the increment in `vectors.increment`, or by a share of it, which is returned; the residual there takes
-    /// its place. A stage that is linear in its unknown is solved by this, and nothing is returned.
+    /// Moves by the increment in `vectors.increment`, or by a share of it, and returns the share; the residual there
+    /// replaces the increment. Returns nothing if the stage is linear in its unknown: it is solved then.
     fn advance(
         &mut self,
         newton: &mut NewtonWork<T>,

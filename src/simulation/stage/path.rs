@@ -1,16 +1,16 @@
-//! The force of a path: the one whose internal work over a step is the change of the potential.
+//! The force along a path: its internal work over a step is the change of the potential.
 
 use crate::error::Result;
 use crate::ranks::Together;
 use crate::real::Real;
 use crate::system::{Path, System};
 
-/// How the force of a path was formed.
+/// How the force along a path was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PathForm {
-    /// The system's own.
+    /// By the system itself.
     Own,
-    /// The force in the middle: there is no potential.
+    /// The force in the middle, for systems without a potential.
     Middle,
     /// Simpson's mean, or the mean nearest to it that conserves energy.
     Simpson,
@@ -36,9 +36,9 @@ impl<T: Real> PathWork<T> {
         self.start = system.potential_energy(from);
     }
 
-    /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end, a f(u₀) + b
-    /// f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: of all such means the one
-    /// nearest to Simpson's rule. Each of the three internal forces has no resultant, hence neither has the mean.
+    /// `out =` the system's own force along the path, or a mean of the forces at its start, middle and end, a f(u₀) +
+    /// b f(ū) + c f(u₁) with a + b + c = 1, whose internal work is the change of the potential: the mean nearest to
+    /// Simpson's rule. Each of the three internal forces has no resultant, hence neither has the mean.
     pub(crate) fn force(
         &mut self,
         (system, together): (&mut dyn System<T>, &Together<T>),

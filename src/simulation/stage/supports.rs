@@ -1,4 +1,4 @@
-//! Prescribed motions: read from the host, refused if NaN or infinite, put into the vectors.
+//! Prescribed motions: read from the host, checked for NaN and infinity, and written to the vectors.
 
 use crate::error::{Error, Result};
 use crate::mass::Mass;
@@ -10,7 +10,7 @@ use crate::system::System;
 pub(crate) struct Supports<T> {
     /// Ascending.
     pub(crate) dofs: Vec<usize>,
-    /// Prescribed u, v, a at the time of the state and at that of the balance.
+    /// Prescribed u, v, a at the time of the state and at the time of the balance.
     pub(crate) state: Vec<[T; 3]>,
     pub(crate) balance: Vec<[T; 3]>,
     /// Whether M couples prescribed dofs with free ones.
@@ -40,7 +40,7 @@ pub(crate) fn finite_supports<T: Real>(t: f64, prescribed: &[usize], supports: &
     Ok(())
 }
 
-/// Puts displacements and velocities of the supports at t into a motion.
+/// Writes displacements and velocities of the supports at t to a motion.
 pub(crate) fn put_supports<T: Real>(
     system: &mut dyn System<T>,
     t: f64,
@@ -59,8 +59,8 @@ pub(crate) fn put_supports<T: Real>(
     Ok(())
 }
 
-/// Puts displacements and velocities of the supports at the start in place, and returns their motions. Refuses initial
-/// values of another motion.
+/// Writes displacements and velocities of the supports at the start, and returns their motions. Refuses initial
+/// values that differ from them.
 pub(crate) fn put_initial_supports<T: Real>(
     system: &mut dyn System<T>,
     t: f64,
@@ -78,7 +78,7 @@ pub(crate) fn put_initial_supports<T: Real>(
     Ok(supports)
 }
 
-/// Sets an initial value to that of its support. Refuses one that the host gave otherwise, zero excepted.
+/// Sets an initial value to the value of its support. Refuses a different value given by the host, unless it is zero.
 fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) -> Result<()> {
     let given = *place;
     let same = (given - prescribed).abs() <= T::of(1e3) * T::epsilon() * prescribed.abs();

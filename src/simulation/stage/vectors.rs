@@ -1,4 +1,4 @@
-//! Vectors of a stage, and what they hold before it is solved: the predicted motion and its residual.
+//! Vectors of a stage, and their values before it is solved: the predicted motion and its residual.
 
 use crate::error::Result;
 use crate::real::Real;
@@ -11,13 +11,13 @@ use crate::system::System;
 pub(crate) struct StageVectors<T> {
     /// Residual, then the increment d.
     pub(crate) increment: Vec<T>,
-    /// ū, v̄, ā where the balance does not hold at the recovered state.
+    /// ū, v̄, ā if the balance does not hold at the recovered state.
     pub(crate) balance: Option<Motion<T>>,
     pub(crate) supports: Supports<T>,
 }
 
-/// Predicts the new motion at d = 0, and that of the balance where it holds elsewhere: displacements and velocities
-/// with the supports in place, and the part of the accelerations that comes from the past.
+/// Predicts the new motion at d = 0, and the motion of the balance if it differs: displacements and velocities with
+/// the supports in place, and the part of the accelerations that comes from the past.
 pub(crate) fn predict<T: Real>(
     stage: &CompiledStage<T>,
     clock: Clock,
@@ -34,8 +34,8 @@ pub(crate) fn predict<T: Real>(
         rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
         put_supports(system, clock.at(stage.load), prescribed, balance_supports, balance)?;
         if let (true, Some(start)) = (stage.along_path, past.first()) {
-            // Supports too are at the mean of both ends, and their velocity is the difference of the ends per time: the
-            // work of a step is force times this difference.
+            // Supports too are at the mean of both ends, and their velocity is the difference of the ends over the
+            // time: the work of a step is force times this difference.
             let per_step = T::of((clock.h * (stage.end - stage.start)).recip());
             for &dof in prescribed.iter() {
                 let (from, to) = (start.u[dof], new.u[dof]);
@@ -46,7 +46,7 @@ pub(crate) fn predict<T: Real>(
     Ok(())
 }
 
-/// Leaves f(t̄, ū, v̄) − M ā of a predicted motion in `vectors.increment`.
+/// Writes f(t̄, ū, v̄) − M ā of a predicted motion to `vectors.increment`.
 pub(crate) fn residual<T: Real>(
     stage: &CompiledStage<T>,
     t_balance: f64,

@@ -8,7 +8,7 @@ use crate::simulation::rows::contact_rows::{Level, Part};
 use crate::simulation::stage::contact::{ContactStep, ContactWork};
 use crate::state::Motion;
 
-/// Where a stage stands in its step, for the impulses of its contacts.
+/// The position of a stage in its step, for the impulses of its contacts.
 pub(crate) struct Booking {
     /// Impulse of a unit multiplier over a step, divided by h.
     pub(crate) impulse_weight: f64,
@@ -18,8 +18,7 @@ pub(crate) struct Booking {
 }
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Decides which contacts are closed, and sets what the stage reports of them before corrections: force and
-    /// impulse.
+    /// Decides which contacts are closed, and sets the reported force and impulse of each before corrections.
     pub(crate) fn close(
         &mut self,
         (new, past): (&Motion<T>, &[Motion<T>]),
@@ -35,7 +34,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if level.target.is_none() {
             trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
         } else {
-            // The gaps that are reported are those at the displacements of the state.
+            // The reported gaps are evaluated at the displacements of the state.
             rows.curved.hold(g, constraints);
             constraints.follow(new.t, &new.u, g)?;
             rows.curved.release(constraints);
@@ -44,7 +43,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let impulse_weight = T::of(clock.h * booking.impulse_weight);
         impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
         if rows.curved.apart {
-            // Multipliers along the rows of the balance: from here on all is along those of the state.
+            // Turns the multipliers from the rows of the balance to the rows of the state, which are used from here
+            // on.
             let tangents = constraints.tangents();
             tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
         }
@@ -77,8 +77,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
             let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
             let closed = raw > T::zero() || touching || law.is_equality();
             trial.closed[row] = closed;
-            // Compliant contacts, and those on dofs without mass, leave no jump to correct. (Impulses do not reach such
-            // dofs: friction there would be taken from one side alone.)
+            // Compliant contacts, and contacts on dofs without mass, leave no jump to correct. Impulses do not reach
+            // such dofs: friction there would be taken from one side only.
             let is_static = !massless.is_empty() && g.acts_on(row, massless);
             let has_mass = !is_static && !constraints.tangents().act_on(g, row, massless);
             if law.rebounds() && is_static {
@@ -101,7 +101,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if is_balanced {
                 buffers.switching.note(row, trial);
             }
-            // (What a contact without mass has taken it may give back when it opens, or closes again.)
+            // A contact on dofs without mass may return dissipated energy when it opens, or closes again.
             if closed && !was_closed && !closed_at_start[row] && !is_balanced {
                 trial.dissipated[row] = T::zero();
             }

@@ -1,4 +1,4 @@
-//! Curved rows in the contact of a stage: linearized again at its result, and compared with what was solved.
+//! Curved rows in the contact of a stage: linearized again at its result, and compared with the rows solved for.
 
 use crate::contact::{Candidates, ContactJacobian};
 use crate::corrector::{Gaps, rounding};
@@ -13,8 +13,8 @@ use crate::simulation::stage::vectors::StageVectors;
 use crate::state::Motion;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Extrapolates gaps along the force rows F, not G, from where the last iteration of Newton's method has linearized
-    /// them to d without contact: contact forces move gaps back along F. Otherwise each iteration would begin with the
+    /// Extrapolates gaps along the force rows F, not G, from the last linearization of Newton's method to d without
+    /// contact, because contact forces move gaps back along F. Otherwise each iteration would begin with the
     /// difference between G and F as an error.
     pub(crate) fn extrapolate(&self, new: &Motion<T>, contact: &mut ContactWork<T>) {
         let ContactWork { rows, interface, .. } = contact;
@@ -33,7 +33,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Goes back to d without contact, and extrapolates y to it from the newest linearization.
+    /// Returns to d without contact, and extrapolates y to it from the newest linearization.
     pub(crate) fn step_back(
         &mut self,
         operator: &mut Operator<T>,
@@ -62,7 +62,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
         let forces = rows.curved.forces(self.g);
         for row in 0..self.constraints.len() {
-            // (A predictive law reads the gap that the scheme constrains.)
+            // A predictive law reads the gap that the scheme constrains.
             let weight = if self.constraints.law(row).is_predictive() { rigid } else { rows.weight[row] };
             rows.y[row] += weight * forces.interface_product(row, &interface.tried);
             rows.tolerance[row] += rounding(weight.abs() * forces.interface_magnitude(row, &interface.tried));
@@ -75,7 +75,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Extrapolates the gaps of the balance to d from the d that was tried last.
+    /// Extrapolates the gaps of the balance from the last tried d to d.
     fn balance_gaps_from_tried(&self, contact: &mut ContactWork<T>) {
         let [_, balance_u, _] = self.weights();
         let ContactWork { rows, interface, .. } = contact;
@@ -88,7 +88,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         rows.keep_balance_gaps();
     }
 
-    /// Keeps the gaps that this linearization foresees at the resulting d.
+    /// Stores the gaps that this linearization predicts at the resulting d.
     pub(crate) fn foresee(&self, needed: bool, contact: &mut ContactWork<T>) {
         let [_, balance_u, _] = self.weights();
         let ContactRowsWork { y, weight, curved, .. } = &mut contact.rows;
@@ -110,8 +110,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Linearizes the rows at the resulting d: G where contact is imposed, F where the balance holds. Says whether any
-    /// has changed.
+    /// Linearizes the rows at the resulting d: G where contact is imposed, F where the balance holds. Returns whether
+    /// any row has changed.
     pub(crate) fn follow(
         &mut self,
         new: &mut Motion<T>,
@@ -152,8 +152,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         })
     }
 
-    /// How much gaps and forces of the rows linearized at d differ from those that were solved for. Leaves y of the
-    /// rows at the d that was placed.
+    /// Compares gaps and forces of the rows linearized at d with the gaps and forces solved for. Leaves y of the rows
+    /// at the d that was placed.
     pub(crate) fn miss(&mut self, new: &Motion<T>, past: &[Motion<T>], contact: &mut ContactWork<T>) -> Result<Miss> {
         self.evaluate(new, contact)?;
         self.evaluate_slips(new, past, contact)?;
@@ -172,7 +172,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 tolerance = constraints.gap_rounding(row, g.magnitude(row, &new.u), y);
                 scale = scale.max(y.abs());
             }
-            // (Where a gap is zero in zero coordinates nothing else is left of the way that the force has taken back.)
+            // The rounding of the displacement undone by the force: no other term contains it if gap and coordinates
+            // are zero.
             tolerance += rounding(rows.weight[row].abs() * forces.interface_magnitude(row, &interface.free));
             let pressed = lambda > T::zero() || law.is_equality();
             let miss = match pressed {
@@ -182,7 +183,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             };
             let beyond = miss - tolerance;
             if beyond > T::zero() {
-                // (Where d moves nothing, the tolerance is the scale that is left.)
+                // Where d moves nothing, the tolerance is the only scale left.
                 let share = (beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value();
                 if share > largest {
                     (worst, largest) = ((row, "the gap"), share);
@@ -194,10 +195,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
             forces.interface_scatter(row, lambda, &mut interface.response);
             let owner = constraints.tangents().owner(row);
             if trial.lambda_raw[owner] > T::zero() && rows.weight[row] > T::zero() {
-                // (A contact that is pressed alone has no slip but that of a normal which turns by rounding.)
+                // A contact under normal force alone slips only by the rounding of its normal.
                 let along = |row: usize| forces.interface_magnitude(row, &interface.increment);
                 let scale = rows.weight[row] * (along(row) + along(owner));
-                // (What sticks has a slip of nothing but the rounding of what friction has taken back.)
+                // The slip of a sticking contact is the rounding of the displacement that friction has undone.
                 let taken = rounding(rows.weight[row] * forces.interface_magnitude(row, &interface.free));
                 let beyond = (rows.y[row] - rows.curved.foreseen[row]).abs() - rows.tolerance[row] - taken;
                 if beyond > T::zero() {

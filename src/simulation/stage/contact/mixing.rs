@@ -1,29 +1,29 @@
-//! Linearizations of curved rows that converge slowly, or go round a solution: where rows are linearized next is mixed
-//! from the last passes.
+//! Anderson mixing of linearizations of curved rows that converge slowly, or cycle around a solution: the next
+//! linearization is at a combination of the last iterates.
 //!
-//! Rows are linearized at d, and the contact problem solved with them has the result r(d). Rows turn with d, and with
-//! them forces, whose change the problem does not know: from pass to pass d then comes nearer to where r(d) = d by a
-//! factor only, which may be nearly one, or below minus one. Anderson's mixing (J. ACM 12, 1965; Walker and Ni, SIAM J.
-//! Numer. Anal. 49, 2011) takes the combination of the last passes in which r − d is least, if it is linear in d.
+//! Rows are linearized at d, and the contact problem solved with them has the result r(d). Rows turn with d, and so
+//! do forces, whose change the problem does not contain. So the iteration approaches the fixed point r(d) = d by a
+//! constant factor only, which may be nearly one, or below minus one. Anderson's mixing (J. ACM 12, 1965; Walker and
+//! Ni, SIAM J. Numer. Anal. 49, 2011) computes the combination of the last iterates in which r − d is least, if it is
+//! linear in d.
 
 use crate::real::Real;
 
-/// The number of differences of passes that are mixed.
+/// The number of differences of iterates that are mixed.
 const DEPTH: usize = 4;
 
-/// Share of a difference that is left of it, without what it has in common with those of later passes, below which it
-/// is rounding.
+/// A difference is rounding if its component orthogonal to newer differences is below this share of it.
 const LEFT: f64 = 1e-6;
 
-/// The longest way from the result of a pass to where rows are linearized next, over that from where they were
-/// linearized to the result: a factor of 0.99 or of 1.01 needs a hundred.
+/// The largest distance from the result of an iteration to the next linearization, over the distance from its own
+/// linearization to the result: a convergence factor of 0.99 or of 1.01 needs a hundred.
 const FARTHEST: f64 = 1e3;
 
-/// The share of the way by which passes have pushed that mixing may move their result where half of the step may be
-/// taken instead. (Of the rests that are those of the same solution nearly all are nearer than a hundredth.)
+/// Mixing may move the result of the unmixed iterations by this share of their displacement by contact if the step
+/// can be halved. Fixed points of the same solution are nearly all within a hundredth.
 pub(crate) const ELSEWHERE: f64 = 0.5;
 
-/// A difference of two passes: of r − d, and of r.
+/// A difference of two iterations: of r − d, and of r.
 struct Difference<T> {
     misses: Vec<T>,
     results: Vec<T>,
@@ -31,13 +31,13 @@ struct Difference<T> {
 
 /// Memory for mixing.
 pub(crate) struct Mixing<T> {
-    /// Where the rows of the next pass are linearized.
+    /// Where the rows of the next iteration are linearized.
     from: Vec<T>,
-    /// The last pass itself.
+    /// The last iteration itself.
     last: Difference<T>,
-    /// The result of the passes before any was mixed.
+    /// The result of the iterations before mixing.
     unmixed: Vec<T>,
-    /// Of the passes before, the newest first, and of them what each has that those before it here have not.
+    /// Differences of earlier iterations, the newest first, and their components orthogonal to newer differences.
     differences: [Difference<T>; DEPTH],
     apart: [Difference<T>; DEPTH],
     known: usize,
@@ -51,7 +51,7 @@ impl<T: Real> Difference<T> {
 }
 
 impl<T: Real> Mixing<T> {
-    /// For so many dofs.
+    /// For `size` dofs.
     pub(crate) fn new(size: usize) -> Self {
         let differences = || std::array::from_fn(|_| Difference::new(size));
         Self {
@@ -65,32 +65,32 @@ impl<T: Real> Mixing<T> {
         }
     }
 
-    /// Begins with the result of passes that were not mixed.
+    /// Begins with the result of unmixed iterations.
     pub(crate) fn begin(&mut self, result: &[T]) {
         self.forget();
         self.unmixed.clear();
         self.unmixed.extend_from_slice(result);
     }
 
-    /// Forgets what passes have found.
+    /// Forgets all iterations.
     fn forget(&mut self) {
         (self.known, self.begun) = (0, false);
     }
 
-    /// How far d is from where passes were before any was mixed, over the way that they had pushed it from `free`, if
-    /// this share is that of another solution.
+    /// The distance of d from the result of the unmixed iterations, over the distance of that result from `free`.
+    /// Returned if it exceeds [`ELSEWHERE`], which indicates another solution.
     pub(crate) fn elsewhere(&self, d: &[T], free: &[T]) -> Option<f64> {
         let share = (square_of_way(d, &self.unmixed) / square_of_way(&self.unmixed, free)).sqrt();
         (share > ELSEWHERE).then_some(share)
     }
 
-    /// Notes where the rows of the next pass are linearized.
+    /// Stores where the rows of the next iteration are linearized.
     pub(crate) fn begin_at(&mut self, d: &[T]) {
         self.from.clear();
         self.from.extend_from_slice(d);
     }
 
-    /// Takes the result of a pass.
+    /// Stores the result of an iteration.
     pub(crate) fn learn(&mut self, result: &[T]) {
         let Self { from, last, differences, .. } = self;
         let miss = |(&result, &from): (&T, &T)| result - from;
@@ -111,7 +111,7 @@ impl<T: Real> Mixing<T> {
         self.begun = true;
     }
 
-    /// Moves the result of the last pass to where r − d is least. Says whether it has moved.
+    /// Moves the result of the last iteration to where r − d is least. Returns whether it has moved.
     pub(crate) fn mix(&mut self, result: &mut [T]) -> bool {
         let Self { last, differences, apart, known, .. } = self;
         let mut used = 0;
@@ -141,14 +141,14 @@ impl<T: Real> Mixing<T> {
         false
     }
 
-    /// Goes back to the result of the last pass, and begins anew.
+    /// Restores the result of the last iteration, and begins again.
     pub(crate) fn give_up(&mut self, result: &mut [T]) {
         result.copy_from_slice(&self.last.results);
         self.forget();
     }
 }
 
-/// Σ x y, which neither overflows nor underflows where T does.
+/// Σ x y in f64, which neither overflows nor underflows where T does.
 fn product<T: Real>(x: &[T], y: &[T]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x.value() * y.value()).sum()
 }
@@ -162,7 +162,7 @@ fn square_of_way<T: Real>(x: &[T], y: &[T]) -> f64 {
 mod tests {
     use super::*;
 
-    /// r(d) = c + D (d − c), whose passes come nearer to c by the factors on the diagonal, or go away from it.
+    /// r(d) = c + D (d − c): iterations approach c, or move away from it, by the factors on the diagonal.
     fn misses(factors: [f64; 3], mixes: bool) -> f64 {
         let center = [1.0, -2.0, 0.5];
         let (mut d, mut mixing) = ([0.0; 3], Mixing::new(3));
@@ -190,7 +190,7 @@ mod tests {
         let mut mixing = Mixing::new(2);
         let free = [3.0, 4.0];
         mixing.begin(&[0.0, 0.0]);
-        // Half of the way of 5 that they had pushed.
+        // Half of the displacement of 5 is 2.5.
         assert_eq!(mixing.elsewhere(&[2.4, 0.0], &free), None);
         assert_eq!(mixing.elsewhere(&[0.0, -2.75], &free), Some(0.55));
         mixing.begin(&[2.0, 4.0]);
@@ -203,12 +203,12 @@ mod tests {
         let mut d = [3.0, 4.0];
         mixing.begin_at(&[0.0, 0.0]);
         mixing.learn(&d);
-        // Nothing to compare with yet; then passes that differ in nothing.
+        // No difference yet; then two equal iterations.
         assert!(!mixing.mix(&mut d));
         mixing.learn(&d);
         assert!(!mixing.mix(&mut d));
         assert_eq!(d.map(f64::to_bits), [3.0, 4.0].map(f64::to_bits));
-        // A solution a million times farther than the last way is none.
+        // A solution a million times farther than the last increment is rejected.
         mixing.forget();
         mixing.begin_at(&[0.0, 0.0]);
         mixing.learn(&[1.0, 0.0]);

@@ -13,18 +13,19 @@ use crate::simulation::stage::contact::applied_rows::AppliedRows;
 use crate::simulation::stage::contact::{ContactStep, ContactWork, course};
 use crate::state::Motion;
 
-/// The most linearizations of nonlinear laws in a stage.
+/// Maximum number of linearizations of nonlinear laws in a stage.
 const LINEARIZATIONS: usize = 100;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Decides which rows the problem begins with; says whether there is any that is violated, or an equality row.
+    /// Decides which rows the problem begins with. Returns whether it must be solved: for a violated row, an equality
+    /// row, or friction under a known normal force.
     pub(crate) fn condition(&mut self, new: &Motion<T>, contact: &mut ContactWork<T>) -> bool {
         let Self { stage, clock, constraints, g, part, .. } = &*self;
         let ContactWork { trial, rows, .. } = contact;
         let mut needed = false;
         let tangents = constraints.tangents();
         for row in tangents.all() {
-            // (Friction that is found after the static balance is not known in it.)
+            // Friction that is found after the static balance is zero in it.
             if rows.weight[row] > T::zero() || *part == Part::Massless && rows.on_massless[tangents.owner(row)] {
                 trial.lambda_raw[row] = T::zero();
             }
@@ -37,7 +38,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             if laws.compliant && law.is_compliant() {
                 let gap = rows.balance_gap[row];
                 rows.y[row] = match law.is_predictive() {
-                    // The mean gap of the coming step, less that of the last step if this was negative.
+                    // The mean gap of the coming step, minus the mean penetration of the last step if there was any.
                     true => {
                         T::of(0.5) * (rows.y[row] + gap) - (-T::of(0.5) * (gap + rows.start_gap[row])).max(T::zero())
                     }
@@ -45,7 +46,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 };
                 rows.tolerance[row] = constraints.gap_rounding(row, g.magnitude(row, &new.u), gap);
                 if self.slows(law) {
-                    // (Its gap is known: it says whether there is a force.)
+                    // The known gap decides whether there is a force.
                     rows.enabled[row] = gap < T::zero();
                     rows.y[row] = -T::of(clock.h) * rows.approach[row];
                     rows.tolerance[row] = rounding(T::of(clock.h) * g.magnitude(row, &new.v));
@@ -71,7 +72,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         needed | self.rub_known(contact)
     }
 
-    /// Takes contacts into the problem whose normal force is known, for their friction; says whether there is any.
+    /// Adds contacts with a known normal force to the problem, for their friction. Returns whether there are any.
     fn rub_known(&self, contact: &mut ContactWork<T>) -> bool {
         let (ContactWork { trial, rows, .. }, tangents) = (contact, self.constraints.tangents());
         let mut any = false;
@@ -84,11 +85,11 @@ impl<T: Real> ContactStep<'_, '_, T> {
         any
     }
 
-    /// Solves for the multipliers. Nonlinear laws are linearized again until they are met.
+    /// Solves for the multipliers. Nonlinear laws are linearized again until they hold.
     pub(crate) fn press(&mut self, operator: &mut Operator<T>, t: f64, contact: &mut ContactWork<T>) -> Result<()> {
         let augmentations = self.constraints.laws().augmentations;
         let limit = LINEARIZATIONS + augmentations;
-        // What the last pass left of the laws.
+        // The residual of the laws after the last iteration.
         let mut before = T::infinity();
         for pass in 0..limit {
             self.press_linearized(operator, t, contact)?;
@@ -103,7 +104,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     continue;
                 }
                 let law = self.constraints.law(row);
-                // (Of a known gap the force is linear in the rate.)
+                // At a known gap the force is linear in the rate.
                 if law.is_nonlinear() && !self.slows(&law) {
                     let gap = y[row] + weight[row] * forces.interface_product(row, &interface.response);
                     let (depth, rounded) = ((-gap).max(T::zero()), T::of(64.0) * T::epsilon());
@@ -127,8 +128,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     trial.lambda_raw[row] = lambda;
                 }
             }
-            // Newton's method ends where a pass that follows a small miss makes it no smaller: what is left is that of
-            // a solver that iterates, as for friction.
+            // Newton's method ends when an iteration does not reduce a small residual: this residual comes from an
+            // iterative contact solver, as for friction.
             let ends = worst.1 <= T::epsilon().sqrt() * deepest && worst.1 > T::of(0.75) * before;
             before = worst.1;
             let met = worst.1 == T::zero() || ends;
@@ -151,8 +152,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Solves on the rows in the problem, and leaves the response in `interface.response`. Rows whose gaps this
-    /// response closes join the problem, and it is solved again. As rows only join, this ends.
+    /// Solves for the rows in the problem, and leaves the response in `interface.response`. Rows whose gaps this
+    /// response closes join the problem, and it is solved again. This ends, as rows only join.
     pub(crate) fn press_linearized(
         &mut self,
         operator: &mut Operator<T>,
@@ -193,7 +194,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 for group in 0..operator.groups().len() {
                     let range = operator.groups().range(group);
                     if range.len() > *most {
-                        // (Beside W solvers take two matrices as large, and cannot return that there is no memory.)
+                        // Beside W solvers need two matrices as large, and cannot report that there is no memory.
                         let rows = if range.len() > *reserved { range.len().next_power_of_two() } else { range.len() };
                         memory::probe::<T>(rows, 3 * rows, "the contact solver")?;
                         *most = rows;
@@ -209,7 +210,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         false => compliance[own[k]] / weight[own[k]],
                     };
                     let (delassus, version) = operator.delassus(forces, own, compliance_of, versions)?;
-                    // (A contact with friction is one block of several rows.)
+                    // A contact with friction is one block of several rows.
                     let blocks = own.iter().filter(|&&row| !forces.is_tangential(row)).count();
                     let (offset, sets) = (&offset[range.clone()], &sets[first_set..first_set + blocks]);
                     first_set += blocks;
@@ -222,7 +223,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                     let multipliers = &mut multipliers[range];
                     let solved = solver.solve(&data, multipliers);
                     if knows {
-                        // (What known forces do is part of the motion already.)
+                        // The motion already contains the effect of known forces.
                         let own = multipliers.iter_mut().zip(own).filter(|(_, row)| is_known(row));
                         own.for_each(|(multiplier, _)| *multiplier = T::zero());
                     }
@@ -234,7 +235,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             statistics.contact_solves += 1;
             let mut grown = false;
-            // No row is pushed farther than this times its weight.
+            // An upper bound of the response of each row, over its weight.
             let reach = forces.largest_row() * T::largest(&interface.response);
             for row in 0..count {
                 let near = y[row] - weight[row] * reach < -tolerance[row];

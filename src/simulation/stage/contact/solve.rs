@@ -1,5 +1,5 @@
-//! The contact of a stage: its problem is solved, and solved again with rows linearized at the result, until they fit
-//! it.
+//! The contact of a stage: its problem is solved, and solved again with rows linearized at the result, until rows and
+//! result agree.
 
 use crate::contact::Candidates;
 use crate::error::{Error, Result};
@@ -14,8 +14,8 @@ use crate::state::Motion;
 use crate::system::System;
 
 impl<T: Real> ContactStep<'_, '_, T> {
-    /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces in
-    /// `interface.forces`. Motions are left as predicted. Says whether curved rows fit the resulting d.
+    /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces
+    /// in `interface.forces`. Motions are left as predicted. Returns whether curved rows fit the resulting d.
     pub(crate) fn solve(
         &mut self,
         system: &mut dyn System<T>,
@@ -48,7 +48,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         result
     }
 
-    /// Solves with the rows as they are, then with rows linearized at the result, until they fit it.
+    /// Solves with the present rows, then with rows linearized at the result, until rows and result agree.
     pub(crate) fn settle(
         &mut self,
         operator: &mut Operator<T>,
@@ -88,8 +88,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(false)
     }
 
-    /// Refuses the rest of passes that were mixed where it is that of another solution, as it seems, and half of the
-    /// step may be taken instead, which is nearer to its own.
+    /// Rejects the fixed point found by Anderson mixing if it is far from the unmixed iterates and the step can be
+    /// halved.
     fn refuse_elsewhere(&self, pass: usize, t: f64, contact: &ContactWork<T>) -> Result<bool> {
         let ContactWork { rows, interface, .. } = contact;
         let mixed = rows.curved.mixing.as_ref().filter(|_| rows.curved.may_halve && pass >= SLOW);
@@ -103,8 +103,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         }
     }
 
-    /// Linearizes rows where passes are going that do not come there by themselves, instead of at the result of the
-    /// last one; the first time there is nothing yet to tell from where that is.
+    /// Relinearizes the rows at the Anderson-mixed iterate instead of the last result. The first call only stores the
+    /// result.
     fn mix(
         &mut self,
         knows: bool,
@@ -123,7 +123,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         if mixing.mix(&mut interface.increment) {
             let mut followed = self.follow(new, vectors, contact);
             if followed.is_err() {
-                // What is lost there is not lost at the result.
+                // A contact that is lost there is not lost at the result.
                 let ContactWork { rows, interface, .. } = contact;
                 rows.curved.mixing.iter_mut().for_each(|mixing| mixing.give_up(&mut interface.increment));
                 followed = self.follow(new, vectors, contact);
@@ -138,8 +138,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
         Ok(())
     }
 
-    /// Evaluates y of every row at d without contact, with the rows as they are, after the forces of compliant laws
-    /// that do not depend on d are applied.
+    /// Evaluates y of every row at d without contact, with the present rows, after the forces of compliant laws that
+    /// do not depend on d are applied.
     pub(crate) fn observe(
         &mut self,
         operator: &mut Operator<T>,
