@@ -1,7 +1,7 @@
-//! What is watched while a run goes on.
+//! Monitors of a run: stability and energy.
 //!
-//! - `stability`: the step size up to which a run is stable; `stiffening`: steps that have become too long.
-//! - `energy`: the energy of a state and the energy balance of a run; `impacts`: what impacts take of it.
+//! - `stability`: the largest stable step of a run; `stiffening`: steps that have become too long.
+//! - `energy`: the energy of a state and the energy balance of a run; `impacts`: the energy lost in impacts.
 
 pub(super) mod energy;
 pub(super) mod impacts;

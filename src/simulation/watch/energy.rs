@@ -14,8 +14,8 @@ use crate::state::{ContactState, State};
 use crate::system::System;
 use std::ops::Range;
 
-/// Accumulates [`Works`]; costs one load, one product with C, the gaps and their rates at the start and, with supports,
-/// one evaluation of f a step.
+/// Accumulates [`Works`]. Each step costs one load, one product with C, the gaps and their rates at the start and,
+/// with supports, one evaluation of f.
 #[derive(Debug)]
 pub(crate) struct Ledger<T: Real> {
     together: Together<T>,
@@ -26,23 +26,23 @@ pub(crate) struct Ledger<T: Real> {
     old_u: Vec<T>,
     residual: Vec<T>,
     power: T,
-    /// Whether there are supports, on any rank: their forces are read from the balance.
+    /// Whether there are supports, on any rank: their forces are computed from the balance.
     is_supported: bool,
     reactions: Vec<T>,
     next_reactions: Vec<T>,
     /// Gᵀ λ at the start and at the end of a step, one entry a dof.
     contact: Vec<T>,
     next_contact: Vec<T>,
-    /// The same of friction; empty as long as there is none.
+    /// The same for friction; empty as long as there is none.
     friction: Vec<T>,
     next_friction: Vec<T>,
     impacts: Impacts<T>,
     /// Reported forces along the rows where they act.
     forces: Vec<T>,
-    /// The same of springs with dashpots; empty as long as there are none.
+    /// The same for springs with dashpots; empty as long as there are none.
     damped: Vec<T>,
     next_damped: Vec<T>,
-    /// What these springs have stored at the start of a step.
+    /// The energy stored in these springs at the start of a step.
     stored: T,
     /// Works, damping power and stored energy at the end of a step that is not accepted yet.
     next: (Works<T>, T, T),
@@ -51,16 +51,16 @@ pub(crate) struct Ledger<T: Real> {
 /// The constraints and their rows of G.
 pub(crate) type Rows<'r, 'a, T> = (&'r Constraints<'a, T>, &'r ContactJacobian<T>);
 
-/// What the ledger reads of a step.
+/// The data of a step that the ledger reads.
 pub(crate) struct StepBooks<'a, T> {
     pub(crate) t: f64,
     /// u, v and a at the time of the state.
     pub(crate) motion: [&'a [T]; 3],
     pub(crate) contacts: &'a ContactState<T>,
-    /// The rows of the gaps, and those along which the reported forces act.
+    /// The rows of the gaps, and the rows along which the reported forces act.
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) forces: &'a ContactJacobian<T>,
-    /// The fraction of the step at which those forces live.
+    /// The fraction of the step at which those forces act.
     pub(crate) load: f64,
     /// The closed contacts with mass that leave jumps, which contacts were closed at the start of the step, and whether
     /// correctors remove the jumps.
@@ -111,14 +111,15 @@ impl<T: Real> Ledger<T> {
         Ok(ledger)
     }
 
-    /// Evaluates forces and powers of a state at which a run begins, or begins again after a discontinuity.
+    /// Evaluates forces and powers of a state at which a run begins, or continues after a discontinuity.
     pub(crate) fn restart(
         &mut self,
         system: &mut dyn System<T>,
         state: &State<T>,
         rows: Rows<'_, '_, T>,
     ) -> Result<()> {
-        // (Without supports a state is not evaluated in a step, nor is it here: a run goes on from what it has left.)
+        // Without supports a state is evaluated neither in a step nor here: a run continues with the data of its last
+        // step.
         let reactions = if self.is_supported { reactions(system, state, rows)? } else { Vec::new() };
         let power = self.damping_power(system, state.displacement(), state.velocity())?;
         system.external_load(state.time(), &mut self.old_load)?;
@@ -159,7 +160,7 @@ impl<T: Real> Ledger<T> {
         Ok(-self.together.dot(&self.residual, v)?)
     }
 
-    /// Remembers the displacements and the contacts that the step starts from; `forces` are those of the rows.
+    /// Stores the displacements and the contacts at the start of a step; `forces` are the forces of the rows.
     pub(crate) fn begin(
         &mut self,
         rows: (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -183,7 +184,7 @@ impl<T: Real> Ledger<T> {
         let half = T::of(0.5);
         let [u, v, _] = books.motion;
         let mut works = self.works;
-        // (On ranks: what this one has of each sum.)
+        // On ranks, each sum holds the part of this rank.
         let mut by_supports = T::zero();
         for ((&reaction, next), &dof) in self.reactions.iter().zip(&mut self.next_reactions).zip(system.prescribed()) {
             *next = self.residual[dof];
@@ -222,7 +223,7 @@ impl<T: Real> Ledger<T> {
             };
             books.forces.scatter(row, force, forces);
         }
-        // The force in the middle of the step, by the line through the forces of two steps.
+        // The force in the middle of the step, interpolated linearly between the forces of two steps.
         let newest = T::of(1.5 - books.load);
         let work = |old: &[T], new: &[T]| match new.is_empty() {
             true => T::zero(),
@@ -236,7 +237,7 @@ impl<T: Real> Ledger<T> {
         works.supports += by_supports;
         works.load += by_loads;
         let hidden = self.impacts.works(constraints, books, &self.forces, (&self.old_u, newest))?;
-        // What springs do not store, or give back, is the dashpots'.
+        // The work of springs that is not stored elastically belongs to the dashpots.
         let kept = stored - self.stored;
         works.contact += by_contact + hidden.contact - kept;
         works.friction += by_friction + hidden.friction;
@@ -248,7 +249,7 @@ impl<T: Real> Ledger<T> {
         works.check(books.t)
     }
 
-    /// Takes over what [`prepare`](Self::prepare) computed, for the step is accepted.
+    /// Stores the results of [`prepare`](Self::prepare) for an accepted step.
     pub(crate) fn end(&mut self) {
         (self.works, self.power, self.stored) = self.next;
         std::mem::swap(&mut self.load, &mut self.old_load);
@@ -265,8 +266,8 @@ impl<T: Real> Ledger<T> {
     }
 }
 
-/// Energy of a state, with the balance of a ledger.
-/// On ranks all call it; where they cannot be reached the energy is not finite.
+/// Energy of a state, with the balance of a ledger. All ranks must call it; if they cannot be reached the energy is
+/// not finite.
 pub(crate) fn energy<T: Real>(
     system: &mut dyn System<T>,
     together: &Together<T>,

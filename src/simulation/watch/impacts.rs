@@ -1,9 +1,9 @@
-//! What impacts take of the kinetic energy, for the energy balance.
+//! The kinetic energy lost in impacts, for the energy balance.
 //!
 //! Impulses J along closed rows that change their gap rates from r to r' do the work ½ Jᵀ (r + r'), with
-//! J = S⁻¹ (r' − r), S = G M⁻¹ Gᵀ (Kelvin and Tait's theorem). Neither the scheme nor its step enters, nor the instant of
-//! the impact within the step; an impact that a scheme spreads over several steps adds up to the same. The way of a gap
-//! that closes under the force of the scheme is then no work of contact.
+//! J = S⁻¹ (r' − r), S = G M⁻¹ Gᵀ (Kelvin and Tait's theorem). It depends neither on the scheme and its step, nor on
+//! the instant of the impact within the step. The works of an impact that a scheme spreads over several steps add up
+//! to the same. The displacement of a gap that closes under the force of the scheme is then no work of contact.
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::no_response;
@@ -14,13 +14,13 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::watch::energy::StepBooks;
 use crate::state::State;
 
-/// Contacts at the start of a step, and memory for what happens to them in it.
+/// Contacts at the start of a step, and memory for their changes in it.
 #[derive(Debug)]
 pub(crate) struct Impacts<T: Real> {
     projection: JumpProjection<T>,
     /// Version of the rows for which the projection was made.
     version: u64,
-    /// Gaps, gap rates followed by the bodies' own rates along tangents, and forces along all rows.
+    /// Gaps; gap rates, followed by the tangential rates of the bodies; and forces along all rows.
     gaps: Vec<T>,
     rates: Vec<T>,
     forces: Vec<T>,
@@ -30,7 +30,7 @@ pub(crate) struct Impacts<T: Real> {
     sums: Vec<T>,
 }
 
-/// Works of a step that the reported forces do not show.
+/// Works of a step that the reported forces do not contain.
 #[derive(Clone, Copy)]
 pub(crate) struct Hidden<T> {
     pub(crate) impacts: T,
@@ -45,7 +45,7 @@ impl<T: Real> Impacts<T> {
         Self { projection, version: 0, gaps, rates, forces, own: Vec::with_capacity(rows), changes, sums }
     }
 
-    /// Reads the contacts of the state that a step starts from; `forces` are those of its rows.
+    /// Evaluates the contacts of the state that a step starts from; `forces` are the forces of its rows.
     pub(crate) fn begin(
         &mut self,
         (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -66,8 +66,8 @@ impl<T: Real> Impacts<T> {
         Ok(())
     }
 
-    /// The works of a step that started from displacements `from`, over which forces are old + `newest` (new − old);
-    /// `lambda` are those at its end, along the rows where they act.
+    /// The works of a step that started from displacements `from`, over which forces are old + `newest` (new − old).
+    /// `lambda` are the forces at its end, along the rows where they act.
     pub(crate) fn works(
         &mut self,
         constraints: &mut Constraints<'_, T>,

@@ -1,4 +1,4 @@
-//! The step up to which a run is stable: the critical Ω of its scheme over the highest frequency of its system.
+//! The largest stable step of a run: the critical Ω of its scheme over the highest frequency of its system.
 
 use crate::analysis::{self, ZeroStability};
 use crate::error::{Error, Result};
@@ -14,32 +14,32 @@ use crate::tableau::Tableau;
 use faer::sparse::SparseColMatRef;
 use faer::{Mat, Side};
 
-/// What is known of the stability of a run.
+/// The result of the stability check of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum StepLimit {
-    /// Nothing: the caller has switched the check off.
+    /// The caller has switched the check off.
     Unchecked,
     /// Steps up to this one have been found stable.
     Cleared(f64),
 }
 
-/// The most steps of Lanczos' iteration, with one product with K each. They are taken only if Gershgorin's circles do
-/// not admit the step size.
+/// Maximum number of Lanczos iterations, with one product with K each. They run only if Gershgorin's circles do not
+/// admit the step size.
 const ITERATIONS: usize = 40;
 
-/// The estimate is evaluated after these numbers of them.
+/// The estimate is evaluated after these numbers of iterations.
 const LOOKS: [usize; 8] = [3, 6, 9, 13, 18, 24, 31, ITERATIONS];
 
 /// Relative accuracy of the square of the highest frequency, when an error names the largest stable step.
 const ACCURACY: f64 = 2e-3;
 
-/// An estimate counts as below a limit if it is below by this many of its residuals.
+/// An estimate counts as below a limit if it is below by this multiple of its residual.
 const RESERVE: f64 = 4.0;
 
-/// Relative accuracy of the critical Ω: roots are double there, and found to the square root of rounding only.
+/// Relative accuracy of the critical Ω: roots are double there, and accurate to the square root of rounding only.
 const SLIVER: f64 = 1e-7;
 
-/// Refuses tableaux whose results have nothing to do with the equation of motion, however small the step.
+/// Refuses tableaux that do not converge to the equation of motion as the step decreases.
 pub(crate) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
     let order = scheme.derived.order;
     let order = order.displacement.min(order.velocity);
@@ -55,23 +55,23 @@ pub(crate) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
     }
 }
 
-/// Ω up to which a scheme is stable without damping; none if it is whatever the frequency.
+/// Ω up to which a scheme is stable without damping; none if it is stable at every frequency.
 pub(crate) fn critical(scheme: &Scheme<'_>) -> Option<f64> {
-    // (Explicit schemes have no radius there.)
+    // Explicit schemes have no radius at infinite frequency.
     if scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + 1e-6) {
         return None;
     }
     scheme.derived.critical(&scheme.tableau)
 }
 
-/// Steps beyond the limit by this factor are not told from the limit.
+/// The factor by which steps may exceed the limit, within its accuracy.
 pub(crate) fn allowance<T: Real>() -> f64 {
     1.0 + SLIVER.max(64.0 * T::epsilon().value())
 }
 
-/// Bounds of the square of the highest frequency of a system whose force is that of another part as well, whose
-/// product with a vector `add` adds; known well enough to compare it with `enough`. The first is one from below, the
-/// second is the estimate with its residual. None if there is no K, or one that is not symmetric.
+/// Bounds of the square of the highest frequency of a system with an additional force, whose product with a vector
+/// `add` adds. They are accurate enough for a comparison with `enough`. The first is a lower bound, the second the
+/// estimate plus its residual. None if there is no K, or K is not symmetric.
 pub(crate) fn highest_square<T: Real>(
     system: &mut dyn System<T>,
     motion: &Motion<T>,
@@ -91,11 +91,12 @@ pub(crate) fn highest_square<T: Real>(
     Ok(Some([highest.at_least, highest.at_most]))
 }
 
-/// Refuses a step beyond the limit of the scheme, as far as that is known; says up to which step it is.
+/// Refuses a step beyond the limit of the scheme, as far as the limit is known. Returns the step up to which it is
+/// known.
 ///
 /// Gershgorin's circles bound the highest frequency from above: a step that this bound admits is stable. Otherwise
-/// Lanczos' iteration on M⁻¹ K decides: Ritz values are never above the highest frequency, so a step that they refuse
-/// is unstable. One that they admit may exceed the limit by the error of the iteration (a fraction of a percent on
+/// Lanczos' iteration on M⁻¹ K decides: Ritz values never exceed the highest frequency, so a step that they refuse is
+/// unstable. A step that they admit may exceed the limit by the error of the iteration (a fraction of a percent on
 /// meshes). For nonlinear systems the tangent at `motion` counts.
 pub(crate) fn check_step<T: Real>(
     (system, together): (&mut dyn System<T>, &Together<T>),
@@ -135,7 +136,7 @@ pub(crate) fn check_step<T: Real>(
             even = Some(std::mem::replace(&mut lanczos.start, circles.rows));
         }
         if !stiffness.is_symmetric() {
-            // Ritz values are no bounds then.
+            // Ritz values are no bounds for unsymmetric matrices.
             return Ok(StepLimit::Cleared(h));
         }
         let enough = if lags { 0.0 } else { (critical * allowance / h).powi(2) };
@@ -143,8 +144,8 @@ pub(crate) fn check_step<T: Real>(
     };
     let mut strongest = 0.0;
     if lags {
-        // The highest mode is taken to have the strongest damping of all modes: exact for Rayleigh damping, on the safe
-        // side otherwise. (Damping may act where no stiffness does.)
+        // The highest mode is assumed to have the strongest damping of all modes: exact for Rayleigh damping, on the
+        // safe side otherwise. Damping may act where no stiffness does.
         lanczos.start = even.unwrap_or(lanczos.start);
         let still = vec![T::zero(); system.dofs()];
         let damping = lanczos.highest(system, 0.0, |system, x, y| match system.damping_force() {
@@ -170,8 +171,8 @@ pub(crate) fn check_step<T: Real>(
     Ok(StepLimit::Cleared(h.max(longest(highest.at_most))))
 }
 
-/// The highest frequency of bodies over ranks: what the host knows, or the bound by Gershgorin's circles, of which each
-/// rank has those of its own dofs. Lanczos' iteration would take products with rows of all ranks.
+/// The highest frequency of bodies over ranks: as given by the host, or the bound by Gershgorin's circles, which each
+/// rank computes for its own dofs. Lanczos' iteration would need products with rows of all ranks.
 fn frequency_over_ranks<T: Real>(
     system: &mut dyn System<T>,
     together: &Together<T>,
@@ -199,7 +200,7 @@ fn frequency_over_ranks<T: Real>(
     }
 }
 
-/// Whether the system is damped, and the scheme takes damping forces from before the stage.
+/// Whether the system is damped and the balance of a stage reads velocities without its unknown.
 fn lags<T: Real>(tableau: &Tableau, system: &mut dyn System<T>) -> bool {
     tableau.stages.iter().any(|stage| stage.balance.v.z == 0.0) && system.damping_force().is_some()
 }
@@ -212,7 +213,7 @@ struct Highest {
     at_most: f64,
 }
 
-/// What K does to a vector.
+/// The product of K with a vector.
 enum Stiffness<'s, T: Real> {
     /// The values of the system's pattern.
     Matrix { values: Vec<T>, product: Product<T> },
@@ -228,8 +229,8 @@ struct Circles<T> {
 }
 
 impl<'s, T: Real> Stiffness<'s, T> {
-    /// The tangent, if the system has one, otherwise its force. None for nonlinear forces at zero displacements, which
-    /// give no length for a difference.
+    /// The tangent, if the system has one, otherwise its force. None for nonlinear forces at zero displacements,
+    /// which define no length for a difference.
     fn of(system: &mut dyn System<T>, at: &'s Motion<T>) -> Result<Option<Self>> {
         let dofs = system.dofs();
         let entries = system.pattern().row_idx().len();
@@ -301,9 +302,9 @@ impl<'s, T: Real> Stiffness<'s, T> {
     }
 }
 
-/// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980, chapter 13),
-/// without orthogonalization against older vectors: this yields eigenvalues several times, which does no harm at the
-/// end of the spectrum.
+/// Lanczos' iteration on M⁻¹ K in the inner product of M (Parlett, The Symmetric Eigenvalue Problem, 1980,
+/// chapter 13), without orthogonalization against older vectors: this yields eigenvalues several times, which is
+/// harmless at the end of the spectrum.
 struct Lanczos<T: Real> {
     inverse: InverseMass<T>,
     /// Sizes of the entries of the first vector; their signs are scattered.
@@ -315,7 +316,8 @@ impl<T: Real> Lanczos<T> {
     fn new(system: &dyn System<T>) -> Result<Self> {
         let (mass, dofs) = (system.mass(), system.dofs());
         let inverse = InverseMass::new(mass, system.prescribed(), &[])?;
-        // (As much of each dof in the inner product of M: of light ones, which are the fastest, as of others.)
+        // Each dof contributes equally in the inner product of M, so that light dofs, which are the fastest, are
+        // included.
         let start = match (&inverse, mass) {
             (InverseMass::Lumped(inverse), _) => inverse.iter().map(|inverse| inverse.sqrt()).collect(),
             (_, Mass::Consistent(mass)) => {
@@ -327,7 +329,7 @@ impl<T: Real> Lanczos<T> {
         Ok(Self { inverse, start, vectors: std::array::from_fn(|_| vec![T::zero(); dofs]) })
     }
 
-    /// The highest eigenvalue, known well enough to compare it with `limit`, and to [`ACCURACY`] if it is above.
+    /// The highest eigenvalue, accurate enough to compare it with `limit`, and to [`ACCURACY`] if it is above.
     fn highest(
         &mut self,
         system: &mut dyn System<T>,
@@ -336,7 +338,7 @@ impl<T: Real> Lanczos<T> {
     ) -> Result<Highest> {
         let Self { inverse, start, vectors: [q, old, image, next] } = self;
         let dot = |x: &[T], y: &[T]| x.iter().zip(y).map(|(&x, &y)| x * y).sum::<T>();
-        // q: the vector; old: M times the one before; image: K q, then M times the next; next: M⁻¹ of that.
+        // q: the vector; old: M times the one before; image: K q, then M times the next; next: M⁻¹ times `image`.
         next.copy_from_slice(start);
         for (dof, x) in next.iter_mut().enumerate() {
             *x *= T::of(sparse::scattered_signed(dof));
@@ -361,7 +363,7 @@ impl<T: Real> Lanczos<T> {
             }
             for i in 0..q.len() {
                 q[i] = next[i] / beta;
-                // `old` becomes M q, which the next iteration subtracts; `next` takes the one before.
+                // `old` becomes M q, which the next iteration subtracts; `next` takes the previous `old`.
                 next[i] = old[i];
                 old[i] = image[i] / beta;
             }
@@ -379,7 +381,7 @@ impl<T: Real> Lanczos<T> {
                 found = ritz(&diagonal, &beside, beta);
                 let miss = found.at_most - found.at_least;
                 let known = found.at_least > limit && miss <= ACCURACY * found.at_least;
-                // (With some reserve, as a higher eigenvalue may not have been found yet.)
+                // With some reserve, as a higher eigenvalue may not have been found yet.
                 if known || found.at_least + RESERVE * miss <= limit {
                     return Ok(found);
                 }
@@ -393,8 +395,8 @@ impl<T: Real> Lanczos<T> {
     }
 }
 
-/// The highest eigenvalue of a tridiagonal matrix, and that with the residual of its vector, if `beta` follows beside
-/// it.
+/// The highest eigenvalue of a tridiagonal matrix, and its sum with the residual of its vector if `beta` is the next
+/// off-diagonal entry.
 fn ritz(diagonal: &[f64], beside: &[f64], beta: f64) -> Highest {
     let n = diagonal.len();
     let matrix = Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {

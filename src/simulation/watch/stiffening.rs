@@ -1,4 +1,4 @@
-//! Steps that have become too long as the run went: compliant contacts that close, and systems that stiffen.
+//! Detects steps that have become too long in a run: compliant contacts that close, and systems that stiffen.
 
 use crate::analysis;
 use crate::contact::ContactJacobian;
@@ -15,63 +15,62 @@ use crate::simulation::watch::stability::{self, StepLimit};
 use crate::state::{Clock, Motion};
 use crate::system::{Linearity, System};
 
-/// Hosts that know their highest frequency are asked again after so many steps.
+/// Hosts that give their highest frequency are asked again after this number of steps.
 const EVERY: u64 = 64;
 
-/// Accelerations that turn their sign and grow by this in a step are looked at: with a frequency 5e-5 above the limit
-/// they grow by more.
+/// Accelerations that reverse their sign and grow by this factor in a step are checked: at a frequency 5e-5 above the
+/// limit they grow by more.
 const GROWTH: f64 = 1.02;
 
-/// Accelerations that grow by this in a step are looked at whatever their sign.
+/// Accelerations that grow by this factor in a step are checked whatever their sign.
 const LEAP: f64 = 4.0;
 
-/// Looks at every step of a scheme that is stable up to some frequency, whether the system and the contacts that press
-/// are still below it. A step is refused only beside a motion whose Rayleigh quotient, a lower bound of the square of
-/// the highest frequency, is above it.
+/// Checks in every step of a conditionally stable scheme whether the system and the active contacts are still below
+/// its limit. A step is refused only if a motion has a Rayleigh quotient, a lower bound of the square of the highest
+/// frequency, above the limit.
 ///
 /// * Springs of contact: the quotient of M⁻¹ Gᵀ of each, k G M⁻¹ Gᵀ, in every step. Where the bounds of mesh and
-///   contact together do not admit the step, Lanczos' iteration with those that press, when one closes.
-/// * Systems that stiffen: the quotient of ½ h² a between u and u + ½ h² a, where accelerations have grown and turned
-///   their sign, as those of motions beyond the limit do in every step, or have become several times as large. (Of such
-///   a motion u + ½ h² a is the next state, so that for a nonlinear force it is the mean stiffness over the step that
-///   counts: a spring of the third power grows without bound exactly beyond it.) Body by body, as far as the pattern of
-///   the tangent tells them apart: beside one that falls, or that a large force moves, a light one would not be seen.
-///   Of one body among several growth is looked at where what the step has changed, Δaᵀ M Δa over Δaᵀ M Δu, is nearly
-///   as stiff as the limit, and no contact of the body has closed or opened: what swings through its rest, or is hit,
-///   costs nothing.
+///   contact together do not admit the step, Lanczos' iteration with the active springs, when one closes.
+/// * Systems that stiffen: the quotient of ½ h² a between u and u + ½ h² a, where accelerations have grown and
+///   reversed their sign, as in every step of motions beyond the limit, or have grown several times. For such a
+///   motion u + ½ h² a is the next state, so that the mean stiffness of a nonlinear force over the step counts: a
+///   cubic spring grows without bound exactly beyond it. Bodies that the pattern of the tangent separates are checked
+///   one by one: otherwise a light body would be hidden by a falling or strongly loaded one. One body among several
+///   is checked only if Δaᵀ M Δa over Δaᵀ M Δu, the stiffness of the change in the step, is nearly the limit, and no
+///   contact of the body has closed or opened: oscillations through equilibrium and impacts cost nothing.
 ///
-/// Nothing is remembered from step to step but which springs have been found admissible.
+/// Only the list of admissible springs is kept from step to step.
 #[derive(Debug)]
 pub(crate) struct Stiffening<T> {
     /// Ω up to which the scheme is stable without damping.
     critical: f64,
-    /// The stiffness for which a dashpot counts, times h/c: Ω² over the c h/m up to which the scheme is stable with
-    /// forces of the rate before. Found when one presses.
+    /// The equivalent stiffness of a dashpot, times h/c: Ω² over the c h/m up to which the scheme is stable with
+    /// forces of the rate before. Computed when a dashpot first carries a force.
     lag: Option<f64>,
     may_stiffen: bool,
-    /// Rows that press by springs without coupling in the step, and their stiffness.
+    /// Rows with active springs that are not coupled in the step, and their stiffness.
     springs: Vec<(usize, f64)>,
-    /// The body of each dof; none where there is one only.
+    /// The body of each dof; empty if there is only one.
     body: Vec<usize>,
     bodies: Vec<Body<T>>,
     /// One entry a dof, zero between steps.
     sums: Vec<T>,
     way: Vec<T>,
     force: [Vec<T>; 2],
-    /// Springs that were found admissible together, with a step size.
+    /// Springs that were found admissible together, and the step size.
     cleared: (Vec<(ContactId, f64)>, f64),
 }
 
-/// What is summed of a body, in the norm of a lumped mass.
+/// Sums over a body, in the norm of a lumped mass.
 #[derive(Clone, Copy, Debug)]
 struct Body<T> {
     /// Squares of the accelerations at the start of the step and at its end, and their product.
     accelerations: [T; 3],
-    /// Square of the change of the accelerations, and its product with that of the displacements.
+    /// Square of the change of the accelerations, and the product of the changes of accelerations and displacements.
     changes: [T; 2],
-    /// Whether its quotient is asked for.
+    /// Whether its quotient is needed.
     is_asked: bool,
-    /// The largest way and the largest displacement.
+    /// The largest entries of ½ h² a and of the displacements.
     far: T,
     near: T,
     /// Numerator and denominator of the quotient.
@@ -86,17 +85,18 @@ impl<T: Real> Body<T> {
         Self { accelerations, changes, is_asked: false, far: zero, near: zero, stiffness: zero, mass: zero }
     }
 
-    /// Whether accelerations have turned their sign and grown, or leapt.
+    /// Whether accelerations have reversed their sign and grown, or grown by [`LEAP`].
     fn grows(&self) -> bool {
         let [before, now, both] = self.accelerations;
         let turns = both < T::zero() && T::of(4.0) * both * both > before * now;
         turns && now > T::of(GROWTH * GROWTH) * before || now > T::of(LEAP * LEAP) * before
     }
 
-    /// Whether what has changed in the step may be as stiff as `most`, the square of a frequency.
+    /// Whether the change in the step may be as stiff as `most`, the square of a frequency.
     fn may_be_stiff(&self, most: f64) -> bool {
-        /// Share of the limit from which on it is looked at. (Where u grows by far more than twice in a step, and a
-        /// scheme gives accelerations of the step before, it is the square of the frequency over that growth: 1/h².)
+        /// Share of the limit above which a body is checked. If u grows by far more than a factor of two in a step,
+        /// and a scheme reports accelerations of the step before, the quotient is the square of the frequency over
+        /// that growth: 1/h².
         const SHARE: f64 = 0.1;
         self.changes[0] > T::of(SHARE * most) * self.changes[1].abs()
     }
@@ -126,7 +126,7 @@ fn lag(scheme: &Scheme<'_>, critical: f64) -> f64 {
 }
 
 impl<T: Real> Stiffening<T> {
-    /// None for schemes that are stable whatever the frequency, and for systems that stay as they are.
+    /// None for unconditionally stable schemes, and for linear systems without contact.
     pub(crate) fn of(system: &dyn System<T>, scheme: &Scheme<'_>, may_press: bool) -> Option<Self> {
         let may_stiffen = system.linearity() == Linearity::Nonlinear;
         if !may_stiffen && !may_press {
@@ -163,7 +163,7 @@ impl<T: Real> Stiffening<T> {
             return Err(self.refusal(&mut step, stiffest.1, Some(stiffest.0)));
         }
         if !self.may_stiffen {
-            // (By Weyl's inequality.)
+            // By Weyl's inequality.
             if bound.1 + (self.critical / cleared).powi(2) <= most {
                 return Ok(());
             }
@@ -188,7 +188,7 @@ impl<T: Real> Stiffening<T> {
         self.body.get(dof).copied().unwrap_or(0)
     }
 
-    /// Finds the bodies whose accelerations have grown; says whether there are any.
+    /// Finds the bodies whose accelerations have grown. Returns whether there are any.
     fn grows(&mut self, step: &Taken<'_, '_, T>, most: f64) -> bool {
         let mass = match step.system.mass() {
             Mass::Lumped(mass) => mass,
@@ -237,9 +237,9 @@ impl<T: Real> Stiffening<T> {
             return;
         }
         for (row, law) in step.constraints.laws().iter().enumerate() {
-            // (A contact that has opened before the end of the step has pressed in one of its stages.)
+            // A contact that opened before the end of the step has carried a force in one of its stages.
             let force = trial.lambda_raw[row].max(trial.impulse[row] / T::of(step.clock.h));
-            // (The unknown may hold the dashpot alone.)
+            // The unknown may contain the force of the dashpot only.
             let holds = rows.weight[row] != T::zero();
             let coupled = holds && !law.is_damped() || rows.on_massless.get(row).is_some_and(|on| *on);
             if law.is_spring() && !coupled && force > T::zero() {
@@ -252,8 +252,8 @@ impl<T: Real> Stiffening<T> {
         }
     }
 
-    /// The row with the highest frequency of its own, with the square of that, and a bound of the square of the
-    /// frequency that all have together; no bounds for a consistent mass.
+    /// The row with the highest frequency of its own, with the square of that frequency, and a bound of the square of
+    /// the highest frequency of all rows together. No bounds for a consistent mass.
     fn bounds(&mut self, system: &dyn System<T>, forces: &ContactJacobian<T>) -> [(usize, f64); 2] {
         let Mass::Lumped(mass) = system.mass() else { return [(0, 0.0), (0, f64::INFINITY)] };
         let prescribed = system.prescribed();
@@ -279,7 +279,7 @@ impl<T: Real> Stiffening<T> {
         [stiffest, (0, bound)]
     }
 
-    /// Looks for the highest frequency with the springs that press, unless it is known to be admissible.
+    /// Checks the highest frequency with the active springs, unless it is known to be admissible.
     fn iterate(&mut self, step: &mut Taken<'_, '_, T>, most: f64) -> Result<()> {
         let ids = &step.constraints.ids;
         let h = step.clock.h;
@@ -288,7 +288,7 @@ impl<T: Real> Stiffening<T> {
         if h <= *known_h && self.springs.iter().all(is_known) {
             return Ok(());
         }
-        // With a reserve for laws that stiffen as they are pressed, if there is room for it.
+        // With a reserve for laws that stiffen under load, if the limit admits it.
         let reserved = |&(row, k): &(usize, f64)| {
             let reserve = if step.constraints.law(row).is_nonlinear() { 1.25 } else { 1.0 };
             (row, reserve * k)
@@ -307,8 +307,8 @@ impl<T: Real> Stiffening<T> {
         Ok(())
     }
 
-    /// The largest Rayleigh quotient of ½ h² a of the bodies that are asked, of those in which it is large enough
-    /// beside u to have digits.
+    /// The largest Rayleigh quotient of ½ h² a of the bodies to check, if ½ h² a is large enough beside u to have
+    /// digits.
     fn quotient(&mut self, step: &mut Taken<'_, '_, T>, beyond: f64) -> Option<f64> {
         let Taken { system, new, clock, .. } = step;
         let half = T::of(0.5 * clock.h * clock.h);
@@ -332,7 +332,8 @@ impl<T: Real> Stiffening<T> {
         self.keep_ways();
         self.means(step)?;
         if self.bodies.iter().any(|body| body.is_asked && !body.square().is_finite()) {
-            // (The forces there, or what work they do, are beyond all numbers: as far as displacements are, then.)
+            // If the forces there or their work overflow, ½ h² a is scaled down to the magnitude of the
+            // displacements.
             for dof in 0..self.way.len() {
                 let Body { far, near, .. } = self.bodies[self.body_of(dof)];
                 if far > near {
@@ -347,14 +348,14 @@ impl<T: Real> Stiffening<T> {
         if asked == 1 || square <= beyond {
             return Some(square);
         }
-        // (Alone: what bodies did to each other, of which the pattern does not tell, would be no quotient.)
+        // Evaluated alone: forces between bodies, which the pattern does not contain, would falsify the quotient.
         self.bodies.iter_mut().enumerate().for_each(|(k, body)| body.is_asked = k == largest);
         self.keep_ways();
         self.means(step)?;
         Some(self.bodies[largest].square()).filter(|square| square.is_finite())
     }
 
-    /// Ways of bodies that are not asked are zero.
+    /// Sets ½ h² a to zero in bodies that are not checked.
     fn keep_ways(&mut self) {
         for dof in 0..self.way.len() {
             if !self.bodies[self.body_of(dof)].is_asked {
@@ -363,13 +364,15 @@ impl<T: Real> Stiffening<T> {
         }
     }
 
-    /// Finds the quotients of the ways of bodies, NaN where there is none; nothing if the host refuses them.
+    /// Computes the quotients of the bodies, NaN where there is none. Returns nothing if the host refuses the
+    /// displacements.
     fn means(&mut self, step: &mut Taken<'_, '_, T>) -> Option<()> {
         let Taken { system, new, .. } = step;
         let [there, here] = &mut self.force;
         self.sums.copy_from_slice(&new.u);
         T::axpy(T::one(), &self.way, &mut self.sums);
-        // (What the host refuses there is none of this step. The state of the step comes last: it is what hosts keep.)
+        // A refusal there is no error of this step. The state of the step comes last, as hosts keep their last
+        // evaluation.
         let known = system.force(new.t, &self.sums, &new.v, there);
         let known = known.and(system.force(new.t, &new.u, &new.v, here));
         self.sums.fill(T::zero());
@@ -389,7 +392,7 @@ impl<T: Real> Stiffening<T> {
         for &(row, k) in &self.springs {
             for (dof, _) in forces.row(row) {
                 let of = self.body_of(dof);
-                // (Of each body once: that of its first dof in the row.)
+                // Once per body: at its first dof in the row.
                 let own = || forces.row(row).filter(|&(dof, _)| self.body_of(dof) == of);
                 if own().next().is_some_and(|(first, _)| first == dof) {
                     let product: T = own().map(|(dof, weight)| weight * self.way[dof]).sum();
@@ -401,7 +404,7 @@ impl<T: Real> Stiffening<T> {
     }
 
     fn refusal(&self, step: &mut Taken<'_, '_, T>, square: f64, row: Option<usize>) -> Error {
-        // (The largest stable step by the best that is known of the system, not by the motion that shows it is beyond.)
+        // The largest stable step by the best estimate for the system, not by the motion that exceeds the limit.
         let known = highest(step, &self.springs, 0.0).ok().flatten();
         let highest = known.map_or(square, |[_, at_most]| at_most.max(square));
         Error::Stiffened {
@@ -425,8 +428,8 @@ fn highest<T: Real>(step: &mut Taken<'_, '_, T>, springs: &[(usize, f64)], enoug
     })
 }
 
-/// The body of each dof, and how many there are. A pattern without entries says nothing, and a mass that couples what
-/// the pattern does not makes them one.
+/// The body of each dof, and the number of bodies. There is one body if the pattern has no entries, or if the mass
+/// couples bodies of the pattern.
 fn bodies<T: Real>(system: &dyn System<T>) -> (Vec<usize>, usize) {
     let pattern = system.pattern();
     if pattern.row_idx().is_empty() {
