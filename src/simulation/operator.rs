@@ -30,9 +30,9 @@ const VALUES: &str = "the values of the effective matrix";
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
-/// Contact works on the interface, the free dofs that it may ever act on: A⁻¹ Gᵀ is formed there alone. A solve has two
-/// halves: [`begin`](Self::begin) gives the solution on the interface, [`finish`](Self::finish) takes the values there
-/// after contact.
+/// Contact works on the interface, the free dofs that it may ever act on: only there A⁻¹ Gᵀ is computed. A solve has
+/// two halves: [`begin`](Self::begin) computes the solution on the interface, [`finish`](Self::finish) completes it
+/// with the values there after contact.
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
     /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
@@ -42,13 +42,13 @@ pub(crate) struct Operator<T> {
     combination: Combination,
     /// Values of the system's tangent and of the effective matrix, kept where the tangent changes.
     part: Vec<T>,
-    /// The part of the tangent that is taken at the end of a path.
+    /// The part of the tangent that is evaluated at the end of a path.
     end: Vec<T>,
     values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
     responses: Responses<T>,
-    /// Of a diagonal matrix the responses of the interface to unit forces, its reciprocals there; empty until needed.
+    /// For a diagonal matrix its reciprocals, the responses of the interface to unit forces; empty until needed.
     reciprocals: Vec<T>,
     /// The response of a diagonal matrix to a row.
     spread: SpreadRow<T>,
@@ -57,15 +57,15 @@ pub(crate) struct Operator<T> {
     delassus: Delassus<T>,
     groups: Groups,
     contact: ContactPath,
-    /// Whether its rows are all here, not spread over ranks.
+    /// Whether this rank has all rows of the matrix.
     whole: bool,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
 }
 
 impl<T: Real> Operator<T> {
-    /// Assembles and factorizes; contact may act on the `interface`. While the matrix stays responses are kept for each
-    /// `unit`.
+    /// Assembles and factorizes; contact may act on the `interface`. For a constant matrix responses are kept for
+    /// each `unit`.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         solver: &dyn LinearSolver<T>,
@@ -110,20 +110,20 @@ impl<T: Real> Operator<T> {
         };
         match operator.factorize(system, h, at) {
             // Another state, or a smaller step, may have a definite matrix, or one that the host admits: iterations
-            // take their tangents where the balance holds, and a run may go on from such a state. If not, the step
+            // evaluate tangents where the balance holds, and a run may continue from such a state. If not, the step
             // fails with this error.
             Err(Error::Singular { .. } | Error::Inadmissible { .. }) if operator.varies() => return Ok(operator),
             other => other?,
         }
         if !operator.full.is_empty() {
-            // The solver allocates memory for that many columns now, not in a step.
+            // The solver allocates memory for this many columns now, not in a step.
             operator.factor.solve(&mut operator.full)?;
         }
         Ok(operator)
     }
 
-    /// A factor of a part of the system that does not depend on the step size: only contact and solves go through it,
-    /// it is not factorized again. Responses are kept for each `unit`.
+    /// A factor of a part of the system that does not depend on the step size: it is used for contact and solves, and
+    /// not factorized again. Responses are kept for each `unit`.
     pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize], unit: Unit) -> Result<Self> {
         Ok(Self {
             weights: [f64::NAN; 3],
@@ -157,8 +157,8 @@ impl<T: Real> Operator<T> {
         self.tangent == Tangent::Present && self.linearity == Linearity::Nonlinear
     }
 
-    /// Factorizes for the step size h with the tangent at a motion; responses are forgotten. Where the matrix varies
-    /// this does not allocate but for the first time.
+    /// Factorizes for the step size h with the tangent at a motion, and forgets responses. Where the matrix varies,
+    /// only the first call allocates.
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
@@ -175,8 +175,8 @@ impl<T: Real> Operator<T> {
                     None => system.tangent(at.t, path.mean, at.v, weights, part)?,
                 },
                 TangentOf::Simpson { end } => {
-                    // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which that of the middle
-                    // term counts half: ⅔ K in the middle and ⅓ K at the end.
+                    // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which the middle term
+                    // counts half: ⅔ K in the middle and ⅓ K at the end.
                     let third = weights.stiffness / T::of(3.0);
                     memory::grow(at_end, part.len(), 1, VALUES)?;
                     let of_end = TangentWeights { stiffness: third, damping: T::zero() };
@@ -195,7 +195,7 @@ impl<T: Real> Operator<T> {
             (Mass::Consistent(mass), Tangent::Present) => combination.fill(&[own, (inertia, mass.val())], None, values),
             (Mass::Consistent(mass), Tangent::Absent) => combination.fill(&[(inertia, mass.val())], None, values),
         }
-        // The factorization takes the most memory of a build: what is not read again is freed before.
+        // The factorization takes the most memory of a build: values that are not read again are freed before.
         if *tangent == Tangent::Absent || *linearity == Linearity::Linear {
             *part = Vec::new();
         }
@@ -214,7 +214,7 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    // Solves fail where the solver iterates. Responses count as computed only after a solve that succeeded.
+    // Solves may fail if the solver iterates. Responses count as computed only after a successful solve.
 
     /// Begins `A d = r` with r in `increment`, and writes d on the interface.
     pub(crate) fn begin(&mut self, increment: &mut [T], on_interface: &mut [T]) -> Result<()> {
@@ -228,8 +228,8 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    /// Finishes what [`begin`](Self::begin) began: `increment` becomes d on all dofs. `forces` are those of contact on
-    /// the interface, `on_interface` is d there with them.
+    /// Finishes the solve of [`begin`](Self::begin): `increment` becomes d on all dofs. `forces` are the contact
+    /// forces on the interface, `on_interface` is d there with them.
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
         let Self { contact, factor, interface, full, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
@@ -263,8 +263,8 @@ impl<T: Real> Operator<T> {
         respond((self.contact, &mut *self.factor), &self.interface, &mut self.full, forces)
     }
 
-    /// Sorts some rows into groups whose forces do not move each other's dofs: by the dofs that they share where A is
-    /// diagonal, else all of them in one.
+    /// Sorts rows into groups whose forces do not move each other's dofs: by shared dofs if A is diagonal, else into
+    /// one group.
     pub(crate) fn sort(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         match self.contact {
             ContactPath::Apart => {
@@ -281,10 +281,10 @@ impl<T: Real> Operator<T> {
     }
 
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
-    /// `versions` counts those given so far.
+    /// `versions` is the number of versions so far.
     ///
-    /// Of a power law that just touches the compliance is beyond all numbers. More than ε⁻⁴ of W of the row is no more
-    /// than that: what such a spring does is lost beside everything else, whatever the unit.
+    /// The compliance of a power law at first touch is infinite. It is limited to ε⁻⁴ times the diagonal entry of W:
+    /// the effect of such a spring is lost to rounding, whatever the unit.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,
@@ -315,7 +315,7 @@ impl<T: Real> Operator<T> {
         Ok((values, *version))
     }
 
-    /// Forms W of some rows, without compliances, from that of others if it is known.
+    /// Forms W of some rows, without compliances, from the W of other rows if it is known.
     fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], is_known: bool) -> Result<()> {
         self.prepare(g, rows)?;
         let Self { delassus, responses, reciprocals, spread, .. } = self;
@@ -348,7 +348,7 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    /// Makes responses to unit forces known on all dofs that some rows act on.
+    /// Computes responses to unit forces on all dofs that some rows act on.
     fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         let Self { contact, factor, interface, full, responses, reciprocals, spread, .. } = self;
         if *contact == ContactPath::Apart {
@@ -388,13 +388,13 @@ impl<T: Real> Operator<T> {
         self.responses.respond((rows, multipliers), forces, response);
     }
 
-    /// Whether W of so many rows is dearer to form than to apply: the factor changes with every iteration.
+    /// Whether W of `rows` rows costs more to form than to apply: the factor changes with every iteration.
     pub(crate) fn applies(&self, rows: usize) -> bool {
-        // (Its scale is read from rows that no rank has all of.)
+        // The scale of W reads rows of the matrix, of which no rank has all.
         self.varies() && rows >= MANY && self.contact != ContactPath::Apart && self.whole
     }
 
-    /// The size of the diagonal of W: that of a body that answers on each dof as if the others were held.
+    /// The magnitude of the diagonal of W, as if each dof moved with all other dofs held.
     pub(crate) fn scale(&self, g: &ContactJacobian<T>, rows: &[usize], scale: &mut Vec<T>) {
         let pattern = self.combination.pattern();
         let diagonal = |place: usize| {
@@ -409,8 +409,7 @@ impl<T: Real> Operator<T> {
         );
     }
 
-    /// W λ of some rows by one solve; the forces Gᵀ λ and their response on the interface are left in two vectors
-    /// there.
+    /// W λ of some rows by one solve; leaves the forces Gᵀ λ and their response in two vectors on the interface.
     pub(crate) fn apply(
         &mut self,
         g: &ContactJacobian<T>,
@@ -430,7 +429,7 @@ impl<T: Real> Operator<T> {
         Ok(())
     }
 
-    /// Forgets the Delassus operator of other rows than those of this version.
+    /// Forgets the Delassus operator if it belongs to another version of the rows.
     pub(crate) fn follow(&mut self, rows: u64) {
         if self.rows != rows {
             self.rows = rows;
@@ -439,7 +438,7 @@ impl<T: Real> Operator<T> {
         }
     }
 
-    /// Forgets what was computed with another matrix.
+    /// Forgets results computed with another matrix.
     fn reset(&mut self) {
         self.responses.reset();
         self.reciprocals.clear();

@@ -1,32 +1,32 @@
-//! How contact gets its responses from a factor, and the order of elimination that this asks for.
+//! How contact computes its responses from a factor, and the order of elimination that this requires.
 
 use crate::error::Result;
 use crate::linear_solver::{COLUMNS, Condensation, Factorization, LinearSolver};
 use crate::real::Real;
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// How contact gets its responses.
+/// How contact computes its responses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ContactPath {
     /// From the trailing block of a factor with the interface eliminated last.
     Condensed,
-    /// By full solves, a column a row.
+    /// By full solves, one column per row.
     Full,
-    /// From a diagonal matrix: a force moves the dof that it acts on, and nothing else.
+    /// From a diagonal matrix: a force moves only the dof that it acts on.
     Apart,
 }
 
-/// Fill over that of a free order beyond which a matrix that is factorized often is not ordered for contact.
+/// Fill relative to a free order beyond which a matrix that is factorized often is not ordered for contact.
 const DEAR: f64 = 1.25;
 
-/// The same of a matrix that stays: in a free order a step in contact takes two solves instead of one.
+/// The same for a constant matrix: in a free order a step in contact needs two solves instead of one.
 const DEAR_KEPT: f64 = 2.0;
 
-/// Share of a factor that the interface's dense triangle must have for a free order to be tried.
+/// Share of a factor that the interface's dense triangle must exceed for a free order to be tried.
 const TRIANGLE: f64 = 0.1;
 
-/// Analyzes with the interface eliminated last, if the solver condenses; in a free order if the factor would otherwise
-/// be much larger, as with a whole surface in the interface: its dofs, eliminated last, fill a dense triangle.
+/// Analyzes with the interface eliminated last, if the solver condenses; in a free order if the factor would
+/// otherwise be much larger. For instance, a whole surface in the interface, eliminated last, fills a dense triangle.
 pub(crate) fn analyze<T: Real>(
     solver: &dyn LinearSolver<T>,
     pattern: SymbolicSparseColMatRef<'_, usize>,
@@ -37,7 +37,7 @@ pub(crate) fn analyze<T: Real>(
     if last.condensation().is_none() {
         return Ok((last, ContactPath::Full));
     }
-    // (The diagonal is always part of the pattern.)
+    // The diagonal is always part of the pattern.
     if pattern.row_idx().len() == pattern.ncols() {
         return Ok((last, ContactPath::Apart));
     }
@@ -70,7 +70,7 @@ pub(crate) fn respond<T: Real>(
     full: &mut [T],
     forces: &mut [T],
 ) -> Result<()> {
-    // A condensation answers on the interface without a full solve, whether steps condense or not.
+    // A condensation computes responses on the interface without a full solve, whether steps condense or not.
     if let Some(condensed) = factor.condensation().filter(|_| path != ContactPath::Full) {
         return condensed.solve(forces);
     }

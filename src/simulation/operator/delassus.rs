@@ -1,5 +1,5 @@
-//! The Delassus operator of the rows that press. Where rows join or leave, what the others do to each other stays:
-//! these entries are moved and not formed again, and are the same to the bit.
+//! The Delassus operator of the active rows. When rows join or leave, the couplings of the other rows are moved and
+//! not formed again: they stay the same to the bit.
 
 use crate::contact_solver::FORESEEN;
 use crate::error::Result;
@@ -12,19 +12,19 @@ pub(crate) struct Delassus<T> {
     pub(crate) rows: Vec<usize>,
     /// Row by row, with the compliances of the laws on the diagonal.
     pub(crate) values: Vec<T>,
-    /// The diagonal without them.
+    /// The diagonal without compliances.
     pub(crate) diagonal: Vec<T>,
-    /// The roots of that.
+    /// The square roots of this diagonal.
     roots: Vec<T>,
-    /// Its number, 0 if what is here belongs to no rows.
+    /// Its version, 0 if the values belong to no rows.
     pub(crate) version: u64,
-    /// Places of the rows that have joined.
+    /// Indices of the rows that have joined.
     pub(crate) joined: Vec<usize>,
     /// The rows that have stayed.
     runs: Vec<Run>,
 }
 
-/// Rows side by side before and now: where they begin then, among those that stay, and now.
+/// Rows that are consecutive before and now: their first index before, among the rows that stay, and now.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     before: usize,
@@ -36,7 +36,7 @@ struct Run {
 const WHAT: &str = "the Delassus operator";
 
 impl<T: Real> Delassus<T> {
-    /// Memory for as many rows as are foreseen on an interface of so many dofs.
+    /// Memory for the number of rows expected on an interface of `interface` dofs.
     pub(crate) fn foreseen(interface: usize) -> Self {
         let rows = interface.min(FORESEEN);
         Self {
@@ -50,7 +50,7 @@ impl<T: Real> Delassus<T> {
         }
     }
 
-    /// Memory for W of some rows; all of them have joined.
+    /// Reserves memory for W of some rows, all of which have joined.
     pub(crate) fn begin(&mut self, rows: &[usize]) -> Result<()> {
         self.values.clear();
         memory::grow(&mut self.values, rows.len(), rows.len(), WHAT)?;
@@ -59,8 +59,8 @@ impl<T: Real> Delassus<T> {
         Ok(())
     }
 
-    /// Memory for W of some rows, where the entries of those that stay have been moved to their places, compliances
-    /// taken off: rows and columns of those that have joined are to be filled.
+    /// Reserves memory for W of some rows, and moves the entries of rows that stay to their new places, without
+    /// compliances. Rows and columns of joined rows are to be filled.
     pub(crate) fn rearrange(&mut self, rows: &[usize]) -> Result<()> {
         if !self.compare(rows) {
             return self.begin(rows);
@@ -72,7 +72,7 @@ impl<T: Real> Delassus<T> {
             values[k * was + k] = own;
         }
         if stay < was {
-            // Nothing is overwritten that is still to be moved: all goes towards the front, in the order of the places.
+            // Ascending moves towards the front overwrite no entry that is still to be moved.
             for to in &*runs {
                 for row in 0..to.count {
                     for run in &*runs {
@@ -85,7 +85,7 @@ impl<T: Real> Delassus<T> {
         values.truncate(stay * stay);
         memory::grow(values, now, now, WHAT)?;
         if stay < now {
-            // And back to front here.
+            // Descending moves towards the back, likewise.
             for to in runs.iter().rev() {
                 for row in (0..to.count).rev() {
                     for run in runs.iter().rev() {
@@ -98,10 +98,11 @@ impl<T: Real> Delassus<T> {
         Ok(())
     }
 
-    /// All that has joined is filled; couplings of it that no sum can see become zero.
+    /// Completes W after the entries of joined rows are filled: couplings below the rounding of every sum become
+    /// zero.
     ///
-    /// What a force does far away in a step decays by orders of magnitude from node to node, down to numbers without
-    /// digits, and to zero in one unit and not in another: where W begins and ends is not to depend on that.
+    /// The response to a force in one step decays by orders of magnitude from node to node, down to numbers without
+    /// digits, which underflow in one unit and not in another. The pattern of W must not depend on that.
     pub(crate) fn end(&mut self, rows: &[usize]) {
         let Self { rows: assembled, values, diagonal, roots, joined, .. } = self;
         let size = rows.len();
@@ -119,7 +120,7 @@ impl<T: Real> Delassus<T> {
             let row = &mut values[k * size..(k + 1) * size];
             row.iter_mut().zip(&*roots).for_each(|(entry, &root)| forget(entry, [root, roots[k]]));
         }
-        // (Where all have joined these were all entries.)
+        // If all rows have joined, the loop above has covered all entries.
         for &k in joined.iter().filter(|_| joined.len() < size) {
             let column = values[k..].iter_mut().step_by(size);
             column.zip(&*roots).for_each(|(entry, &root)| forget(entry, [root, roots[k]]));
@@ -128,7 +129,7 @@ impl<T: Real> Delassus<T> {
         assembled.extend_from_slice(rows);
     }
 
-    /// Finds which rows stay, in the order that they had, and which have joined; says whether any stay.
+    /// Finds which rows stay, in their old order, and which have joined. Returns whether any stay.
     fn compare(&mut self, rows: &[usize]) -> bool {
         let Self { rows: before, runs, joined, .. } = self;
         runs.clear();
@@ -156,12 +157,12 @@ impl<T: Real> Delassus<T> {
 mod tests {
     use super::*;
 
-    /// An entry that says whose it is.
+    /// An entry that identifies its row and column.
     fn entry(row: usize, column: usize) -> f64 {
         (1000 * row + column) as f64
     }
 
-    /// Fills what has joined, and puts compliances on the diagonal, as an operator does.
+    /// Fills the joined rows, and adds compliances to the diagonal, as an operator does.
     fn fill(w: &mut Delassus<f64>, rows: &[usize]) {
         let n = rows.len();
         for &k in &w.joined {
@@ -183,7 +184,7 @@ mod tests {
         let all: Vec<usize> = (0..40).collect();
         let sets = |mask: usize| all.iter().copied().filter(move |row| (row * row + mask * 7) % (2 + mask % 5) != 1);
         let mut list: Vec<Vec<usize>> = (0..30).map(|mask| sets(mask * mask).collect()).collect();
-        // None, one, all; normal rows with their tangents; another order, which no move gives.
+        // None, one, all; normal rows with their tangents; another order, which moves cannot produce.
         list.extend([
             vec![],
             vec![3],
@@ -205,13 +206,13 @@ mod tests {
                 assert_eq!(value.to_bits(), (entry(rows[i], rows[j]) + compliance).to_bits(), "{rows:?} {i} {j}");
             }
         }
-        // Of rows that stay nothing is to be filled.
+        // If all rows stay, none are to be filled.
         w.rearrange(&all[1..]).unwrap();
         assert!(w.joined.is_empty());
     }
 
-    /// Couplings that decay from row to row are zero where they are lost beside the diagonal, in any unit and however
-    /// the rows have come together.
+    /// Couplings that decay from row to row are zero where they are below rounding beside the diagonal, in any unit
+    /// and for any order in which the rows have joined.
     #[test]
     fn what_no_sum_can_see_is_zero() {
         let n = 30;

@@ -4,17 +4,17 @@ use crate::real::Real;
 
 /// Vectors on the interface, one entry a dof there.
 pub(crate) struct InterfaceWork<T> {
-    /// The increment d: without contact at first, with it in the end.
+    /// The increment d: first without contact, finally with it.
     pub(crate) increment: Vec<T>,
-    /// Forces of contact; and those of the contact problem that is being solved.
+    /// Forces of contact, and forces of the contact problem that is being solved.
     pub(crate) forces: Vec<T>,
     pub(crate) pressing: Vec<T>,
-    /// Values at d = 0 of the displacements, of those of the balance where it holds elsewhere, and of what contact
-    /// constrains.
+    /// Values at d = 0 of the displacements of the state and of the balance if it differs, and of the target of
+    /// contact.
     pub(crate) displacement: Vec<T>,
     pub(crate) balance: Vec<T>,
     pub(crate) target: Vec<T>,
-    /// d without contact, and with that of the last linearization of curved rows.
+    /// d without contact, and d of the last linearization of curved rows.
     pub(crate) free: Vec<T>,
     pub(crate) tried: Vec<T>,
     /// Displacements where the gaps of curved rows were linearized last.
@@ -48,14 +48,14 @@ pub(crate) fn advance<T: Real>(dofs: &[usize], base: &[T], weight: T, increment:
     }
 }
 
-/// Keeps the values on the interface.
+/// Copies the values on the interface to `kept`.
 pub(crate) fn keep<T: Real>(dofs: &[usize], values: &[T], kept: &mut [T]) {
     for (&dof, kept) in dofs.iter().zip(kept) {
         *kept = values[dof];
     }
 }
 
-/// Puts back what [`keep`] has kept.
+/// Restores the values stored by [`keep`].
 pub(crate) fn restore<T: Real>(dofs: &[usize], kept: &[T], values: &mut [T]) {
     for (&dof, &kept) in dofs.iter().zip(kept) {
         values[dof] = kept;

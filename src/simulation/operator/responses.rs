@@ -1,7 +1,8 @@
-//! Responses of the interface to unit forces, kept for what has been pressed.
+//! Responses of the interface to unit forces, kept for the dofs or rows that contact has used.
 //!
-//! Where the matrix stays and rows change they belong to dofs: rows that turn cost products then, and no solve. Where
-//! the matrix changes with every iteration, or rows never do, they belong to rows, of which there are fewer.
+//! If the matrix is constant and rows change, responses belong to dofs: rows that turn then cost products, and no
+//! solve. If the matrix changes with every iteration, or rows never do, responses belong to rows, of which there are
+//! fewer.
 
 mod tiles;
 
@@ -13,7 +14,7 @@ use crate::real::Real;
 use crate::simulation::rows::constraints::Constraints;
 use tiles::Tiles;
 
-/// What a column is the response to.
+/// The unit that a column is the response to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unit {
     /// A unit force on a dof of the interface.
@@ -23,7 +24,7 @@ pub(crate) enum Unit {
 }
 
 impl Unit {
-    /// What responses of a matrix that stays are kept for: rows that never change are fewer than the dofs they act on.
+    /// The unit of responses of a constant matrix: rows that never change are fewer than the dofs they act on.
     pub(crate) fn of<T: Real>(constraints: &Constraints<'_, T>) -> Self {
         if constraints.is_fixed() { Self::Row } else { Self::Dof }
     }
@@ -35,10 +36,10 @@ pub(crate) struct Responses<T> {
     unit: Unit,
     /// Number of dofs on the interface.
     size: usize,
-    /// For each dof there, or each row, the number of its column.
+    /// For each dof there, or each row, the index of its column.
     slots: Vec<usize>,
     columns: Vec<Column>,
-    /// What the columns hold, in pages: none is moved when more are needed. Pages behind the `page`-th are empty.
+    /// Values of the columns, in pages: none is moved when more are needed. Pages behind the `page`-th are empty.
     pages: Vec<Vec<T>>,
     page: usize,
     /// Columns that are being solved for.
@@ -50,30 +51,31 @@ pub(crate) struct Responses<T> {
     tiles: Tiles<T>,
 }
 
-/// A column from the first to the last entry that is not zero: of bodies side by side a force moves two.
+/// A column from its first to its last nonzero entry: a contact force moves only two of several bodies.
 #[derive(Clone, Copy, Debug)]
 struct Column {
     page: usize,
     start: usize,
-    /// The dofs it belongs to.
+    /// The range of dofs that it covers.
     first: usize,
     count: usize,
 }
 
-/// Dofs of an interface whose responses take little memory, all together.
+/// Number of dofs of an interface whose responses take little memory altogether.
 const SMALL: usize = 256;
 
-/// Entries of a row, in the mean, up to which the response to each is formed as a whole: those of nodes on obstacles.
+/// Mean number of entries of a row up to which the response to each row is formed as a whole, as for nodes on
+/// obstacles.
 const SHORT: usize = 8;
 
 const WHAT: &str = "the responses of contact";
 
-/// A dof or row without a column, and one that is about to get one.
+/// Marks of a dof or row without a column, and of one that is about to get one.
 const NONE: usize = usize::MAX;
 const MISSING: usize = usize::MAX - 1;
 
 impl<T: Real> Responses<T> {
-    /// For an interface of so many dofs. Of a small one all columns have memory at once.
+    /// For an interface of `size` dofs. Memory for all columns of a small interface is reserved at once.
     pub(crate) fn new(unit: Unit, size: usize) -> Self {
         let small = if size <= SMALL { size } else { 0 };
         Self {
@@ -90,7 +92,7 @@ impl<T: Real> Responses<T> {
         }
     }
 
-    /// Forgets all columns: they belong to another matrix. Their memory is used again.
+    /// Forgets all columns, which belong to another matrix. Their memory is used again.
     pub(crate) fn reset(&mut self) {
         self.slots.clear();
         self.columns.clear();
@@ -105,7 +107,7 @@ impl<T: Real> Responses<T> {
         }
     }
 
-    /// Makes known what [`couple`](Self::couple) and [`respond`](Self::respond) need of some rows
+    /// Computes the columns that [`couple`](Self::couple) and [`respond`](Self::respond) need for some rows
     /// (ascending); `solve` replaces up to [`COLUMNS`] columns of forces by their responses.
     pub(crate) fn prepare(
         &mut self,
@@ -128,7 +130,7 @@ impl<T: Real> Responses<T> {
                 Unit::Dof => g.located(row).for_each(|(place, _)| ask(place)),
             }
         }
-        // (Should a solve fail nothing is known of these.)
+        // If a solve fails, these columns stay unknown.
         for &index in missing.iter() {
             slots[index] = NONE;
         }
@@ -150,7 +152,7 @@ impl<T: Real> Responses<T> {
         found
     }
 
-    /// Keeps the column of a dof or row: of a row what is not zero, of a dof, for tiles, all of it.
+    /// Stores the column of a dof or row: its nonzero range for a row, all of it for a dof, as tiles need it.
     fn keep(&mut self, index: usize, column: &[T]) -> Result<()> {
         let Self { unit, size, slots, columns, pages, page, .. } = self;
         let known = |x: &T| *x != T::zero();
@@ -171,14 +173,14 @@ impl<T: Real> Responses<T> {
         Ok(())
     }
 
-    /// The column of a dof or row that has one, from the dof on where it begins.
+    /// The first dof of the stored column of a dof or row, and its values.
     fn column(&self, index: usize) -> (usize, &[T]) {
         let Column { page, start, first, count } = self.columns[self.slots[index]];
         (first, &self.pages[page][start..start + count])
     }
 
-    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): its entries are then sums whose rounding
-    /// depends on which rows there are.
+    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): the rounding of its entries then
+    /// depends on the set of rows.
     pub(crate) fn couples_by_tiles(&self, g: &ContactJacobian<T>, rows: &[usize]) -> bool {
         let entries = || rows.iter().map(|&row| g.located(row).count()).sum::<usize>();
         self.unit == Unit::Dof && entries() > SHORT * rows.len()

@@ -1,4 +1,4 @@
-//! The entries of an effective matrix: its pattern, and where its tangent is taken.
+//! The entries of an effective matrix: its pattern, and the motion at which its tangent is evaluated.
 
 use crate::error::Result;
 use crate::mass::{self, Mass};
@@ -7,7 +7,7 @@ use crate::sparse::Combination;
 use crate::state::Motion;
 use crate::system::{Linearity, Path, System, TangentWeights};
 
-/// Where a tangent is taken.
+/// Where a tangent is evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct At<'m, T> {
     pub(crate) t: f64,
@@ -17,7 +17,7 @@ pub(crate) struct At<'m, T> {
 }
 
 impl<'m, T> At<'m, T> {
-    /// A motion, and the force there.
+    /// A motion and the force there.
     pub(crate) fn state(motion: &'m Motion<T>) -> Self {
         Self { t: motion.t, u: &motion.u, v: &motion.v, of: TangentOf::State }
     }
@@ -26,15 +26,15 @@ impl<'m, T> At<'m, T> {
 /// The force that a tangent belongs to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum TangentOf<'m, T> {
-    /// That of the motion.
+    /// The force of the motion.
     State,
-    /// The system's own of a path.
+    /// The system's own force along a path.
     Path(Path<'m, T>),
-    /// Simpson's mean over a path with this end, in whose middle the motion is.
+    /// Simpson's mean over a path with this end, whose middle is the motion.
     Simpson { end: &'m [T] },
 }
 
-/// Whether K and C have a part in an effective matrix.
+/// Whether K and C enter an effective matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tangent {
     /// Only M: an explicit stage without damping.
@@ -61,7 +61,7 @@ pub(crate) fn check_sources<T: Real>(
     combination.check(diagonal, what.into_iter().flatten())
 }
 
-/// The pattern of an effective matrix, of those of K, C and M that enter it, and no larger.
+/// The pattern of an effective matrix: the union of the patterns of K, C and M that enter it.
 pub(crate) fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) -> Result<(Tangent, Combination)> {
     let dofs = system.dofs();
     let damped = weights[1] != 0.0 && system.damping_force().is_some();
@@ -69,7 +69,7 @@ pub(crate) fn pattern<T: Real>(system: &mut dyn System<T>, weights: [f64; 3]) ->
         true => Tangent::Present,
         false => Tangent::Absent,
     };
-    // Damping proportional to a lumped mass leaves an explicit scheme its diagonal.
+    // Damping proportional to a lumped mass keeps the matrix of an explicit scheme diagonal.
     let diagonal = tangent == Tangent::Present
         && weights[0] == 0.0
         && system.linearity() == Linearity::Linear
@@ -111,7 +111,7 @@ mod tests {
     use crate::system::LinearSystem;
     use faer::sparse::{SparseColMat, Triplet};
 
-    /// A scheme whose matrix is that of the mass alone is given no more, whether the system is damped or not.
+    /// A scheme whose matrix is the mass alone gets no larger pattern, whether the system is damped or not.
     #[test]
     fn what_a_scheme_does_not_read_is_not_in_its_pattern() {
         let entries = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)].map(|(i, j, x)| Triplet::new(i, j, x));

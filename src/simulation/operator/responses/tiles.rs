@@ -1,14 +1,14 @@
-//! W = G A⁻¹ Gᵀ from responses to dofs, a tile of places at a time: what the rows of a tile read of all columns stays
-//! in a cache, for rows that are neighbors act on the same dofs.
+//! W = G A⁻¹ Gᵀ from responses to dofs, one tile of places at a time: the column entries that the rows of a tile read
+//! stay in a cache, since neighboring rows act on the same dofs.
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
 use std::ops::Range;
 
-/// Places of a tile.
+/// Number of places of a tile.
 const TILE: usize = 128;
 
-/// Rows whose responses are brought from one order into the other together: as many as fill a line of a cache.
+/// Number of rows whose responses are transposed together: as many as fill a cache line.
 const FEW: usize = 8;
 
 /// The entries of some rows, and responses at the places of a tile.
@@ -17,9 +17,9 @@ pub(crate) struct Tiles<T> {
     /// (place, weight) of all rows, ascending in each, and where each row begins.
     entries: Vec<(usize, T)>,
     starts: Vec<usize>,
-    /// Of each row the first entry at the places of the present tile, or behind it.
+    /// For each row the first entry at the places of the present tile, or behind it.
     next: Vec<usize>,
-    /// The responses to a few rows at the places of the tile, and at each of them those to all rows.
+    /// The responses to a few rows at the places of the tile, and the responses to all rows at each of these places.
     own: Vec<T>,
     all: Vec<T>,
 }
@@ -36,7 +36,7 @@ impl<T: Real> Tiles<T> {
         }
     }
 
-    /// W of some rows, row by row, on an interface of so many places; `column` gives the response to a unit force at
+    /// W of some rows, row by row, on an interface of `size` places; `column` returns the response to a unit force at
     /// any place that the rows act on.
     pub(crate) fn couple<'c>(
         &mut self,
@@ -75,7 +75,7 @@ impl<T: Real> Tiles<T> {
         }
     }
 
-    /// Takes the entries of some rows.
+    /// Reads the entries of some rows, and sorts them by place.
     fn sort(&mut self, g: &ContactJacobian<T>, rows: &[usize]) {
         let Self { entries, starts, next, .. } = self;
         entries.clear();
@@ -99,7 +99,7 @@ fn first<T>(entries: &[(usize, T)], range: Range<usize>) -> Option<usize> {
 
 /// `out += Σ c x` with the list x of each (place, c).
 fn add<'x, T: Real>(terms: &[(usize, T)], list: impl Fn(usize) -> &'x [T], out: &mut [T]) {
-    // (Several at a time: `out` is read and written less often.)
+    // Several terms at a time: `out` is read and written less often.
     let fours = terms.chunks_exact(4);
     let rest = fours.remainder();
     for four in fours {
