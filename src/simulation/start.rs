@@ -4,7 +4,7 @@
 //! - `rate_check`: gap rates and rows are compared with gaps.
 //! - `massless`, `massless_parts`: dofs without mass are brought into static balance.
 //! - `problem`: the contact problem of the start.
-//! - `past`: past states made from a motion.
+//! - `past`: past states computed from a motion.
 //! - `resumed`, `checkpoint`: a run is continued from another one, or from a file.
 
 #[cfg(feature = "serde")]
@@ -40,7 +40,7 @@ use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
 use crate::system::System;
 use crate::tableau::StartUp;
 
-/// What the state at the start is made from.
+/// The data from which the state at the start is computed.
 pub(crate) struct Start<'s, T: Real> {
     pub(crate) system: &'s mut dyn System<T>,
     pub(crate) contact_solver: &'s mut dyn ContactSolver<T>,
@@ -52,27 +52,27 @@ pub(crate) struct Start<'s, T: Real> {
     pub(crate) massless: &'s [usize],
     /// Which dofs are brought into static balance.
     pub(crate) balanced: Balanced,
-    /// Whether accelerations are those of the smooth motion, without the forces of closed contacts.
+    /// Whether accelerations belong to the smooth motion, without the forces of closed contacts.
     pub(crate) is_smooth: bool,
 }
 
-/// How bodies that overlap at the start are treated, in rigid contacts and equality rows. (Mesh generators leave small
-/// overlaps.)
+/// How bodies that overlap at the start are treated, in rigid contacts and equality rows. Mesh generators leave small
+/// overlaps.
 ///
 /// Gaps within the rounding of the numbers that they are computed from count as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum InitialOverclosure {
-    /// [`Error::InitialViolation`], which names the depth.
+    /// Fails with [`Error::InitialViolation`], which states the depth.
     #[default]
     Refused,
-    /// The depth is added to the gap for the whole run, so that the contact starts closed and nothing is strained. It
-    /// is added to all gaps of the feature ([`ContactId::feature`](crate::contact::ContactId::feature)), so that a node
-    /// that slides on keeps it.
+    /// The depth is added to the gap for the whole run, so that the contact starts closed and without strain. It is
+    /// added to all gaps of the feature ([`ContactId::feature`](crate::contact::ContactId::feature)), so that a
+    /// sliding node keeps it.
     AdjustedGaps,
-    /// The depth is added at first, and taken away over this time by the factor 1 − 3 τ² + 2 τ³ with τ from 0 to 1.
-    /// This strains the bodies as an interference fit does.
+    /// The depth is added at first, and removed over this time by the factor 1 − 3 τ² + 2 τ³ with τ from 0 to 1. This
+    /// strains the bodies like an interference fit.
     RemovedOver(f64),
 }
 
@@ -88,11 +88,11 @@ pub(crate) enum Violation {
 /// The impact by which a contact that friction jams comes to stick.
 #[derive(Clone, Copy, Debug)]
 enum Impact<T> {
-    /// Velocities are those of a run that goes on, and stay as they are.
+    /// Not allowed: velocities belong to a run that continues, and stay unchanged.
     Refused,
-    /// None so far.
+    /// No impact so far.
     Possible,
-    /// The row of the contact, and the impulses that the velocities contain. There is no second one.
+    /// The row of the contact, and the impulses that the velocities contain. There is no second impact.
     Found(usize, StartImpact<T>),
 }
 
@@ -103,14 +103,14 @@ struct Found<T: Real> {
     adjustment: Option<StartAdjustment<T>>,
 }
 
-/// What a run starts from.
+/// The data from which a run starts.
 pub(crate) struct Begun<T: Real> {
     pub(crate) state: State<T>,
     pub(crate) history: History<T>,
     pub(crate) adjustment: Option<StartAdjustment<T>>,
 }
 
-/// M⁻¹ on the free dofs with room for the candidates.
+/// M⁻¹ on the free dofs, with memory for the candidates.
 pub(crate) fn projection<T: Real>(
     system: &dyn System<T>,
     constraints: &Constraints<'_, T>,
@@ -158,8 +158,8 @@ impl<T: Real> Start<'_, T> {
             1
         };
         let shown = scheme.shown(&motion);
-        // A scheme that stores the velocity of another time gets it there. The acceleration is left at the start: its
-        // rate is unknown, and an estimate would be dominated by the stiffest mode.
+        // A scheme that stores the velocity at another time gets the velocity at that time. The acceleration is left
+        // at the start: its rate is unknown, and an estimate would be dominated by the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
         T::axpy(T::of(scheme.shifts[0] * h), a, v);
         let clock = Clock::new(t, h);
@@ -284,7 +284,7 @@ impl<T: Real> Start<'_, T> {
 
         let contact = scheme.tableau.stages[scheme.tableau.stages.len() - 1].contact;
         let looks_ahead = contact.lead() > 0.0;
-        // Springs in compression push from the start.
+        // Springs in compression exert their force from the start.
         let mut rates = vec![GapRates::default(); constraints.len()];
         if constraints.laws().damped {
             constraints.finite_rates(t, &motion.u, &motion.v, &mut rates)?;
@@ -300,7 +300,7 @@ impl<T: Real> Start<'_, T> {
                 contacts.closed[row] = force > T::zero();
             }
         }
-        // (Dofs without mass respond to no impulse: what friction gave there to one body the other would not lose.)
+        // Dofs without mass do not respond to impulses: friction there would act on one body only.
         let drags = |constraints: &Constraints<'_, T>, row: usize| constraints.tangents().rub_on(g, row, massless);
         let is_spring = |row: usize| contacts.closed[row] && constraints.law(row).is_spring();
         let rubs = |row: &usize| is_spring(*row) && !drags(constraints, *row);
@@ -318,7 +318,7 @@ impl<T: Real> Start<'_, T> {
         };
         problem.add_inertial(constraints, g, motion, &contacts.gap)?;
         if !massless.is_empty() {
-            // These have been solved for, or are open.
+            // Contacts on dofs without mass have been solved for, or are open.
             problem.rows.retain(|&row| !g.acts_on(row, massless));
             problem.waiting.retain(|&row| !g.acts_on(row, massless));
         }
@@ -346,8 +346,8 @@ impl<T: Real> Start<'_, T> {
     }
 }
 
-/// Contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0. Friction that acts on dofs with mass
-/// alone follows, when the normal force is known.
+/// Solves contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0. Then solves for friction that
+/// acts on dofs with mass only, as the normal force is known.
 fn press_static<T: Real>(
     constraints: &mut Constraints<'_, T>,
     (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
@@ -377,8 +377,8 @@ fn press_static<T: Real>(
     rub_known(constraints, g, solver, projection, h, (motion, contacts), &rows)
 }
 
-/// What of the forces on dofs without mass contact has not balanced either goes on to the dofs with mass, and
-/// accelerates them: it comes from inside of the bodies.
+/// Passes on the forces on dofs without mass that contact has not balanced to the dofs with mass, and accelerates
+/// these: such forces are internal to the bodies.
 fn pass_on_rest<T: Real>(
     system: &mut dyn System<T>,
     (massless, unbalanced): (&[usize], &[T]),
@@ -405,8 +405,8 @@ fn pass_on_rest<T: Real>(
     Ok(())
 }
 
-/// The free dofs of the bodies at rest: parts that K couples without a velocity, those of their supports included.
-/// Refuses runs in which everything moves, and ranks, none of which has all of the stiffness.
+/// The free dofs of the bodies at rest: parts coupled by K without a velocity, supports included. Refuses runs in
+/// which everything moves, and ranks, none of which has all of the stiffness.
 fn bodies_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[T]) -> Result<Vec<usize>> {
     if !together.is_alone() {
         let reason = "no rank has all of the stiffness: give displacements in balance, as a static analysis finds them";
@@ -429,8 +429,8 @@ fn bodies_at_rest<T: Real>(system: &dyn System<T>, together: &Together<T>, v: &[
     }
 }
 
-/// The friction of contacts whose normal forces are known, those of springs in compression and of static balance: it
-/// holds what is at rest, and slows what slides.
+/// The friction of contacts with known normal forces, from springs in compression or static balance: it holds
+/// contacts at rest, and slows sliding contacts.
 fn rub_known<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
@@ -484,12 +484,12 @@ fn rub_known<T: Real>(
     Ok(())
 }
 
-/// Rounding of initial gaps, in units of that of our own sums: coordinates may have been written to a file with twelve
-/// digits.
+/// Rounding of initial gaps, in units of the rounding of sums: coordinates may have been written to a file with
+/// twelve digits.
 const INPUT: f64 = 64.0;
 
-/// Evaluates the gaps, says which of them are closed, and refuses a start inside an obstacle. A gap may have been
-/// `missed` by so much.
+/// Evaluates the gaps, returns which of them are closed, and refuses a start inside an obstacle. `missed` is an
+/// additional tolerance of the gaps.
 fn touching_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &ContactJacobian<T>,
@@ -531,8 +531,8 @@ fn touching_contacts<T: Real>(
     Ok(touching)
 }
 
-/// Whether the straight line through the start is the past motion of the system: neither the acceleration at the start
-/// nor that at the past states changes a velocity beyond rounding within a step.
+/// Whether the straight line through the start is the past motion of the system: the accelerations at the start and
+/// at the past states do not change a velocity beyond rounding within a step.
 fn is_free_flight<T: Real>(
     (system, together): (&mut dyn System<T>, &Together<T>),
     projection: &mut JumpProjection<T>,
@@ -565,7 +565,7 @@ fn is_free_flight<T: Real>(
     Ok(true)
 }
 
-/// The largest size of an entry of a vector, infinite if one is no number.
+/// The largest magnitude of an entry of a vector, infinite if an entry is not finite.
 fn largest<T: Real>(x: &[T], together: &Together<T>) -> Result<f64> {
     let own = if T::all_finite(x) { T::largest(x) } else { T::infinity() };
     together.max(Ok([own.value()])).map(|[largest]| largest)
@@ -582,9 +582,9 @@ fn admitted<T: Real>(force: Result<()>, together: &Together<T>) -> Result<bool> 
     }
 }
 
-/// How accelerations change with changes of displacements and velocities as large as these are, and without common
-/// direction: ε times that is what rounding makes of accelerations where forces cancel, as those of stiff springs do in
-/// rigid motions. None where the host does not admit the state.
+/// The change of accelerations by changes of displacements and velocities of their own magnitude and with scattered
+/// signs. ε times this is the rounding of accelerations where forces cancel, as for stiff springs in rigid motions.
+/// None where the host does not admit the state.
 fn sensitivity<T: Real>(
     (system, together): (&mut dyn System<T>, &Together<T>),
     projection: &mut JumpProjection<T>,

@@ -1,4 +1,4 @@
-//! Checkpoints: what a run is saved as, and how another one goes on from it.
+//! Checkpoints: the saved form of a run, and how another run continues from it.
 
 use crate::real::Real;
 use crate::simulation::build::builder::SimulationBuilder;
@@ -7,7 +7,7 @@ use crate::simulation::start::resumed::Resumed;
 use crate::state::Checkpoint;
 
 impl<T: Real> Simulation<'_, T> {
-    /// State and history as they are now, to be saved: a copy of them. With the feature `serde`.
+    /// A copy of state and history as they are now, to be saved. With the feature `serde`.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint<T> {
         let (state, history) = (self.state.clone(), self.history.clone());
@@ -20,10 +20,10 @@ impl<T: Real> SimulationBuilder<'_, T> {
     /// [step size](crate::History::step_size), bit for bit, as [`resume`](Self::resume) does. Initial values and start
     /// time given elsewhere are ignored. With the feature `serde`.
     ///
-    /// A checkpoint that does not fit is refused by [`build`](Self::build): [`Error::Dimension`] for another number of
-    /// dofs, [`Error::Incompatible`] for another scheme, or one with other rows under the same name,
-    /// [`Error::Parameter`] for another step size. What a host changes in system, constraints, correctors or settings
-    /// is not noticed.
+    /// A checkpoint that does not fit is refused by [`build`](Self::build): [`Error::Dimension`] for another number
+    /// of dofs, [`Error::Incompatible`] for another scheme, or for other rows under the same name,
+    /// [`Error::Parameter`] for another step size. Changes of system, constraints, correctors or settings are not
+    /// detected.
     ///
     /// [`Error::Dimension`]: crate::Error::Dimension
     /// [`Error::Incompatible`]: crate::Error::Incompatible

@@ -1,5 +1,5 @@
-//! Dofs without mass at the start of a run, or all dofs of one that starts at rest: brought into static balance with
-//! the others, the load and contact.
+//! Dofs without mass at the start of a run, or all dofs of a run that starts at rest: brought into static balance
+//! with the others, the load and contact.
 
 use crate::contact::{Candidates, ContactJacobian, Course};
 use crate::contact_solver::{ContactProblem, ContactSolver};
@@ -21,7 +21,7 @@ use crate::system::System;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StartAdjustment<T> {
-    /// Change of the potential energy, that of the load (minus its force times the displacement) included; not
+    /// Change of the potential energy, with the potential of the load (minus its force times the displacement); not
     /// positive. The run would have lost this energy in a jump. None if the system has no potential.
     pub energy: Option<T>,
     /// The largest change of a displacement (length).
@@ -32,37 +32,37 @@ pub struct StartAdjustment<T> {
     pub impact: Option<StartImpact<T>>,
 }
 
-/// What is not positive definite where a run cannot start at rest.
+/// The matrix in the error of a run that cannot start at rest.
 const AT_REST: &str = "stiffness matrix, with which the run was to start at rest (contact does not hold a body there),";
 
-/// The most iterations of the balance at the start. Linear systems take two.
+/// Maximum number of iterations of the balance at the start. Linear systems take two.
 const ITERATIONS: usize = 30;
 
 /// Which dofs are brought into balance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Balanced {
-    /// Those without mass, if they have a stiffness of their own and no damping.
+    /// Dofs without mass, if they have a stiffness of their own and no damping.
     Massless,
-    /// Those of all bodies at rest that have a stiffness of their own; if there is none, the run is refused.
+    /// Dofs of all bodies at rest that have a stiffness of their own; if there is none, the run is refused.
     All,
 }
 
-/// What became of a balance.
+/// The result of a balance.
 enum Balance<T> {
     /// It held to rounding.
     Kept,
-    /// What was moved, and what gaps may miss.
+    /// The adjustment, and the tolerance of the gaps.
     Found(StartAdjustment<T>, T),
     /// Parts have no symmetric positive definite stiffness of their own.
     Indefinite,
 }
 
-/// Brings dofs (those without mass, or all that are free) into static balance with the other dofs, the load and
-/// contact, by Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the way from where they
-/// were given. Those that are in balance to rounding are left alone, bit for bit. So are massless ones that damping
-/// acts on, for their displacements are initial values of their own, and those without a symmetric positive definite
-/// stiffness: whether the scheme can do with that, the step decides. With it comes what gaps may miss, as far as it is
-/// rounding of the ways that contact has taken back.
+/// Brings dofs (without mass, or all free dofs) into static balance with the other dofs, the load and contact, by
+/// Newton's method: f_b + Gᵀ λ = 0, 0 ≤ g ⊥ λ ≥ 0, and friction in its cone against the displacement from the given
+/// positions. Dofs that are in balance to rounding stay unchanged, bit for bit. So do massless dofs under damping,
+/// whose displacements are independent initial values, and dofs without a symmetric positive definite stiffness: the
+/// step decides whether the scheme can treat these. Also returns the tolerance of gaps, from the rounding of the
+/// displacements that contact has undone.
 pub(crate) fn balance_start<T: Real>(
     system: &mut dyn System<T>,
     solver: &mut dyn ContactSolver<T>,
@@ -93,7 +93,7 @@ pub(crate) fn balance_start<T: Real>(
     }
     match balanced {
         Balanced::Massless => Ok(None),
-        // No body can: the factor says why.
+        // No body can be balanced: the factor gives the reason.
         Balanced::All => {
             let columns = Columns::of(system, dofs, motion)?;
             Embedded::factorized(&columns, dofs, &[]).map(|_| None).map_err(|error| match error {
@@ -104,7 +104,7 @@ pub(crate) fn balance_start<T: Real>(
     }
 }
 
-/// Balances some parts of the dofs together, for contacts may couple them. Where it cannot, `parts` keeps those that
+/// Balances some parts of the dofs together, as contacts may couple them. If that fails, `parts` keeps the parts that
 /// are left to balance.
 fn balance<T: Real>(
     system: &mut dyn System<T>,
@@ -152,8 +152,8 @@ fn balance<T: Real>(
             return Err(Error::StepNotFinite { t, h, what: "the displacement in static balance", dof, value });
         }
         let scale = largest(&motion.u).max(largest(given));
-        // (Gaps are met within their own rounding, which may be larger than that of displacements: they are computed
-        // from coordinates.)
+        // Gaps are met within their own rounding, which may exceed the rounding of displacements: they are computed
+        // from coordinates.
         let settled = size <= T::of(1e3) * T::epsilon() * scale + T::of(4.0) * sliver;
         if iteration == 0 {
             if settled {
@@ -174,8 +174,8 @@ fn balance<T: Real>(
             let work = dofs.iter().map(|&dof| residual[dof] * moves(dof)).sum::<T>();
             let energy = energies[0].zip(energies[1]).map(|(before, after)| after - before - work);
             if !is_massless {
-                // What the last iteration still moved is what rounding leaves of a solve with all of K: more than a row
-                // with small displacements of its own would count as rounding.
+                // The last increment is the rounding of a solve with all of K, which may exceed the rounding of rows
+                // with small displacements.
                 missed = missed.max(T::of(8.0) * g.largest_row() * (size + T::epsilon() * scale));
             }
             return Ok(Balance::Found(
@@ -187,11 +187,11 @@ fn balance<T: Real>(
     Err(Error::StartNotBalanced { iterations: ITERATIONS, dof: worst })
 }
 
-/// Gives dofs without mass that damping acts on the velocities that their balance asks for, f_b(t, u, v) = 0, by
-/// Newton's method: their displacements are initial values, their velocities are not. With others the damping force of
-/// the start would not be in balance, and accelerate those with mass as nothing inside of a body does. They are left as
-/// they were given where their part of C is not symmetric positive definite, or no balance is found, and where one of
-/// their part is `held`.
+/// Computes the velocities of massless dofs under damping from their balance, f_b(t, u, v) = 0, by Newton's method:
+/// their displacements are initial values, their velocities are not. With other velocities the damping force at the
+/// start would not be in balance, and would accelerate the dofs with mass, as no internal force does. Velocities stay
+/// as given where the part of C is not symmetric positive definite, where no balance is found, and in parts with a
+/// `held` dof.
 pub(crate) fn balance_rates<T: Real>(
     system: &mut dyn System<T>,
     dofs: &[usize],
@@ -211,7 +211,7 @@ pub(crate) fn balance_rates<T: Real>(
     Ok(())
 }
 
-/// The velocities of some parts. Where there are none, says so, and `parts` keeps those for which to seek them.
+/// Computes the velocities of some parts. If that fails, returns false, and `parts` keeps the parts to try again.
 fn settle_rates<T: Real>(
     system: &mut dyn System<T>,
     parts: &mut Vec<Vec<usize>>,
@@ -233,8 +233,8 @@ fn settle_rates<T: Real>(
         if !T::all_finite(&motion.v) {
             break;
         }
-        // (Where what is around them lets them stand, they are known to the rounding of that. Between springs that
-        // differ much they are known to that of the stiffest, below which nothing falls.)
+        // Dofs that may stand still are accurate to the rounding of the velocities around them. Between springs that
+        // differ much, they are accurate to the rounding of the stiffest, and increments stop falling.
         let largest = T::largest(&motion.v);
         let stays = size <= T::epsilon().powf(T::of(0.25)) * largest && size > T::of(0.5) * before;
         if size <= T::of(1e3) * T::epsilon() * largest || stays {
@@ -246,9 +246,10 @@ fn settle_rates<T: Real>(
     Ok(false)
 }
 
-/// Replaces forces on dofs without mass, which nothing balances, by those on the dofs with mass that they go on to, as
-/// these dofs would move to balance them: at rates by damping, or by stiffness. Says whether there are any beyond what
-/// rounding leaves of a balance. Those on parts of which neither is symmetric positive definite stay where they are.
+/// Replaces forces on dofs without mass, which nothing balances, by the forces on the dofs with mass to which they
+/// are passed on as these dofs would move to balance them: at rates by damping, or by stiffness. Returns whether
+/// there are any beyond the rounding of a balance. Forces on parts in which neither is symmetric positive definite
+/// stay.
 pub(crate) fn pass_on<T: Real>(
     system: &mut dyn System<T>,
     dofs: &[usize],
@@ -268,7 +269,7 @@ pub(crate) fn pass_on<T: Real>(
     Ok(by_rates || by_ways)
 }
 
-/// By columns of C or of K, those parts of which these are symmetric positive definite; `parts` keeps them.
+/// By columns of C or of K, for the parts in which these are symmetric positive definite; `parts` keeps these parts.
 fn pass_on_by<T: Real>(
     system: &mut dyn System<T>,
     columns: impl Fn(&mut dyn System<T>, &[usize], &Motion<T>) -> Result<Columns<T>>,
@@ -299,8 +300,8 @@ fn pass_on_by<T: Real>(
     Ok(false)
 }
 
-/// The contact problem of an iteration: adds the response to d on the interface, and leaves the forces there. Returns
-/// the largest tolerance of a gap, as a displacement.
+/// Solves the contact problem of an iteration: adds the response to d on the interface, and leaves the forces there.
+/// Returns the largest tolerance of a gap, as a displacement.
 fn press_start<T: Real>(
     solver: &mut dyn ContactSolver<T>,
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
@@ -330,7 +331,7 @@ fn press_start<T: Real>(
         })
         .collect();
     laws.resize(g.rows(), [T::zero(); 2]);
-    // Gaps, and the ways along the tangents.
+    // Gaps, and displacements along the tangents.
     let way = |row: usize| g.row(row).map(|(dof, weight)| weight * (u[dof] - given[dof])).sum::<T>();
     let start = |row: usize| if row < rows { gaps[row] } else { way(row) };
     let free: Vec<T> =
@@ -368,6 +369,6 @@ fn press_start<T: Real>(
         operator.answer(g, (&problem, &lambda), forces, &mut response);
     }
     T::axpy(T::one(), &response, on_interface);
-    // (Rows are taken to have unit weights: a gap is then as long as the displacement that closes it.)
+    // Rows are assumed to have unit weights: a gap is then as long as the displacement that closes it.
     Ok(contacts.iter().fold(T::zero(), |sliver, &row| sliver.max(tolerance[row])))
 }

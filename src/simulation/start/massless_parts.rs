@@ -1,5 +1,5 @@
-//! Dofs without mass, part by part: at the start dofs with mass stay where they are, so that what only these couple
-//! is balanced apart. What holds of one part, that it is damped or floats, must not be laid to another.
+//! Dofs without mass, part by part: at the start dofs with mass stay where they are, so that parts coupled only by
+//! these are balanced separately. A property of one part, damping or a floating mode, must not affect another.
 
 use crate::error::{Error, Result};
 use crate::linear_solver::components;
@@ -8,7 +8,7 @@ use crate::simulation::stage::massless::{Columns, Embedded, damping_forces};
 use crate::system::System;
 use faer::sparse::SymbolicSparseColMat;
 
-/// Lists of dofs, both ascending, of which the pattern of the tangent couples none with another; one list where there
+/// Lists of dofs, each ascending, that the pattern of the tangent does not couple with each other; one list if there
 /// is no pattern.
 pub(crate) fn parts<T: Real>(system: &dyn System<T>, dofs: &[usize]) -> Vec<Vec<usize>> {
     let pattern = system.pattern();
@@ -25,12 +25,12 @@ pub(crate) fn parts<T: Real>(system: &dyn System<T>, dofs: &[usize]) -> Vec<Vec<
     lists.into_iter().map(|list| list.into_iter().map(|place| dofs[place]).collect()).collect()
 }
 
-/// Those that damping acts on, and the others.
+/// Parts that damping acts on, and the other parts.
 pub(crate) fn by_damping<T: Real>(system: &mut dyn System<T>, parts: Vec<Vec<usize>>) -> Result<[Vec<Vec<usize>>; 2]> {
     let Some(forces) = damping_forces(system, &joined(&parts))? else { return Ok([Vec::new(), parts]) };
     let acts = |dof: usize| forces[dof] != T::zero();
     let (damped, others): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part.iter().any(|&dof| acts(dof)));
-    // (Where it acts on other dofs alone, nothing says for which of them.)
+    // If it acts on other dofs only, the parts that cause it are unknown.
     let is_elsewhere = damped.is_empty() && (0..forces.len()).any(acts);
     Ok(if is_elsewhere { [others, damped] } else { [damped, others] })
 }
@@ -42,8 +42,8 @@ pub(crate) fn joined(parts: &[Vec<usize>]) -> Vec<usize> {
     dofs
 }
 
-/// Factorizes the own matrix of some parts, of whose dofs (all of them, ascending) these are the columns. Where it is
-/// not symmetric positive definite there is no factor, and `parts` keeps those of which it is.
+/// Factorizes the own matrix of some parts from its columns, one for each of their `dofs` (ascending). If it is not
+/// symmetric positive definite there is no factor, and `parts` keeps the parts whose own matrix is.
 pub(crate) fn factorize<T: Real>(
     columns: &Columns<T>,
     dofs: &[usize],
@@ -61,7 +61,7 @@ pub(crate) fn factorize<T: Real>(
         }
     }
     if parts.len() == count {
-        // One by one they are, together they are not, by rounding.
+        // By rounding, each part is definite and all parts together are not.
         parts.clear();
     }
     Ok(None)

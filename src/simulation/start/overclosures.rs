@@ -17,7 +17,7 @@ pub(crate) struct Overclosures<T> {
 }
 
 impl<T: Real> Overclosures<T> {
-    /// From the gaps of contacts at the start. Of several contacts of a feature the deepest counts.
+    /// From the gaps of contacts at the start. The deepest contact of each feature counts.
     pub(crate) fn new(gaps: &[(ContactId, T)], start: f64, over: Option<f64>) -> Self {
         let mut depths: Vec<((usize, usize), T)> = Vec::new();
         for &(id, gap) in gaps {
@@ -31,7 +31,7 @@ impl<T: Real> Overclosures<T> {
         Self { depths, start, over }
     }
 
-    /// Of a checkpoint that was read: refuses what no run leaves.
+    /// Checks overclosures read from a checkpoint, and refuses values that no run produces.
     #[cfg(feature = "serde")]
     pub(crate) fn check_read(&self) -> Result<()> {
         let Self { depths, start, over } = self;
@@ -52,7 +52,7 @@ impl<T: Real> Overclosures<T> {
         }
     }
 
-    /// Whether the depths are removed in time.
+    /// Whether the depths are removed over time.
     pub(crate) fn vary(&self) -> bool {
         self.over.is_some()
     }

@@ -1,4 +1,4 @@
-//! Past states made from a motion: a straight line, or Taylor's expansion.
+//! Past states computed from a motion: a straight line, or Taylor's expansion.
 
 use crate::real::Real;
 use crate::state::Motion;

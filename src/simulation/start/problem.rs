@@ -1,4 +1,4 @@
-//! The contact problem of the start: which contacts press before the first step, and how hard.
+//! The contact problem of the start: which contacts carry a force before the first step, and how large it is.
 
 use crate::contact::{ContactId, ContactJacobian, ContactLaw, Course, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
@@ -13,10 +13,10 @@ use crate::tableau::ContactLevel;
 
 /// The impact by which friction stopped the slip of a contact when a simulation was built.
 ///
-/// Where μ |W_nt| ≥ W_nn a contact that touches, and slides so that its friction closes the gap, has no force with
-/// which it could slide on ([`Error::Jammed`](crate::Error::Jammed)). Rigid bodies then have an impact without collision
-/// (Painlevé's paradox; Génot and Brogliato, Eur. J. Mech. A/Solids 18, 1999): impulses that bring the slip to zero and
-/// keep the rate of the gap at zero. For a single contact they are X = −W⁻¹ (0, slip velocity), with
+/// Where μ |W_nt| ≥ W_nn, a touching contact that slides so that its friction closes the gap has no force with which
+/// it could slide on ([`Error::Jammed`](crate::Error::Jammed)). Rigid bodies then have an impact without collision
+/// (Painlevé's paradox; Génot and Brogliato, Eur. J. Mech. A/Solids 18, 1999): impulses that stop the slip and keep
+/// the rate of the gap at zero. For a single contact they are X = −W⁻¹ (0, slip velocity), with
 /// |X_t|/X_n = W_nn/|W_nt| ≤ μ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -27,8 +27,8 @@ pub struct StartImpact<T> {
     pub normal: T,
     /// Its impulses along its tangents (force times time); the second one is zero in two dimensions.
     pub friction: [T; 2],
-    /// Change of the kinetic energy, less the work of obstacles that move; not positive. Other contacts that rest are
-    /// part of the impact, and of its energy.
+    /// Change of the kinetic energy, less the work of moving obstacles; not positive. Other resting contacts are part
+    /// of the impact, and of its energy.
     pub energy: T,
 }
 
@@ -46,7 +46,8 @@ pub(crate) struct StartProblem<T> {
     compliance: Vec<T>,
     /// The contacts with friction that slide.
     sliding: Vec<Slide<T>>,
-    /// The step, within which friction does no more than stop them, if the unknowns are forces on bodies with mass.
+    /// The step, if the unknowns are forces on bodies with mass: friction may stop a slip within it, but not reverse
+    /// it.
     pub(crate) h: Option<f64>,
     /// The rows solved for, and their multipliers.
     solved: Vec<usize>,
@@ -54,8 +55,8 @@ pub(crate) struct StartProblem<T> {
 }
 
 impl<T: Real> StartProblem<T> {
-    /// Contacts at rest: touching, and neither approaching nor separating. One that approaches is left to the first
-    /// step, one that separates is open.
+    /// Contacts at rest: touching, and neither approaching nor separating. An approaching contact is left to the
+    /// first step, a separating contact is open.
     pub(crate) fn at_rest(
         constraints: &mut Constraints<'_, T>,
         g: &ContactJacobian<T>,
@@ -67,8 +68,8 @@ impl<T: Real> StartProblem<T> {
         constraints.finite_rates(motion.t, &motion.u, &motion.v, &mut rates)?;
         let rows = (0..constraints.len()).filter(|&row| {
             let rate = g.product(row, &motion.v) + rates[row].rate;
-            // The way in one step that the tolerance of touching allows is not allowed here: at rest the rate is zero
-            // but for rounding.
+            // The displacement in one step that the tolerance of touching allows is not allowed here: at rest the
+            // rate is zero up to rounding.
             let still =
                 rate.abs() * T::of(h) <= rounding(g.magnitude(row, &motion.u) + T::of(h) * g.magnitude(row, &motion.v));
             constraints.law(row).is_equality() || touching[row] && still
@@ -182,7 +183,7 @@ impl<T: Real> StartProblem<T> {
         };
         let mut tolerance: Vec<T> =
             y.iter().enumerate().map(|(row, &y)| scale * rounded(row, g.magnitude(row, &target), y)).collect();
-        // The stabilized bipenalty compares with the step before: the gap is taken to have been the same.
+        // The stabilized bipenalty compares with the step before, whose gap is assumed to be the same.
         if constraints.laws().predictive {
             let mut gaps = vec![T::zero(); constraints.len()];
             constraints.finite_gaps(motion.t, &motion.u, &mut gaps)?;
@@ -193,7 +194,7 @@ impl<T: Real> StartProblem<T> {
             }
         }
         let mut offset: Vec<T> = y.into_iter().map(|y| scale * y).collect();
-        // The slip there, or the way until then.
+        // The slip there, or the displacement until then.
         let mut slips = vec![GapRates::default(); constraints.tangents().len()];
         constraints.finite_slip_rates(t, &motion.u, &motion.v, &mut slips)?;
         for (row, own) in constraints.tangents().all().zip(&slips) {
@@ -210,7 +211,7 @@ impl<T: Real> StartProblem<T> {
         let takes_part = |row: &usize| constraints.law(*row).is_equality() || offset[*row] < -tolerance[*row];
         let aimed = |row: &usize| open[*row] && constraints.law(*row).needs_multiplier();
         let (rows, waiting) = (0..constraints.len()).filter(aimed).partition(takes_part);
-        // (A mean gap changes by half of the response.)
+        // A mean gap changes by half of the response.
         let compliance =
             |law: ContactLaw| T::of(2.0) * scale * law.linearized(-T::one(), T::zero(), T::zero(), Course::at_rest()).0;
         let compliance = (0..constraints.len()).map(|row| compliance(constraints.law(row))).collect();
@@ -227,7 +228,7 @@ impl<T: Real> StartProblem<T> {
         })
     }
 
-    /// Takes a contact as one that sticks, if its friction can hold it: its slip is rounding.
+    /// Treats a contact as sticking if its friction can hold it: its slip is rounding.
     pub(crate) fn stick(&mut self, contact: usize) {
         self.sliding.retain(|slide| slide.contact != contact);
     }
@@ -235,7 +236,7 @@ impl<T: Real> StartProblem<T> {
     /// Changes the velocities by the impact without collision that stops the slip of a contact: its gap rate and slip
     /// are zero afterwards, with impulses W X = −(gap rate, slip). The other contacts of the problem have impulses by
     /// Coulomb's law of impact: 0 ≤ X_n ⊥ gap rate ≥ 0, |X_t| ≤ μ X_n against the slip. Changes nothing if there are
-    /// no such impulses, or if those of the contact are outside of its cone.
+    /// no such impulses, or if the impulses of the contact are outside of its cone.
     pub(crate) fn stop(
         &self,
         contact: usize,
@@ -315,7 +316,7 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// Solves. `rubs` says of a contact whether its friction takes part.
+    /// Solves. `rubs` returns whether the friction of a contact takes part.
     pub(crate) fn solve(
         &mut self,
         t: f64,
@@ -352,7 +353,7 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// Solves on the rows that take part.
+    /// Solves for the rows that take part.
     fn solve_gaps(
         &mut self,
         t: f64,
@@ -379,7 +380,7 @@ impl<T: Real> StartProblem<T> {
         Ok(())
     }
 
-    /// The same where contacts have friction: what slides has its direction.
+    /// The same with friction: a sliding contact has a given friction direction.
     fn solve_rubbing(
         &mut self,
         t: f64,
@@ -417,25 +418,25 @@ pub(crate) struct Slide<T> {
     /// The direction of its friction: against the slip.
     direction: [T; 2],
     speed: T,
-    /// Whether its friction would turn the slip round within the first step. Coulomb's law then holds of the slip at
+    /// Whether its friction would reverse the slip within the first step. Coulomb's law then holds for the slip at
     /// the end of the step: the force stops the slip, if the bound allows it.
     stops: bool,
 }
 
 impl<T: Real> Slide<T> {
-    /// The friction over the normal force, if it is all that there may be.
+    /// The friction over the normal force, if it is at its bound.
     pub(crate) fn friction(&self, tangents: &Tangents) -> Option<[T; 2]> {
         (!self.stops).then(|| self.direction.map(|f| T::of(tangents.friction(self.contact)) * f))
     }
 
-    /// The slip over the step, if that is to be stopped.
+    /// The slip velocity over the step size, if the slip is to be stopped.
     pub(crate) fn to_stop(self, h: f64) -> [T; 2] {
         self.direction.map(|f| if self.stops { -self.speed / T::of(h) * f } else { T::zero() })
     }
 }
 
-/// Notes what would slide back at the end of a step h with the accelerations along tangential rows, if they have
-/// friction; says whether there is any that was not known.
+/// Marks slides that would reverse by the end of a step h with the accelerations along tangential rows with friction.
+/// Returns whether any mark is new.
 pub(crate) fn stop_in_time<T: Real>(
     sliding: &mut [Slide<T>],
     tangents: &Tangents,

@@ -1,5 +1,5 @@
-//! A comparison of gap rates and rows with gaps: a constraint that moves must give rates that are not zero, and one
-//! whose gaps turn must say that its rows change.
+//! Compares gap rates and rows with gaps: a moving constraint must give nonzero rates, and a constraint whose gaps
+//! turn must report that its rows change.
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::Gaps;
@@ -28,7 +28,7 @@ impl<T: Real> RateCheck<T> {
         check
     }
 
-    /// Memory for so many rows.
+    /// Reserves memory for `rows` rows.
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.before.resize(rows, T::zero());
         self.now.resize(rows, T::zero());
@@ -36,8 +36,9 @@ impl<T: Real> RateCheck<T> {
         self.silent.resize(rows, false);
     }
 
-    /// Refuses rows whose gap, at fixed displacements, changes throughout the time h from a motion on while their rates
-    /// are zero. (A jump changes a gap once only, and a wall that starts or stops has a rate at some of the times.)
+    /// Refuses rows whose gap, at fixed displacements, changes throughout the time h from a motion on while their
+    /// rates are zero. A jump changes a gap only once, and a wall that starts or stops has a rate at some of the
+    /// times.
     pub(crate) fn check(
         &mut self,
         constraints: &mut Constraints<'_, T>,
@@ -45,7 +46,7 @@ impl<T: Real> RateCheck<T> {
         h: f64,
         jacobian: &ContactJacobian<T>,
     ) -> Result<()> {
-        /// Times, in shares of h, so uneven that an oscillation does not have the same gap at all of them.
+        /// Times, in shares of h, uneven so that an oscillation does not have the same gap at all of them.
         const SHARES: [f64; 5] = [0.0, 0.19, 0.42, 0.71, 1.0];
         let count = constraints.len();
         let Self { before, now, rates, silent, .. } = self;
@@ -71,7 +72,7 @@ impl<T: Real> RateCheck<T> {
             found = silent[..count].iter().position(|silent| *silent);
         }
         if let Some(row) = found {
-            // (The gap at the start, again.)
+            // The gap at the start, again.
             constraints.finite_gaps(motion.t, &motion.u, before)?;
             first = before[row];
         }
@@ -86,15 +87,15 @@ impl<T: Real> RateCheck<T> {
         }
     }
 
-    /// Refuses rows of constraints that have said in this step that their rows do not change, along which gaps change
-    /// by something else than the rows between the displacements of the step.
+    /// Refuses rows that their constraints have reported as unchanged in this step, if the change of the gap between
+    /// the displacements of the step differs from the change along the row.
     pub(crate) fn check_rows(
         &mut self,
         constraints: &mut Constraints<'_, T>,
         [start, new]: [&Motion<T>; 2],
         jacobian: &ContactJacobian<T>,
     ) -> Result<()> {
-        /// The share of the way that a row may miss: hosts may leave out turns that do not matter.
+        /// The share of the displacement that a row may miss: hosts may omit turns that do not matter.
         const SHARE: f64 = 0.01;
         let count = constraints.len();
         if !(0..count).any(|row| constraints.is_unchanged(row, self.version)) {

@@ -1,4 +1,4 @@
-//! What a run continues from: refused if another run has left it.
+//! State and history that a run continues from, refused if they do not fit the run.
 
 use crate::error::{Error, Result, step_size};
 use crate::real::Real;
@@ -21,7 +21,7 @@ pub(crate) struct Resumed<T> {
 
 impl<T: Real> Resumed<T> {
     pub(crate) fn new(mut state: State<T>, history: History<T>) -> Self {
-        // Versions of names count within a run: those of another one mean nothing here.
+        // Versions of names count within a run: versions of another run mean nothing here.
         state.contacts.names = Names::default();
         Self {
             state,
@@ -93,7 +93,7 @@ fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_
     let slots = scheme.slots();
     let trail = history.trail.room();
     let shifted = scheme.shifts.map(|shift| shift != 0.0);
-    // Values at the time of the state are there where, and only where, the stored ones live elsewhere.
+    // Values at the time of the state are there if, and only if, the stored values belong to another time.
     let shown = state.shown.each_ref().map(|shown| !shown.is_empty());
     let moved = history.unmoved.iter().zip(shifted).any(|(unmoved, shifted)| !unmoved.is_empty() && !shifted);
     let length = trail == 0 || trail == trail_length(scheme);
