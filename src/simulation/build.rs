@@ -1,8 +1,8 @@
-//! What is put together before a run: its parts are checked against one another, and the scheme is compiled.
+//! The assembly of a run: its parts are checked against one another, and the scheme is compiled.
 //!
-//! - `builder`: every input is checked; `settings`: settings as files hold them.
-//! - `pairing`, `admitted`: which scheme, corrections, contact laws and contact solver go together.
-//! - `scheme`, `derived`: the scheme and what follows from its rows alone.
+//! - `builder`: checks every input; `settings`: settings as stored in files.
+//! - `pairing`, `admitted`: which schemes, corrections, contact laws and contact solvers are compatible.
+//! - `scheme`, `derived`: the scheme and the numbers derived from its rows.
 //! - `program`: the scheme compiled for one system and one step size.
 //! - `workspace`: the memory of the steps.
 

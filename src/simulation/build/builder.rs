@@ -173,9 +173,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Leaves contact as the scheme solves it: without correctors, the default one included.
-    /// Contact forces then spike at impact, and velocities oscillate: the trapezoidal rule may end the fall of a block
-    /// with many times its energy. For comparisons, and for studies of the schemes themselves.
+    /// Disables all correctors, the default ones included. Contact forces then spike at impact, and velocities
+    /// oscillate: the trapezoidal rule may end the fall of a block with many times its energy. For comparisons, and
+    /// for studies of the schemes themselves.
     #[must_use]
     pub fn uncorrected(mut self) -> Self {
         self.correctors.clear();
@@ -183,13 +183,15 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Adds a corrector; several act in the order given, and in place of the default ones:
-    /// [`PersistencyCorrection::with_history_projection`](crate::PersistencyCorrection::with_history_projection), where
-    /// contact is rigid, on dofs with mass, and imposed on the displacements of the state, and
-    /// [`WorkBalance`](crate::corrector::WorkBalance), where contact dofs have no mass and the scheme conserves energy.
-    /// (Contact on velocities or ahead of the state leaves nothing to correct,
-    /// compliant laws, [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] suppress oscillation by
-    /// themselves.)
+    /// Adds a corrector. Several act in the order given, and replace the default ones:
+    ///
+    /// * [`PersistencyCorrection::with_history_projection`](crate::PersistencyCorrection::with_history_projection),
+    ///   where contact is rigid, on dofs with mass, and imposed on the displacements of the state;
+    /// * [`WorkBalance`](crate::corrector::WorkBalance), where contact dofs have no mass and the scheme conserves
+    ///   energy.
+    ///
+    /// Contact on velocities or ahead of the state leaves nothing to correct. Compliant laws,
+    /// [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] suppress oscillation by themselves.
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
         self.correction = DefaultCorrection::Replaced;
@@ -197,8 +199,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Adds correctors that were chosen at run time: any number, an `Option` for instance. If there are none, contact
-    /// is left [uncorrected](Self::uncorrected).
+    /// Adds correctors chosen at run time: any number, for instance an `Option`. If there are none, contact is left
+    /// [uncorrected](Self::uncorrected).
     #[must_use]
     pub fn correctors(mut self, correctors: impl IntoIterator<Item = Box<dyn Corrector<T> + 'a>>) -> Self {
         self.correction = DefaultCorrection::Replaced;
@@ -213,7 +215,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Chooses how a multistep scheme gets its past; [`StartUp::Trapezoidal`] by default. One-step schemes need none.
+    /// Chooses how a multistep scheme computes its past; [`StartUp::Trapezoidal`] by default. One-step schemes need
+    /// none.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -247,23 +250,23 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Lets the run change its step size by itself. Without this every step has the size given, and the error of one
-    /// that fails is returned.
+    /// Lets the run control its step size. Without this every step has the size given, and the error of a failed step
+    /// is returned.
     #[must_use]
     pub fn step_control(mut self, control: StepControl) -> Self {
         self.control = Some(control);
         self
     }
 
-    /// Accumulates the works of the energy balance ([`Energy::works`](super::Energy::works)); costs a load and a
-    /// product with C a step, with supports one evaluation of f, with contacts their gaps and rates once more.
+    /// Accumulates the works of the energy balance ([`Energy::works`](super::Energy::works)). Each step costs a load
+    /// and a product with C, with supports one evaluation of f, with contacts their gaps and rates once more.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
         self.balance = EnergyBalance::On;
         self
     }
 
-    /// Says what becomes of bodies that overlap at the start; [`InitialOverclosure::Refused`] by default.
+    /// Chooses how overlaps of bodies at the start are treated; [`InitialOverclosure::Refused`] by default.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -292,22 +295,24 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the bodies are
-    /// brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the way from
-    /// there, laws of springs as they are. A load that begins with the run then does not shake it.
+    /// Starts at rest under the loads at the start time: from the displacements given (zero by default) the bodies
+    /// are brought into static balance, f(u, 0) + Gᵀ λ = 0 with 0 ≤ g ⊥ λ ≥ 0, friction in its cone against the
+    /// displacement from there, and springs by their laws. A load that is present at the start does not excite the
+    /// run then.
     ///
-    /// Bodies are what K couples. A body that has a velocity, or whose own K is not positive definite since it flies
-    /// free, keeps the displacements and velocities given: so a hammer may strike a structure under preload.
+    /// Bodies are the parts that K couples. A body that has a velocity, or whose own K is not positive definite
+    /// because it flies freely, keeps the displacements and velocities given: a hammer may strike a structure under
+    /// preload.
     ///
-    /// Newton's method, of linear systems two factorizations of K (no more than one is held at a time), one contact
-    /// problem on the rows that close. [`start_adjustment`](Simulation::start_adjustment) says how far dofs have moved.
-    /// Accelerations and contact forces follow from that state as from any other.
+    /// Newton's method solves for the balance, with two factorizations of K for linear systems (one is stored at a
+    /// time), and one contact problem on the rows that close. [`start_adjustment`](Simulation::start_adjustment)
+    /// returns how far dofs have moved. Accelerations and contact forces are computed from that state as from any
+    /// other.
     ///
-    /// Refused at [`build`](Self::build): runs in which every body has a velocity, supports included; runs in which no
-    /// body at rest has a positive definite K, as one which contact alone holds ([`Error::Singular`]); a balance that
-    /// is not found, as of nonlinear
-    /// systems far from it ([`Error::StartNotBalanced`]); systems over ranks. A run that is
-    /// [resumed](Self::resume) has started.
+    /// Refused at [`build`](Self::build): runs in which every body has a velocity, supports included; runs in which
+    /// no body at rest has a positive definite K, such as a body held by contact only ([`Error::Singular`]); a
+    /// balance that is not found, as for nonlinear systems far from it ([`Error::StartNotBalanced`]); systems over
+    /// ranks. A [resumed](Self::resume) run has started already.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -333,22 +338,21 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Takes schemes and step sizes as they are. Without this a scheme of order 0 or without zero-stability is refused,
-    /// and a step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
+    /// Disables the stability check. Without this a scheme of order 0 or without zero-stability is refused, and so is
+    /// a step beyond the stability limit of the scheme, here and in [`set_step_size`](Simulation::set_step_size).
     ///
     /// The limit is the critical Ω of the scheme ([`analysis::critical_omega`]) over the highest frequency of M⁻¹ K.
-    /// The frequency is that of [`System::highest_frequency`]; without it the upper bound by Gershgorin's circles, if
-    /// it admits the step; otherwise Lanczos' estimate, which is a lower bound. So a step that is refused is unstable,
-    /// and one that is admitted may exceed the limit by a fraction of a percent. A step at the limit itself is
-    /// admitted: waves along a uniform bar are exact there, though the shortest grows linearly in time once it is
-    /// excited.
+    /// The frequency is [`System::highest_frequency`]; without it the upper bound by Gershgorin's circles, if it
+    /// admits the step; otherwise Lanczos' estimate, which is a lower bound. So a refused step is unstable, and an
+    /// admitted step may exceed the limit by a fraction of a percent. A step at the limit itself is admitted: waves
+    /// along a uniform bar are exact there, though the shortest grows linearly in time once it is excited.
     ///
-    /// For nonlinear systems the tangent at the start counts (at the present state, for `set_step_size`). What comes
-    /// later, a system that stiffens or compliant contacts that press, is looked at in each step, which ends with
-    /// [`Error::Stiffened`] if its frequency is beyond the limit. Damping counts if the scheme takes its forces from
-    /// before the step, of bodies without stiffness too. It is then assumed that the highest mode has the strongest
-    /// damping, which is exact for Rayleigh damping and otherwise may refuse a stable step. Of a K that is not
-    /// symmetric only Gershgorin's circles count.
+    /// For nonlinear systems the tangent at the start is used (at the present state, for `set_step_size`). Systems
+    /// that stiffen later, and compliant contacts, are checked in each step, which fails with [`Error::Stiffened`] if
+    /// its frequency is beyond the limit. Damping is included if the scheme evaluates its forces before the step,
+    /// also for bodies without stiffness. The highest mode is then assumed to have the strongest damping, which is
+    /// exact for Rayleigh damping and otherwise may refuse a stable step. For an unsymmetric K only Gershgorin's
+    /// circles are used.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
         self.stability = Stability::Unchecked;
@@ -356,10 +360,9 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     /// Continues from the state and history of another run of the same system, scheme and
-    /// [step size](History::step_size), bit for bit. A run without [step control](Self::step_control) goes on with that
-    /// size at once, also where the other one had halved it.
-    /// Initial values and start time given elsewhere are ignored. (What was saved to a file goes through
-    /// `resume_from`, with the feature `serde`.)
+    /// [step size](History::step_size), bit for bit. A run without [step control](Self::step_control) continues with
+    /// that size at once, even if the other run had halved it. Initial values and start time given elsewhere are
+    /// ignored. For files use `resume_from`, with the feature `serde`.
     #[must_use]
     pub fn resume(mut self, state: State<T>, history: History<T>) -> Self {
         self.resumed = Some(Resumed::new(state, history));
@@ -376,14 +379,14 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let together = Together::new(self.system.ranks());
         let run = self.over_ranks(&together).and_then(|builder| builder.build_together(&together));
         let mut run = together.finish(run)?;
-        // (A run that controlled its step size may have left off between two steps of this one.)
+        // A run that controlled its step size may have ended between two steps of this one.
         if run.judge.is_none() {
             run.set_step_size(run.history.step_size())?;
         }
         Ok(run)
     }
 
-    /// Puts the ranks, if there are any, between the run and the parts of the host that they are spread over.
+    /// Wraps the parts of the host that are spread over ranks, if there are any.
     fn over_ranks(self, together: &Together<T>) -> Result<Self> {
         let Some(ranks) = self.system.ranks() else { return Ok(self) };
         together.agree(check_system(&*self.system).and_then(|dofs| check_owned(&*ranks, dofs)))?;
@@ -498,7 +501,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 }
 
-/// Initial displacements and velocities as they were given, or zero; those of their owners on ranks.
+/// Initial displacements and velocities as given, or zero; on ranks the values of their owners.
 fn initial_motion<T: Real>(together: &Together<T>, given: [Option<Vec<T>>; 2], dofs: usize) -> Result<[Vec<T>; 2]> {
     let names = ["the initial displacement", "the initial velocity"];
     let mut motion = given.map(|values| values.unwrap_or_else(|| vec![T::zero(); dofs]));
@@ -508,7 +511,7 @@ fn initial_motion<T: Real>(together: &Together<T>, given: [Option<Vec<T>>; 2], d
     Ok(motion)
 }
 
-/// Finds the rows of the state that a run goes on from, and checks that they fit.
+/// Finds the rows of the state that a run continues from, and checks that they fit.
 fn take_up<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &mut ContactJacobian<T>,
@@ -521,13 +524,13 @@ fn take_up<T: Real>(
     if let Some(overclosures) = &history.overclosures {
         constraints.adjust(overclosures.clone());
     }
-    // (A past that is resampled at once is projected onto gaps as the last step has measured them.)
+    // A past that is resampled at once is projected onto gaps as the last step has measured them.
     constraints.keep_depths(&state.motion, 0.0)?;
     RateCheck::new(constraints.len()).check(constraints, &state.motion, h, g)
 }
 
-/// What is known of the largest stable step. A run that goes on from a state whose tangent the host does not admit had
-/// none there either: explicit steps read none.
+/// The largest step known to be stable. If the host does not admit the tangent of a resumed state, the step size is
+/// accepted: explicit steps read no tangent.
 fn step_limit<T: Real>(
     (system, together): (&mut dyn System<T>, &Together<T>),
     scheme: &Scheme<'_>,
@@ -543,7 +546,7 @@ fn step_limit<T: Real>(
     }
 }
 
-/// The free dofs without mass. Over ranks, none of which has all of their stiffness, they are refused.
+/// The free dofs without mass. They are refused over ranks, none of which has all of their stiffness.
 fn massless_dofs<T: Real>(system: &dyn System<T>, together: &Together<T>) -> Result<Vec<usize>> {
     let mut massless = mass::massless(system.mass(), system.prescribed());
     massless.retain(|&dof| together.owns(dof));

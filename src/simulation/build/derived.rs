@@ -1,5 +1,5 @@
-//! What follows from the rows of a scheme alone, remembered from one run to the next: it takes longer than ten steps of
-//! a small system, and a study of a thousand runs has one scheme.
+//! Numbers derived from the rows of a scheme, and cached from one run to the next: deriving them takes longer than
+//! ten steps of a small system, and a study of a thousand runs has one scheme.
 
 use crate::analysis::{self, Order, ZeroStability};
 use crate::integrator::{Newmark, TimeIntegrator};
@@ -15,13 +15,13 @@ pub(crate) struct Derived {
     pub(crate) radius_at_infinity: Option<f64>,
     /// The one-step scheme of the first steps.
     pub(crate) starter: Tableau,
-    /// The momentum covector for 1, 2, … known states; the last is that of the scheme itself.
+    /// The momentum covector for 1, 2, … known states; the last one belongs to the scheme itself.
     pub(crate) covectors: Vec<Vec<[f64; 3]>>,
     critical: OnceLock<Option<f64>>,
 }
 
 impl Derived {
-    /// Of a tableau that was checked. The last one of the thread is remembered with its tableau.
+    /// From a checked tableau. The last result of the thread is cached with its tableau.
     pub(crate) fn of(tableau: &Tableau) -> Arc<Self> {
         thread_local! {
             static LAST: RefCell<Option<(Tableau, Arc<Derived>)>> = const { RefCell::new(None) };
@@ -48,7 +48,7 @@ impl Derived {
         }
     }
 
-    /// The critical Ω of the tableau without damping, found when it is first asked for.
+    /// The critical Ω of the tableau without damping, computed at the first call.
     pub(crate) fn critical(&self, tableau: &Tableau) -> Option<f64> {
         *self.critical.get_or_init(|| analysis::critical_omega(tableau, 0.0))
     }

@@ -1,5 +1,5 @@
-//! Whether the parts of a run go together: the scheme with dofs without mass, with corrections, damping and
-//! paths, with an estimate of the local error.
+//! Whether the parts of a run are compatible: the scheme with dofs without mass, with corrections, damping and paths,
+//! and with an estimate of the local error.
 
 use crate::analysis::{self, LocalError};
 use crate::corrector::{Corrector, PersistencyCorrection, Requirements, WorkBalance};
@@ -12,8 +12,8 @@ use crate::state::Motion;
 use crate::system::System;
 use crate::tableau::{ContactLevel, Tableau};
 
-/// Refuses dofs without mass where the scheme leaves their displacement undetermined, or its errors alive. Says whether
-/// they follow statically before the other dofs move.
+/// Refuses dofs without mass if the scheme leaves their displacement undetermined, or its errors undamped. Returns
+/// whether they follow statically before the other dofs move.
 pub(crate) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
     let Some(dof) = dof else { return Ok(false) };
     let reason = match analysis::massless_factor(&scheme.tableau) {
@@ -31,7 +31,7 @@ pub(crate) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result
     Err(Error::Incompatible { part: format!("{} with dof {dof} without mass", scheme.integrator.name()), reason })
 }
 
-/// Refuses corrections of contact that is not imposed on the displacements of the state, and those that cannot act.
+/// Refuses corrections of contact that is not imposed on the displacements of the state, and ineffective corrections.
 pub(crate) fn check_corrections<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
@@ -65,7 +65,7 @@ pub(crate) fn check_corrections<T: Real>(
     Ok(())
 }
 
-/// What the local error of a scheme follows from; refused where contact would not show in it.
+/// The numbers that estimate the local error of a scheme; refused if the estimate would not contain contact.
 pub(crate) fn local_error(scheme: &Scheme<'_>, may_press: bool) -> Result<LocalError> {
     let ahead = scheme.tableau.stages.iter().any(|stage| stage.contact.lead() > 0.0);
     let refuse = |reason| {
@@ -94,7 +94,7 @@ pub(crate) fn check_path<T: Real>(system: &mut dyn System<T>, scheme: &Scheme<'_
     }
 }
 
-/// Refuses schemes that damping, taken from the start of the step, makes unstable however small the step.
+/// Refuses schemes that evaluate damping at the start of the step and are then unstable at every step size.
 pub(crate) fn check_lagged_damping<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
@@ -112,7 +112,7 @@ pub(crate) fn check_lagged_damping<T: Real>(
     Ok(())
 }
 
-/// The correctors of a run that names none: of jumps, and of contacts without mass, where each has something to do.
+/// The correctors of a run that chooses none: for jumps, and for contacts without mass, where there are any.
 pub(crate) fn default_corrections<'a, T: Real>(
     tableau: &Tableau,
     constraints: &Constraints<'_, T>,
@@ -128,8 +128,8 @@ pub(crate) fn default_corrections<'a, T: Real>(
     correctors
 }
 
-/// Whether the correction of jumps has something to do: contact on displacements of the state, of a rigid law (or not
-/// known yet), on dofs with mass.
+/// Whether there may be jumps to correct: contact on displacements of the state, by a rigid law (or not known yet),
+/// on dofs with mass.
 fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let has_mass = |dof: &usize| massless.binary_search(dof).is_err();
     tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION)
@@ -140,7 +140,7 @@ fn is_correctable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, 
 }
 
 /// Whether the work of contacts without mass is balanced by default: contact dofs have none, and the scheme conserves
-/// energy but for the steps in which contacts close or open.
+/// energy except in steps in which contacts close or open.
 fn is_balanceable<T: Real>(tableau: &Tableau, constraints: &Constraints<'_, T>, massless: &[usize]) -> bool {
     let has_none = |dof: &usize| massless.binary_search(dof).is_ok();
     constraints.may_press() && constraints.interface().iter().any(has_none) && analysis::steps_by_means(tableau)

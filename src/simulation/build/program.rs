@@ -1,4 +1,4 @@
-//! A tableau compiled for one system and one step size: scaled coefficients, and which operator each stage solves with.
+//! A tableau compiled for one system and one step size: scaled coefficients, and the operator of each stage.
 
 use crate::error::Result;
 use crate::linear_solver::LinearSolver;
@@ -32,15 +32,15 @@ impl<T> Term<T> {
 #[derive(Debug)]
 pub(crate) struct ScaledRow<T> {
     terms: Vec<Term<T>>,
-    /// The first of them that are not differences.
+    /// The number of terms that are not differences; they come first.
     plain: usize,
     pub(crate) weight: T,
 }
 
-/// The most terms a row can have.
+/// Maximum number of terms of a row.
 const TERMS: usize = 3 * MAX_PAST;
 
-/// Dofs a block: the vectors of a block stay in the first-level cache.
+/// Number of dofs per block: the vectors of a block stay in the first-level cache.
 const BLOCK: usize = 1024;
 
 impl<T: Real> ScaledRow<T> {
@@ -84,7 +84,7 @@ impl<T: Real> ScaledRow<T> {
         T::combine(plain, differences, &newest.u[block.clone()], out);
     }
 
-    /// The part that comes from the past, if any does, at a dof.
+    /// The part that comes from the past at a dof, if there is any.
     pub(crate) fn past_at(&self, past: &[Motion<T>], dof: usize) -> Option<T> {
         let newest = past.first().filter(|_| !self.terms.is_empty())?;
         let term = |term: &Term<T>| {
@@ -125,12 +125,12 @@ impl<T: Real> ScaledRows<T> {
         [0, 1, 2].map(|field| self.0[field].weight)
     }
 
-    /// Whether the past has a part in u, v or a.
+    /// Whether u, v or a depends on the past.
     pub(crate) fn reads_past(&self, field: usize) -> bool {
         !self.0[field].terms.is_empty()
     }
 
-    /// Whether u, v or a is made of differences of displacements.
+    /// Whether u, v or a contains differences of displacements.
     pub(crate) fn subtracts(&self, field: usize) -> bool {
         self.0[field].terms.iter().any(Term::is_difference)
     }
@@ -153,14 +153,14 @@ impl<T: Real> ScaledRows<T> {
     }
 }
 
-/// What contact constrains, where it is not the displacement of the stage's own state.
+/// The quantity that contact constrains, if it is not the displacement of the stage's own state.
 #[derive(Debug)]
 pub(crate) struct ContactTarget<T> {
-    /// Displacements ahead of the state, or h times a velocity: lengths both.
+    /// Displacements ahead of the state, or h times a velocity: both are lengths.
     pub(crate) row: ScaledRow<T>,
-    /// The fraction of the step at which the target lives.
+    /// The fraction of the step at which the target is evaluated.
     pub(crate) at: f64,
-    /// At velocity level: displacements of the forecast, and the fraction of the step at which they live.
+    /// At velocity level: displacements of the forecast, and their fraction of the step.
     pub(crate) forecast: Option<(ScaledRow<T>, f64)>,
 }
 
@@ -178,7 +178,8 @@ impl<T: Real> ContactTarget<T> {
     }
 }
 
-/// The way from the state of a stage to where contact is imposed, or from where the stage starts to its state.
+/// The displacement from the state of a stage to where contact is imposed, or from the start of the stage to its
+/// state.
 fn way<T: Real>(stage: &Stage, h: f64) -> ScaledRow<T> {
     let increment = stage.increment();
     ScaledRow::new(
@@ -195,31 +196,32 @@ fn way<T: Real>(stage: &Stage, h: f64) -> ScaledRow<T> {
 #[derive(Debug)]
 pub(crate) struct CompiledStage<T> {
     pub(crate) recovery: ScaledRows<T>,
-    /// Only where the balance does not hold at the recovered state.
+    /// Only if the balance does not hold at the recovered state.
     pub(crate) balance: Option<ScaledRows<T>>,
-    /// Only where contact is not imposed on the displacements of the stage's own state.
+    /// Only if contact is not imposed on the displacements of the stage's own state.
     pub(crate) contact: Option<ContactTarget<T>>,
-    /// The way along which contact with friction slides, where that is no velocity: to where contact is imposed ahead
-    /// of the state, or in the stage.
+    /// The displacement that friction uses as slip if the slip is no velocity: to where contact is imposed ahead of
+    /// the state, or in the stage.
     pub(crate) way: ScaledRow<T>,
     pub(crate) load: f64,
     /// The fractions of the step at which the stage starts and ends.
     pub(crate) start: f64,
     pub(crate) end: f64,
-    /// Whether the force is that of the path over the stage.
+    /// Whether the force is evaluated along the path over the stage.
     pub(crate) along_path: bool,
     pub(crate) operator: usize,
     /// Pure z-weights of the acceleration rows, recovery and balance.
     pub(crate) acceleration: f64,
     pub(crate) balance_acceleration: f64,
-    /// What a multiplier changes, [`Stage::response`]: with the covector it gives the impulse weight.
+    /// The response to a multiplier, [`Stage::response`]: with the covector it gives the impulse weight.
     pub(crate) response: [f64; 3],
     /// Momentum covector after the stage.
     pub(crate) covector: Vec<[f64; 3]>,
     pub(crate) read: Vec<[bool; 3]>,
-    /// Whether the next stage starts from a.
+    /// Whether the next stage reads a.
     pub(crate) reads_acceleration: bool,
-    /// Whether the balance holds at the state, no row of a velocity reads an acceleration, and none the step before.
+    /// Whether the balance holds at the state, no velocity row reads an acceleration, and no row reads the step
+    /// before.
     pub(crate) keeps_balance: bool,
 }
 
@@ -247,7 +249,7 @@ impl<T: Real> CompiledStage<T> {
         }
     }
 
-    /// The rows at which the balance holds.
+    /// The rows of the motion at which the balance holds.
     pub(crate) fn balanced(&self) -> &ScaledRows<T> {
         self.balance.as_ref().unwrap_or(&self.recovery)
     }
@@ -261,7 +263,7 @@ pub(crate) struct Program<T> {
 }
 
 impl<T: Real> Program<T> {
-    /// Recompiles the same stages for another step size; after an error the program is as it was. Matrices that vary
+    /// Recompiles the same stages for another step size. After an error the program is unchanged. Matrices that vary
     /// are left to the iterations of the step.
     pub(crate) fn set_step_size(
         &mut self,
@@ -276,8 +278,8 @@ impl<T: Real> Program<T> {
                 continue;
             }
             if let Err(error) = self.operators[i].factorize(system, h, at) {
-                // They could be factorized for the old size before. If the host's tangent fails now, the first error is
-                // the one that is returned.
+                // They were factorized for the old size before. If the host's tangent fails now, the first error is
+                // returned.
                 let mut constant = self.operators[..=i].iter_mut().filter(|operator| !operator.varies());
                 constant.try_for_each(|operator| operator.factorize(system, old, at)).ok();
                 return Err(error);
@@ -294,16 +296,16 @@ impl<T: Real> Program<T> {
     }
 }
 
-/// What a program is compiled for.
+/// The data for which a program is compiled.
 pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) system: &'c mut dyn System<T>,
     pub(crate) solver: &'c dyn LinearSolver<T>,
     pub(crate) h: f64,
-    /// Where tangents are first taken.
+    /// Where tangents are first evaluated.
     pub(crate) at: At<'c, T>,
     /// The free dofs that contact may ever act on.
     pub(crate) interface: &'c [usize],
-    /// What responses of a matrix that stays are kept for.
+    /// The unit of responses of a constant matrix.
     pub(crate) unit: Unit,
 }
 
@@ -315,7 +317,7 @@ impl<T: Real> Compiler<'_, T> {
         self.stages(tableau, books)
     }
 
-    /// Compiles the one-step scheme `start` whose first steps make the past of the multistep scheme `reader`. Its
+    /// Compiles the one-step scheme `start` whose first steps compute the past of the multistep scheme `reader`. Its
     /// momentum covectors change from step to step and are not part of the program.
     pub(crate) fn start(&mut self, start: &Tableau, reader: &Tableau) -> Result<Program<T>> {
         self.stages(start, |_| Ok((Vec::new(), reader.reads_after(reader.stages.len() - 1))))
@@ -347,7 +349,7 @@ impl<T: Real> Compiler<'_, T> {
             let (covector, read) = books(s)?;
             let own = tableau.reads_after(s);
             let reads_a = |read: &[[bool; 3]]| read.iter().any(|[.., a]| *a);
-            // (What a multistep scheme that reads a starts with is corrected as its own steps are.)
+            // The first steps of a multistep scheme that reads a are corrected as its own steps are.
             let is_own = own.len() == read.len() || !reads_a(&read[..]);
             let keeps_balance = is_own && by_velocities && stage.is_collocated();
             program.stages.push(CompiledStage {
@@ -378,7 +380,7 @@ mod tests {
     use super::*;
     use crate::integrator::{CdLagrange, Composite, Houbolt, TchamwaWielgosz, TimeIntegrator};
 
-    /// What is predicted for some dofs is what is predicted for all of them, bit for bit.
+    /// Predictions for some dofs equal the predictions for all of them, bit for bit.
     #[test]
     fn predictions_on_the_interface_are_those_of_all_dofs() {
         let motion = |state: usize| {

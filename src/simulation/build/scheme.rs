@@ -1,4 +1,4 @@
-//! The scheme of a run, and what follows from its rows besides the compiled program.
+//! The scheme of a run, and quantities derived from its rows besides the compiled program.
 
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
@@ -7,7 +7,7 @@ use crate::state::Motion;
 use crate::tableau::{StartUp, Tableau};
 use std::sync::Arc;
 
-/// Dofs a block: the values of a block are still in the first-level cache when they are checked.
+/// Number of dofs per block: the values of a block are still in the first-level cache when they are checked.
 const BLOCK: usize = 1024;
 
 /// An integrator, its tableau, and the numbers derived from it once.
@@ -17,7 +17,7 @@ pub(crate) struct Scheme<'a> {
     pub(crate) tableau: Tableau,
     /// Number of states a step reads, the current one included.
     pub(crate) depth: usize,
-    /// Times of the stored v and a, in steps from that of the state.
+    /// Times of the stored v and a relative to the time of the state, in steps.
     pub(crate) shifts: [f64; 2],
     pub(crate) start_up: StartUp,
     pub(crate) derived: Arc<Derived>,
@@ -32,9 +32,9 @@ impl<'a> Scheme<'a> {
         Self { integrator, tableau, depth, shifts, start_up, derived }
     }
 
-    /// Number of motions in a history: the states that are read, and one for each stage to write. Where stored v and a
-    /// are those of another time, a change of the step size reads the state before the present one, though the steps of
-    /// a one-step scheme do not: a step that is undone must not have written there.
+    /// Number of motions in a history: the states that are read, and one for each stage to write. If v and a are
+    /// stored at another time, a change of the step size reads the state before the present one, though the steps of
+    /// a one-step scheme do not: an undone step must not have written there.
     pub(crate) fn slots(&self) -> usize {
         let is_shifted = self.shifts.iter().any(|shift| shift.abs() > 0.0);
         self.depth.max(if is_shifted { 2 } else { 1 }) + self.tableau.stages.len()
@@ -59,14 +59,14 @@ impl<'a> Scheme<'a> {
         sum
     }
 
-    /// Memory for v and a at the time of a state: empty where the stored ones live there.
+    /// Memory for v and a at the time of a state: empty if they are stored at that time.
     pub(crate) fn shown<T: Real>(&self, motion: &Motion<T>) -> [Vec<T>; 2] {
         let of = |field: usize| if self.shifts[field - 1] == 0.0 { Vec::new() } else { motion.field(field).to_vec() };
         [of(1), of(2)]
     }
 
-    /// Extrapolates stored v and a to the time of the state; without a `past` state to extrapolate from they are
-    /// copied. Prescribed motions are given at the time of the state. Says whether all that was extrapolated is finite.
+    /// Extrapolates stored v and a to the time of the state; without a `past` state they are copied. Prescribed
+    /// motions are given at the time of the state. Returns whether all extrapolated values are finite.
     pub(crate) fn show<T: Real>(
         &self,
         new: &Motion<T>,

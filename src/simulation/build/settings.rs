@@ -1,4 +1,4 @@
-//! Settings as files hold them, under the names of the methods that choose them; what is read goes through those.
+//! Settings as stored in files, under the names of the methods that choose them; reading calls these methods.
 
 use crate::simulation::stage::newton::{Newton, TangentUpdate};
 use crate::simulation::step::judge::StepControl;
@@ -42,7 +42,7 @@ struct NewtonRecord {
     iterations: usize,
 }
 
-/// Which of the methods begins the settings.
+/// The method that creates the settings.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum TangentRecord {

@@ -1,5 +1,5 @@
-//! Memory of the steps: nothing in it changes a result, and nothing is allocated after it but for more
-//! contacts than there have ever been.
+//! Memory of the steps: nothing in it changes a result. Later allocations are only for more contacts than ever
+//! before.
 
 use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
@@ -33,15 +33,15 @@ pub(crate) struct Workspace<T: Real> {
     pub(crate) massless: Vec<usize>,
     /// For explicit schemes, if there are dofs without mass.
     pub(crate) block: Option<MasslessBlock<T>>,
-    /// For implicit schemes, if the work of contacts on such dofs is balanced.
+    /// For implicit schemes, if the work of contacts on dofs without mass is balanced.
     pub(crate) excess: Option<Box<ExcessForces<T>>>,
     pub(crate) correction: CorrectionWork<T>,
     pub(crate) rate_check: RateCheck<T>,
-    /// For schemes that are stable up to some frequency, which may be met in the run.
+    /// For schemes with a stability limit that may be reached in the run.
     pub(crate) stiffening: Option<Stiffening<T>>,
-    /// The number of contacts that there is memory for.
+    /// Number of contacts to reserve memory for.
     pub(crate) rows: usize,
-    /// v and a at the time of the new state, where the scheme stores those of another time.
+    /// v and a at the time of the new state, if the scheme stores them at another time.
     pub(crate) shown: [Vec<T>; 2],
     pub(crate) backup: Backup<T>,
 }
@@ -58,9 +58,9 @@ pub(crate) struct CorrectionWork<T: Real> {
     pub(crate) energy: T,
 }
 
-/// How much contact there is when memory is reserved.
+/// The amount of contact to reserve memory for.
 pub(crate) struct ContactSize {
-    /// Rows that there is to be memory for, and weights of all of them.
+    /// Number of rows to reserve memory for, and number of weights of all rows.
     pub(crate) rows: usize,
     pub(crate) entries: usize,
     /// Dofs that contact may ever act on.
@@ -71,7 +71,7 @@ pub(crate) struct ContactSize {
 }
 
 impl ContactSize {
-    /// That of the constraints, with room for so many rows.
+    /// Sizes of the constraints, with memory for `rows` rows.
     pub(crate) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
         let (entries, interface) = (g.entries(), constraints.interface().len());
         Self { rows, entries, interface, may_press: constraints.may_press(), curved: !constraints.is_affine() }
@@ -79,7 +79,7 @@ impl ContactSize {
 }
 
 impl<T: Real> Workspace<T> {
-    /// Memory for the steps of a program, with a history of so many `slots`.
+    /// Memory for the steps of a program, with a history of `slots` motions.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
@@ -140,7 +140,7 @@ impl<T: Real> Workspace<T> {
         }
     }
 
-    /// Keeps the free dofs without mass, and what they take: `follower` is the name of the scheme if they follow
+    /// Stores the free dofs without mass, and the data for them: `follower` is the name of the scheme if they follow
     /// statically before the others move.
     pub(crate) fn keep_massless(
         &mut self,
@@ -160,7 +160,7 @@ impl<T: Real> Workspace<T> {
         if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
             let damps = match system.linearity() {
                 Linearity::Linear => is_damped(system, &massless),
-                // (Forces that are not linear may act on them later.)
+                // Nonlinear forces may damp them later.
                 Linearity::Nonlinear => Ok(!massless.is_empty()),
             };
             let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
@@ -171,7 +171,7 @@ impl<T: Real> Workspace<T> {
         Ok(())
     }
 
-    /// Memory for so many contacts, of so many weights in all.
+    /// Reserves memory for `rows` contacts with `entries` weights in all.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.rows = rows;
         self.contact.rows.make_room(rows, entries);
