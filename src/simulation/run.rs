@@ -1,6 +1,6 @@
-//! A run: its parts, what is read of it, and how it is put back after a failed step.
+//! A run: its parts, its results, and its restoration after a failed step.
 //!
-//! - `advance`: a run goes on, until a time.
+//! - `advance`: steps of a run, up to a time.
 //! - `results`: work counts, energies, and why a run ended.
 //! - `contact_output`, `impulses`: forces and impulses of contact for the caller.
 
@@ -115,12 +115,13 @@ impl<T: Real> Simulation<'_, T> {
         &self.statistics
     }
 
-    /// How dofs without mass were moved when the simulation was built, because they were not in static balance with the
-    /// others, the load and contact. (They would have jumped in the first step, and the energy balance would not have
-    /// shown what this costs.) Of a run that [starts at rest](crate::SimulationBuilder::start_at_rest) all dofs count.
+    /// How dofs without mass were moved when the simulation was built, because they were not in static balance with
+    /// the others, the load and contact. Otherwise they would have jumped in the first step, at a cost that the
+    /// energy balance does not contain. If the run [starts at rest](crate::SimulationBuilder::start_at_rest) all dofs
+    /// count.
     ///
-    /// It also stores the [impact](crate::StartImpact) that stopped the slip of a contact which friction jammed at the
-    /// start. None if nothing was moved, and no velocity changed.
+    /// It also stores the [impact](crate::StartImpact) that stopped the slip of a contact which friction jammed at
+    /// the start. None if nothing was moved, and no velocity changed.
     pub fn start_adjustment(&self) -> Option<StartAdjustment<T>> {
         self.adjustment
     }
@@ -135,9 +136,9 @@ impl<T: Real> Simulation<'_, T> {
         &*self.system
     }
 
-    /// A contact constraint, by its place in the order in which they were given: the first number of a
-    /// [`ContactId`](crate::contact::ContactId). (A host that wants to read its own constraint as what it is keeps it,
-    /// and gives a wrapper that shares it.)
+    /// A contact constraint, by its index in the order in which they were given: the first number of a
+    /// [`ContactId`](crate::contact::ContactId). A host that needs the type of its own constraint keeps it, and
+    /// passes a wrapper that shares it.
     pub fn constraint(&self, constraint: usize) -> Option<&dyn ContactConstraint<T>> {
         self.constraints.part(constraint)
     }
@@ -163,10 +164,10 @@ impl<T: Real> Simulation<'_, T> {
     /// Momentum along a direction (one entry a dof, for instance 1 on all x displacements) in the form that the scheme
     /// conserves: its change over a step is the sum of the impulses, to rounding.
     ///
-    /// That is the momentum of the velocities v + p h a, up to O(h²), with a p of the scheme: 0 for the trapezoidal rule,
-    /// ½ for central differences, whose conserved velocities live half a step ahead. Where a force F acts, that of a
-    /// contact too, the value therefore depends on h: [`set_step_size`](Self::set_step_size) from h to h' changes it by
-    /// p (h' − h) F, and the state not at all.
+    /// This is the momentum of the velocities v + p h a, up to O(h²), with a p of the scheme: 0 for the trapezoidal
+    /// rule, ½ for central differences, whose conserved velocities are half a step ahead. Under a force F, contact
+    /// included, the value therefore depends on h: [`set_step_size`](Self::set_step_size) from h to h' changes it by
+    /// p (h' − h) F, but does not change the state.
     ///
     /// # Errors
     ///
@@ -184,16 +185,16 @@ impl<T: Real> Simulation<'_, T> {
         self.together.dot(&product, direction)
     }
 
-    /// Refuses to go on after a panic of the host.
+    /// Refuses calls after a panic of the host.
     pub(crate) fn check_sound(&self) -> Result<()> {
         if self.poisoned { Err(Error::Poisoned) } else { Ok(()) }
     }
 
-    /// Runs a call that changes the run and calls the host. If the host panics, state and history are put back before
-    /// the panic goes on, and later calls are refused.
+    /// Runs a call that changes the run and calls the host. If the host panics, state and history are restored before
+    /// the panic continues, and later calls are refused.
     pub(crate) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
         self.check_sound()?;
-        // Unwind safe: state and history are put back below, and nothing else can be used after a panic.
+        // Unwind safe: state and history are restored below, and nothing else can be used after a panic.
         match catch_unwind(AssertUnwindSafe(|| call(self))) {
             Ok(result) => result,
             Err(panic) => {
@@ -208,7 +209,7 @@ impl<T: Real> Simulation<'_, T> {
         }
     }
 
-    /// Puts state and history back to what they were when the attempt of a step began.
+    /// Restores state and history as they were when the attempt of a step began.
     pub(crate) fn put_back(&mut self) {
         let Self { state, history, work, .. } = self;
         work.backup.undo(&mut history.slots);
@@ -216,10 +217,10 @@ impl<T: Real> Simulation<'_, T> {
         work.backup.underway = false;
     }
 
-    /// Kinetic and elastic energy of the state, and the balance if the builder asked for it.
+    /// Kinetic and elastic energy of the state, and the balance if the builder requested it.
     ///
-    /// Takes `&mut self`, as [`reactions`](Self::reactions) does, because the host evaluates its energy and its forces
-    /// with memory of its own ([`System::potential_energy`], [`System::force`]). Nothing of the run changes.
+    /// Takes `&mut self`, as [`reactions`](Self::reactions) does, because the host evaluates its energy and its
+    /// forces with memory of its own ([`System::potential_energy`], [`System::force`]). The run does not change.
     pub fn energy(&mut self) -> Energy<T> {
         energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_deref())
     }
@@ -228,7 +229,7 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// The host's own.
+    /// Errors of the host.
     pub fn reactions(&mut self) -> Result<Vec<T>> {
         self.check_sound()?;
         let reactions = energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g));

@@ -1,8 +1,8 @@
-//! One step of the present size: stages, corrections, acceptance; a failed step leaves everything as it was.
+//! One step of the present size: stages, corrections, acceptance; a failed step leaves everything unchanged.
 //!
 //! - `jumps`: contacts that close or open, and friction that changes.
 //! - `finite`: the check before a state is accepted.
-//! - `judge`: whether a step is fine enough; `control`: a refused step is taken again.
+//! - `judge`: whether a step is fine enough; `control`: repeats refused steps.
 //! - `resample`: changes of the step size, and restarts.
 
 pub(super) mod control;
@@ -40,7 +40,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
     pub(crate) fn attempt(&mut self) -> Result<Verdict> {
         match self.attempt_together() {
-            // (All ranks have agreed on it before the host's history moved.)
+            // All ranks have agreed on it before the host's history moved.
             Ok(verdict) => Ok(verdict),
             failed => self.together.finish(failed),
         }
@@ -88,17 +88,17 @@ impl<T: Real> Simulation<'_, T> {
         result
     }
 
-    /// Undoes what an attempt has done to state, history and rows.
+    /// Undoes the changes of an attempt to state, history and rows.
     fn undo(&mut self) {
         self.put_back();
         let Self { constraints, g, state, history, scheme, .. } = self;
-        // Rows may have followed the failed step: back to the state. (A past that is resampled for half of the step is
-        // projected onto gaps as the step has measured them.) An error of this search is not lost, for the next step
-        // begins with the same search.
+        // Rows may have followed the failed step: this moves them back to the state. A past that is resampled for
+        // half of the step is projected onto gaps as the step has measured them. An error of this search is not lost,
+        // for the next step begins with the same search.
         constraints.search_for_step(&state.motion, extent(scheme.ahead(), history), g).ok();
     }
 
-    /// Refuses a step that has become too long for what presses, or for a system that has stiffened.
+    /// Refuses a step that has become too long for active contacts, or for a system that has stiffened.
     fn check_stability(&mut self) -> Result<()> {
         let Self { system, constraints, g, history, work, scheme, limit, .. } = self;
         let (Some(stiffening), [new, past @ ..]) = (&mut work.stiffening, &history.slots[..]) else { return Ok(()) };
@@ -115,15 +115,15 @@ impl<T: Real> Simulation<'_, T> {
         })
     }
 
-    /// Lets the constraints inspect the motion in slot 0 of the history. When a contact has closed, and every so many
-    /// steps, gap rates are compared with the gaps.
+    /// Lets the constraints inspect the motion in slot 0 of the history. When a contact has closed, and at regular
+    /// intervals of steps, gap rates are compared with the gaps.
     fn inspect(&mut self) -> Result<()> {
         const EVERY: u64 = 64;
         let Self { constraints, g, history, work, program, startup, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
         let ahead = startup.as_ref().unwrap_or(program).stages.last().and_then(|stage| stage.contact.as_ref());
         note_slips_of_state((constraints, g), new, ahead, &mut work.contact)?;
-        // (Where correctors have edited the start of the step, it is the edited one.)
+        // If correctors have edited the start of the step, it is the edited one.
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
         if history.clock.steps % EVERY == 0 || closed[0].iter().zip(closed[1]).any(|(was, is)| *is && !was) {
@@ -133,8 +133,8 @@ impl<T: Real> Simulation<'_, T> {
         constraints.inspect([start, new], closed)
     }
 
-    /// Makes the motion in slot 0 of the history the state. After an error, or the verdict that the step is too coarse,
-    /// the caller undoes the step.
+    /// Makes the motion in slot 0 of the history the state. After an error, or if the step is too coarse, the caller
+    /// undoes the step.
     fn accept(&mut self) -> Result<Verdict> {
         let Self { system, constraints, g, correctors, state, history, work, statistics, .. } = self;
         let Self { ledger, scheme, judge, together, .. } = self;
@@ -142,7 +142,7 @@ impl<T: Real> Simulation<'_, T> {
         let flags = work.contact.trial.closed.iter().zip(&work.contact.closed_at_start);
         let changes = flags.filter(|(now, before)| now != before).count();
         let [new, past @ ..] = &history.slots[..] else { return Ok(Verdict::Accepted) };
-        // (What a bond has let go at the end of the last step is open in this one.)
+        // A bond that broke at the end of the last step is open in this one.
         let broken = state.broken_at(past[stages - 1].t).len();
         let ends = [work.backup.start(past), new];
         let jumps = broken > 0 || jumps(constraints, g, ends, history.clock.h, &work.contact);
@@ -152,11 +152,11 @@ impl<T: Real> Simulation<'_, T> {
         let from = (!jumps).then(|| &past[stages - 1]);
         let finite = scheme.show(new, from, &work.vectors.supports.dofs, &mut work.shown);
         let step = (history.clock.at(0.0), history.clock.h);
-        // Recovery has checked what it wrote. Still to be checked are dofs whose velocity is differenced, and what
-        // corrections have edited.
+        // Recovery has checked its results. Dofs whose velocity is differenced, and edits of corrections, are still
+        // to be checked.
         let touched = work.correction.buffers.has_touched() && work.correction.projection.is_some();
         let spreads = work.correction.buffers.spreads() || matches!(system.mass(), Mass::Consistent(_));
-        // (Of a large interface all dofs are checked sooner than those of it, eight to a line of memory.)
+        // For a large interface, checking all dofs is faster than checking its dofs: a cache line holds eight.
         let interface = if constraints.len() > 0 { constraints.interface() } else { &[] };
         let extent = match work.newton.is_some() || touched && spreads || 8 * interface.len() > new.u.len() {
             true => Extent::All,
@@ -207,7 +207,7 @@ impl<T: Real> Simulation<'_, T> {
         if let Some(ledger) = ledger {
             ledger.end();
         }
-        // The states of the stages before the last drop out of the past.
+        // The states of the stages before the last are dropped from the past.
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
@@ -245,7 +245,7 @@ impl<T: Real> Simulation<'_, T> {
     fn stages(&mut self) -> Result<()> {
         let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, together, .. } = self;
         let (program, start_covector) = match &mut self.startup {
-            // After the step one state more is known than now.
+            // After the step one more state is known than now.
             Some(startup) => (startup, Some(&self.scheme.derived.covectors[history.known])),
             None => (&mut self.program, None),
         };
@@ -342,13 +342,13 @@ impl<T: Real> Simulation<'_, T> {
     }
 }
 
-/// How far ahead a step looks, and its share of a whole one.
+/// How far ahead a step looks, and its share of a whole step.
 fn extent<T: Real>(ahead: f64, history: &History<T>) -> (f64, f64) {
     let (h, whole) = (history.clock.h, history.pace.nominal.max(history.made_with));
     (ahead * h, (h / whole).min(1.0))
 }
 
-/// Tells the corrections that a stage begins, and lets those act on its predicted motion that do.
+/// Begins the corrections of a stage; correctors with a prediction act on its predicted motion.
 fn begin_corrections<T: Real>(
     work: &mut Workspace<T>,
     correctors: &[Box<dyn Corrector<T> + '_>],
@@ -385,7 +385,7 @@ fn begin_corrections<T: Real>(
     correctors.iter().try_for_each(|corrector| corrector.predict(&mut prediction))
 }
 
-/// Makes a projection forget rows of another version.
+/// Resets a projection made for rows of another version.
 fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version: u64) {
     if *known != version {
         *known = version;
@@ -393,7 +393,7 @@ fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version
     }
 }
 
-/// By how much the displacements of the balance move where those of the state do, with the unknown.
+/// The displacement of the balance per displacement of the state, as functions of the unknown.
 fn balance_share<T: Real>(stage: &CompiledStage<T>) -> T {
     let [state, balance] = [stage.recovery.weights()[0], stage.balanced().weights()[0]];
     if state == T::zero() { T::zero() } else { balance / state }

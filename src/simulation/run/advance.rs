@@ -1,4 +1,4 @@
-//! How a run goes on: a step, whole steps until a time, steps that land on it.
+//! Advances a run: by a step, by whole steps until a time, by steps that land on it.
 
 use crate::error::{Error, Result};
 use crate::observer::{Control, Observer, StepView, Wants};
@@ -9,16 +9,16 @@ use crate::simulation::run::results::Outcome;
 use crate::state::resolution;
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step. Under [`step_control`](super::SimulationBuilder::step_control) it is taken with smaller sizes
-    /// until one succeeds.
+    /// Takes one step. Under [`step_control`](super::SimulationBuilder::step_control) smaller sizes are tried until
+    /// one succeeds.
     ///
     /// # Errors
     ///
     /// [`Error::StepNotFinite`], [`Error::ContactNotFinite`], [`Error::ContradictoryContacts`], [`Error::Contact`],
     /// [`Error::NewtonNotConverged`], [`Error::IndefiniteTangent`], [`Error::ContactLost`], [`Error::PassedThrough`],
-    /// [`Error::LinearNotConverged`], [`Error::TimeNotAdvancing`], or what the host's own parts return;
-    /// [`Error::StepRefused`] in place of those if smaller steps were tried. State and history are then as they
-    /// were. [`Error::Poisoned`] after a panic of the host that was caught.
+    /// [`Error::LinearNotConverged`], [`Error::TimeNotAdvancing`], or errors of the host's own parts; instead
+    /// [`Error::StepRefused`] if smaller steps were tried. State and history are then unchanged. [`Error::Poisoned`]
+    /// after a panic of the host that was caught.
     pub fn step(&mut self) -> Result<()> {
         self.guarded(|run| match run.judge {
             Some(_) => run.controlled_step(),
@@ -26,14 +26,14 @@ impl<T: Real> Simulation<'_, T> {
         })
     }
 
-    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer says so. A grid time
-    /// whose distance from `t` is rounding counts as `t`.
+    /// Takes whole steps and stops at the first grid time ≥ `t` − 1e-9 h, or when the observer stops the run. A grid
+    /// time whose distance from `t` is rounding counts as `t`.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if `t` is not finite, those of [`step`](Self::step); [`Error::EnergyNotFinite`] if an
-    /// observer asks for the energy, and it is NaN or infinite, and what an observer returns: the step itself has then
-    /// been taken.
+    /// [`Error::Parameter`] if `t` is not finite, and errors of [`step`](Self::step). After the step itself has been
+    /// taken: [`Error::EnergyNotFinite`] if an observer requests an energy that is NaN or infinite, and errors of an
+    /// observer.
     pub fn run_until(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
@@ -47,10 +47,10 @@ impl<T: Real> Simulation<'_, T> {
         Ok(Outcome::Reached)
     }
 
-    /// Takes a step and shows it to the observer.
+    /// Takes a step and passes it to the observer.
     fn observed_step(&mut self, observer: &mut dyn Observer<T>) -> Result<Control> {
         self.step()?;
-        // (Energies are sums over all ranks, which take part even if an observer elsewhere wants them.)
+        // Energies are sums over all ranks, which take part even if only an observer elsewhere needs them.
         let [wanted] = self.together.sum(Ok([f64::from(u8::from(observer.wants() == Wants::Energy))]))?;
         let energy = (wanted > 0.0).then(|| self.energy());
         energy.map_or(Ok(()), |energy| energy.check(self.time()))?;
@@ -65,10 +65,9 @@ impl<T: Real> Simulation<'_, T> {
         Ok(if stops? == [0.0] { Control::Continue } else { Control::Stop })
     }
 
-    /// Takes whole steps as long as they end before `t`, and then one that ends there; the step size is then what it
-    /// was.
+    /// Takes whole steps as long as they end before `t`, then one that ends there, and restores the step size.
     ///
-    /// Two factorizations, if `t` is not on the grid.
+    /// This costs two factorizations, if `t` is not on the grid.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -85,7 +84,7 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// Those of [`run_until`](Self::run_until) and [`set_step_size`](Self::set_step_size).
+    /// Errors of [`run_until`](Self::run_until) and [`set_step_size`](Self::set_step_size).
     pub fn land_on(&mut self, t: f64, observer: &mut dyn Observer<T>) -> Result<Outcome> {
         let nominal = self.history.pace.nominal;
         if !t.is_finite() {

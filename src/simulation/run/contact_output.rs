@@ -1,4 +1,4 @@
-//! What a run says of its contacts to those who draw them or hand them to another code.
+//! The contacts of a run for plots and other codes: forces as vectors, rows and positions.
 
 use crate::contact::{ContactId, Contacts};
 use crate::real::Real;
@@ -15,21 +15,21 @@ pub struct ContactForce<T> {
     pub status: ContactStatus,
     /// The gap (length).
     pub gap: T,
-    /// The force λ, compression positive: that of [`ContactState::forces`](crate::state::ContactState::forces).
+    /// The force λ, compression positive, as in [`ContactState::forces`](crate::state::ContactState::forces).
     pub force: T,
     /// The (dof, weight) pairs of the row of G, along which the force acts and the gap is measured: its normal.
     pub row: Vec<(usize, T)>,
-    /// The friction forces along the tangents, and the velocities of the slip along them: those of
+    /// The friction forces along the tangents, and the slip velocities along them, as in
     /// [`ContactState::friction_forces`](crate::state::ContactState::friction_forces) and
     /// [`slip`](crate::state::ContactState::slip). Empty without friction.
     pub friction: Vec<T>,
     /// See [`friction`](Self::friction).
     pub slip: Vec<T>,
-    /// Rows beside it along which bodies slide, if the constraint has said them, as (dof, weight) pairs.
+    /// Rows along which the bodies slide, if the constraint has given them, as (dof, weight) pairs.
     pub tangents: Vec<Vec<(usize, T)>>,
-    /// Where the contact is (length), if its constraint knows: nodes at the end of the step.
+    /// Where the contact is (length), if its constraint gives it: nodes at the end of the step.
     pub position: Option<[T; 3]>,
-    /// The direction in space in which the gap opens, if its constraint knows.
+    /// The direction in space in which the gap opens, if its constraint gives it.
     pub normal: Option<[T; 3]>,
 }
 
@@ -46,9 +46,9 @@ impl<T: Real> ContactForce<T> {
 impl<T: Real> Simulation<'_, T> {
     /// The contacts of the state with their forces as vectors, their rows, and where they are.
     ///
-    /// Rows are those of the state: M a = f + Σ [`forces`](ContactForce::forces) there, to rounding or O(h) as
-    /// [`ContactState::forces`](crate::state::ContactState::forces) says. Contacts are in the
-    /// order of [`ContactState::ids`](crate::state::ContactState::ids). Allocates: for output, not for inner loops.
+    /// Rows belong to the state: M a = f + Σ [`forces`](ContactForce::forces) there, to rounding or O(h) as described
+    /// at [`ContactState::forces`](crate::state::ContactState::forces). Contacts are in the order of
+    /// [`ContactState::ids`](crate::state::ContactState::ids). Allocates: for output, not for inner loops.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -71,7 +71,7 @@ impl<T: Real> Simulation<'_, T> {
     /// ```
     pub fn contact_forces(&self) -> impl Iterator<Item = ContactForce<T>> + '_ {
         let contacts = &self.state.contacts;
-        // As constraints see them now: positions move without their rows.
+        // Read from the constraints now: positions move without their rows.
         let said: Vec<Contacts<T>> = (0..).map_while(|part| self.constraint(part)).map(Contacts::of).collect();
         self.constraints.rows_of(contacts).map(move |(contact, row)| {
             let id = contacts.ids[contact];

@@ -1,4 +1,4 @@
-//! Impulses of contact as vectors: what contact and its corrections have given to each dof in a step.
+//! Impulses of contact and of its corrections on each dof in a step.
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
@@ -7,10 +7,10 @@ use crate::state::ContactState;
 
 /// Impulses on the dofs (force × time), one entry a dof; empty without constraints.
 pub(crate) struct Impulses<T> {
-    /// Those of the step that is being tried, and of the last step that was accepted.
+    /// Impulses of the step that is being tried, and of the last accepted step.
     trial: Vec<T>,
     last: Vec<T>,
-    /// Whether either may have entries that are not zero.
+    /// Whether these may have nonzero entries.
     trial_pushes: bool,
     last_pushes: bool,
     /// Impulses along the rows before corrections.
@@ -18,7 +18,7 @@ pub(crate) struct Impulses<T> {
 }
 
 impl<T: Real> Impulses<T> {
-    /// For so many dofs, 0 without constraints.
+    /// For `dofs` dofs, 0 without constraints.
     pub(crate) fn new(dofs: usize) -> Self {
         let [trial, last] = [(); 2].map(|()| vec![T::zero(); dofs]);
         Self { trial, last, trial_pushes: false, last_pushes: false, before: Vec::new() }
@@ -39,12 +39,12 @@ impl<T: Real> Impulses<T> {
         }
     }
 
-    /// Notes the impulses along the rows before corrections.
+    /// Stores the impulses along the rows before corrections.
     pub(crate) fn note(&mut self, contacts: &ContactState<T>) {
         self.before.clone_from(&contacts.impulse);
     }
 
-    /// Adds what corrections have added to the impulses along the rows since [`note`](Self::note).
+    /// Adds the impulses along the rows that corrections have added since [`note`](Self::note).
     pub(crate) fn push_corrections(&mut self, g: &ContactJacobian<T>, contacts: &ContactState<T>) {
         for (row, (&after, &before)) in contacts.impulse.iter().zip(&self.before).enumerate() {
             if after != before {
@@ -54,7 +54,7 @@ impl<T: Real> Impulses<T> {
         }
     }
 
-    /// The step is accepted.
+    /// Accepts the step.
     pub(crate) fn accept(&mut self) {
         std::mem::swap(&mut self.trial, &mut self.last);
         std::mem::swap(&mut self.trial_pushes, &mut self.last_pushes);
@@ -62,11 +62,11 @@ impl<T: Real> Impulses<T> {
 }
 
 impl<T: Real> Simulation<'_, T> {
-    /// The impulses of all contacts, friction included, on each dof in the last step that this simulation has made
-    /// (force × time), with what corrections have added; empty without constraints.
+    /// The impulses of all contacts on each dof (force × time), friction and corrections included, in the last step
+    /// that this simulation has made; empty without constraints.
     ///
-    /// Over the dofs of a body and along a direction they add up to what contact has given to that body: where nothing
-    /// else acts along that direction this is the change of its [`momentum`](Self::momentum), to rounding. Over two
+    /// Their sum over the dofs of a body along a direction is the impulse of contact on that body: under no other
+    /// force along that direction it is the change of the body's [`momentum`](Self::momentum), to rounding. Over two
     /// bodies that touch only each other the sum is zero.
     ///
     /// ```

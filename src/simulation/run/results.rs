@@ -1,4 +1,4 @@
-//! What a run hands to observers and to its caller: work counts, energies, and why it ended.
+//! Results of a run for observers and its caller: work counts, energies, and why it ended.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -17,7 +17,7 @@ pub struct Statistics {
     pub newton_iterations: u64,
     /// Effective matrices factorized.
     pub factorizations: u64,
-    /// Contact problems solved; a stage in which nothing comes near has none.
+    /// Contact problems solved; a stage without near contacts has none.
     pub contact_solves: u64,
     /// Active-set iterations of all contact problems together.
     pub contact_iterations: u64,
@@ -49,7 +49,7 @@ pub struct Energy<T> {
     pub kinetic: T,
     /// Elastic energy (½ uᵀ K u of a linear system), if the system has a potential.
     pub potential: Option<T>,
-    /// Where energy came from and went since the start, if the builder asked for the balance.
+    /// Sources and sinks of energy since the start, if the builder requested the balance.
     pub works: Option<Works<T>>,
 }
 
@@ -67,13 +67,13 @@ impl<T: Real> Energy<T> {
     }
 }
 
-/// Where the energy of the system came from and went since the start: the change of the total energy is the sum of all
+/// Sources and sinks of the energy of the system since the start: the change of the total energy is the sum of all
 /// lines.
 ///
-/// Works of forces are those of the trapezoidal rule over the steps. (That of contact takes the forces in the middle of
-/// the step, which is the same rule for schemes whose forces live at its end.) `load` to `impacts` belong to the model,
-/// and are those of the exact motion as the step goes to zero; `corrections` and `remainder` belong to the time
-/// integration.
+/// Works of forces are computed by the trapezoidal rule over the steps. The work of contact uses the forces in the
+/// middle of the step, which is the same rule for schemes whose forces act at its end. `load` to `impacts` belong to
+/// the model, and tend to the works of the exact motion as the step goes to zero; `corrections` and `remainder`
+/// belong to the time integration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -84,24 +84,24 @@ pub struct Works<T> {
     pub supports: T,
     /// Work of damping (not positive), and of the dashpots of contact laws.
     pub damping: T,
-    /// Work of the reported contact forces along the normals: that of obstacles that move, of the springs of compliant
-    /// laws without their dashpots, and of contacts on dofs without mass. Impacts against moving obstacles are included; the closing of rigid
-    /// gaps is not work of a force, but an impact.
+    /// Work of the reported contact forces along the normals: by moving obstacles, by the springs of compliant laws
+    /// without their dashpots, and by contacts on dofs without mass. Impacts against moving obstacles are included.
+    /// The closing of rigid gaps is not work of a force, but an impact.
     pub contact: T,
-    /// Work of the friction forces on the bodies, impulses of impacts included: not positive where obstacles do not
-    /// move along themselves.
+    /// Work of the friction forces on the bodies, impulses of impacts included: not positive if obstacles do not move
+    /// along their own surface.
     pub friction: T,
-    /// Kinetic energy that impacts have taken (negative), in the frame of the obstacle: ½ (r' − r)ᵀ S⁻¹ (r' + r) for
-    /// contacts with mass that close with the gap rates r and go on with r', S = G M⁻¹ Gᵀ. Two rigid masses that stay
+    /// Kinetic energy lost in impacts (negative), in the frame of the obstacle: ½ (r' − r)ᵀ S⁻¹ (r' + r) for contacts
+    /// with mass that close with the gap rates r and continue with r', S = G M⁻¹ Gᵀ. Two rigid masses that stay
     /// together lose ½ m r² with m = m₁ m₂/(m₁ + m₂), whatever the scheme, the step and the instant of the impact
-    /// within it; those that rebound with −e r lose (1 − e²) of that. Of an elastic body it is the energy of the contact
-    /// nodes alone, which goes to zero with the size of the elements.
+    /// within it; masses that rebound with −e r lose (1 − e²) of that. For an elastic body it is the energy of the
+    /// contact nodes alone, which goes to zero with the size of the elements.
     pub impacts: T,
-    /// Change of kinetic energy by corrections of velocity of contacts that were closed at the start of the step, or
-    /// that open: what is corrected in the step in which a contact closes is part of its impact.
+    /// Change of kinetic energy by velocity corrections of contacts that were closed at the start of the step, or
+    /// that open. Corrections in the step in which a contact closes are part of its impact.
     pub corrections: T,
-    /// Total energy minus energy at the start minus all of the above: what the scheme itself adds (positive) or
-    /// dissipates (negative).
+    /// Total energy minus energy at the start minus all of the above: energy that the scheme itself adds (positive)
+    /// or dissipates (negative).
     pub remainder: T,
 }
 

@@ -1,4 +1,4 @@
-//! Step-size control: refused steps are taken again with halves of the step, which grow back to the nominal one.
+//! Step-size control: refused steps are repeated with halves of the step, which grow back to the nominal one.
 
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::simulation::step::judge::Verdict;
 use crate::state::{History, Refusal, State};
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step, with halves of the step size as long as steps are refused.
+    /// Takes one step, and halves the step size as long as steps are refused.
     pub(crate) fn controlled_step(&mut self) -> Result<()> {
         let mut before: Option<(State<T>, History<T>)> = None;
         let mut refusals = 0;
@@ -64,7 +64,7 @@ impl<T: Real> Simulation<'_, T> {
         }
     }
 
-    /// Counts a good step, and doubles the step size where the nominal grid and the judgement allow it.
+    /// Counts a good step, and doubles the step size if the nominal grid and the judgment allow it.
     fn grow(&mut self) {
         let Self { judge: Some(judge), constraints, state, statistics, history, .. } = self else { return };
         statistics.coarse_steps += u64::from(judge.coarse);
@@ -75,7 +75,7 @@ impl<T: Real> Simulation<'_, T> {
             rows.any(|(contact, row)| constraints.law(row).is_spring() && state.contacts.closed[contact])
         };
         if history.pace.advance(presses) && may_grow {
-            // If the matrix of the larger step cannot be factorized, the run goes on with the smaller one.
+            // If the matrix of the larger step cannot be factorized, the run continues with the smaller one.
             let larger = 2.0 * self.history.clock.h;
             if self.change_step_size(larger).is_ok() {
                 self.history.pace.double();

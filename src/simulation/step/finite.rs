@@ -8,11 +8,11 @@ use crate::state::{ContactState, Motion, State};
 #[derive(Clone, Copy)]
 pub(crate) enum Extent<'d> {
     All,
-    /// Those that have changed since all were found finite.
+    /// Dofs that have changed since all dofs were found finite.
     At([&'d [usize]; 2]),
 }
 
-/// Refuses displacements, velocities and accelerations that are NaN or infinite; t and h are those of the step.
+/// Refuses displacements, velocities and accelerations that are NaN or infinite; t and h belong to the step.
 pub(crate) fn check_motion<T: Real>(t: f64, h: f64, motion: [&[T]; 3], extent: Extent<'_>) -> Result<()> {
     for (what, values) in ["the displacement", "the velocity", "the acceleration"].into_iter().zip(motion) {
         let wrong = match extent {
@@ -44,7 +44,7 @@ pub(crate) fn check_contacts<T: Real>(t: f64, contacts: &ContactState<T>) -> Res
             continue;
         }
         if let Some(row) = values.iter().position(|x| !x.is_finite()) {
-            // (Behind the contacts stand the tangential rows of those with friction.)
+            // Tangential rows of contacts with friction follow the contacts.
             let contact = ids[contacts.tangents.owner(row)];
             return Err(Error::ContactNotFinite { t, what, contact, value: values[row].value() });
         }

@@ -1,4 +1,4 @@
-//! Settings of the step-size control, and the judgement of a step: fine enough, or too coarse.
+//! Settings of the step-size control, and the judgment of a step: fine enough, or too coarse.
 
 use crate::analysis::LocalError;
 use crate::contact::ContactJacobian;
@@ -7,19 +7,19 @@ use crate::ranks::Together;
 use crate::real::Real;
 use crate::state::{Motion, State};
 
-/// How a run changes its step size by itself.
+/// How a run controls its step size.
 ///
 /// Steps are the nominal one, given to the builder, divided by powers of two. A step that fails for a reason that a
-/// smaller one may mend ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything as it was and is
-/// taken again with half the size; after two steps that went well the size doubles where that meets the nominal grid
-/// again, so every nominal time is met. If doubling fails at once, it waits twice as long the next time. It does not
-/// come back to a size that was found too long for the stiffness of the system ([`Error::Stiffened`]), or of a contact
-/// as long as such contacts press: a step beyond the limit of stability adds energy before it is found to be one.
+/// smaller step may avoid ([`Error::is_recoverable`]), or that is judged too coarse, leaves everything unchanged and
+/// is repeated with half the size. After two successful steps the size doubles where that meets the nominal grid
+/// again, so every nominal time is met. If doubling fails at once, the next doubling waits twice as long. The size
+/// does not return to one that was too long for the stiffness of the system ([`Error::Stiffened`]), or of a contact
+/// as long as such contacts carry forces: a step beyond the stability limit adds energy before it is detected.
 /// [`set_step_size`](crate::Simulation::set_step_size) makes sizes up to the one given admissible again.
 ///
-/// Two judgements may be added: an estimate of the [local error](Self::local_error), and a limit to the
-/// [contacts that change](Self::contact_changes) in a step. At the smallest size a judgement refuses nothing: the step
-/// is taken and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
+/// Two criteria may be added: an estimate of the [local error](Self::local_error), and a limit to the
+/// [contacts that change](Self::contact_changes) in a step. At the smallest size they are ignored: the step is taken
+/// and counted in [`Statistics::coarse_steps`](crate::Statistics::coarse_steps). A failure there is
 /// [`Error::StepRefused`], and the run is as it was before the step, with the step size it had.
 ///
 /// Changes of the step size allocate, factorize, and resample the past of multistep schemes
@@ -67,8 +67,8 @@ impl StepControl {
 
     /// Refuses steps whose local error in any displacement is estimated at more than `tolerance` (length).
     ///
-    /// The estimate is the difference between a step and Taylor's expansion of the state it starts from (v and a at the
-    /// time of the state), times a factor that follows from the tableau
+    /// The estimate is the difference between a step and Taylor's expansion of the state it starts from (v and a at
+    /// the time of the state), times a factor of the tableau
     /// ([`analysis::local_error`](crate::analysis::local_error)). In a step in which a contact closes or opens the
     /// motion is not smooth and the factor is 1; the estimate is then about the velocity that the contact lost times
     /// the step size, as the instant of impact is uncertain by a step. Velocities are compared as well as
@@ -82,10 +82,10 @@ impl StepControl {
     /// about `tolerance`/(0.5 s · Δa). Contacts that change in every step are judged by 2 h² Δa. Friction on dofs
     /// without mass leaves no such error.
     ///
-    /// All other errors are those of one step: the estimate does not contain their sum over a run.
+    /// All other errors are errors of one step: the estimate does not contain their sum over a run.
     ///
-    /// Schemes that impose contact ahead of the state show an impact one step late, and with some schemes of first
-    /// order the error of the velocity does not show at all: `build` refuses both.
+    /// The estimate detects an impact one step late if the scheme imposes contact ahead of the state, and does not
+    /// contain the error of the velocity for some schemes of first order: `build` refuses both.
     ///
     /// # Errors
     ///
@@ -112,7 +112,7 @@ impl StepControl {
     }
 }
 
-/// What became of a step that did not fail.
+/// The result of a step that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
     Accepted,
@@ -131,7 +131,7 @@ pub(crate) struct Judge<T> {
     lasting: f64,
     /// Whether contacts or their friction changed in the step judged last.
     pub(crate) changed: bool,
-    /// Whether steps are accepted though too coarse: they cannot be smaller.
+    /// Whether steps are accepted though too coarse, because they cannot be smaller.
     pub(crate) suspended: bool,
     /// The estimate of the step judged last, as a length and divided by the tolerance.
     pub(crate) estimate: f64,
@@ -147,7 +147,7 @@ impl<T: Real> Judge<T> {
         Self { control, local, start, lasting: 0.0, changed: false, suspended: false, estimate, excess, coarse: false }
     }
 
-    /// Remembers the state that a step starts from, and how long the error of a velocity lasts.
+    /// Stores the state that a step starts from, and how long the error of a velocity lasts.
     pub(crate) fn begin(&mut self, state: &State<T>, lasting: f64) {
         self.lasting = lasting;
         if self.local.is_some() {
@@ -157,8 +157,8 @@ impl<T: Real> Judge<T> {
         }
     }
 
-    /// Judges a step that ends with u and v, by its contacts too: whether the motion jumps because some have closed or
-    /// opened, how many have, and the error of the velocity if friction jumps.
+    /// Judges a step that ends with u and v, also by its contacts: whether the motion jumps because some have closed
+    /// or opened, their number, and the error of the velocity if friction jumps.
     pub(crate) fn judge(
         &mut self,
         together: &Together<T>,
@@ -171,11 +171,11 @@ impl<T: Real> Judge<T> {
         self.changed = jumps || velocity_error.is_some();
         if let (Some(tolerance), Some(local)) = (self.control.tolerance, self.local) {
             let factor = if jumps { 1.0 } else { local.factor };
-            // (The largest of numbers leaves NaN out.)
+            // A maximum ignores NaN.
             let distance = self.distance([u, v], prescribed, h);
             let distance = if distance.is_nan() { f64::INFINITY } else { distance };
             let [distance] = together.max(Ok([distance]))?;
-            // (Where a contact closes as well, the acceleration contains its impact. All ranks know all contact dofs.)
+            // If a contact closes as well, the acceleration contains its impact. All ranks know all contact dofs.
             let lasting = velocity_error.filter(|_| !jumps).map_or(0.0, |error| error * (self.lasting + h));
             self.estimate = (factor * distance).max(lasting);
             self.excess = self.estimate / tolerance;
@@ -189,8 +189,8 @@ impl<T: Real> Judge<T> {
         })
     }
 
-    /// How far the velocity along some rows may be off at the end of a step of size h in which the acceleration along
-    /// them jumps: h times the largest jump. None if there are no rows.
+    /// The error of the velocity along some rows at the end of a step of size h in which the acceleration along them
+    /// jumps: h times the largest jump. None if there are no rows, or errors are not estimated.
     pub(crate) fn velocity_error(
         &self,
         (g, rows): (&ContactJacobian<T>, impl Iterator<Item = usize>),

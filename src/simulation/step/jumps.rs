@@ -8,7 +8,7 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::contact::ContactWork;
 use crate::state::{ContactState, Motion};
 
-/// Which contacts exert a force where displacements are u, in place of what `exerting` said before.
+/// Lists which contacts exert a force at displacements u, and replaces the old list.
 pub(crate) fn note_exerting<T: Real>(
     (constraints, g): (&Constraints<'_, T>, &ContactJacobian<T>),
     contacts: &ContactState<T>,
@@ -26,15 +26,15 @@ fn exerts<T: Real>(
     row: usize,
 ) -> bool {
     let gap = contacts.gap[row];
-    // (The force of a spring that just touches is the rounding of its gap.)
+    // The force of a spring that just touches is the rounding of its gap.
     let is_pressed =
         || !constraints.law(row).is_spring() || -gap > constraints.gap_rounding(row, g.magnitude(row, u), gap);
     (contacts.lambda_raw[row] != T::zero() || contacts.lambda[row] != T::zero()) && is_pressed()
 }
 
-/// The contacts that exert a force at both ends of a step and whose friction jumps in it, because they begin or end to
-/// slide or their slip reverses. On dofs without mass friction is part of a static balance: those contacts are left
-/// out.
+/// The contacts that exert a force at both ends of a step and whose friction jumps in it, because they begin or end
+/// to slide or their slip reverses. Contacts on dofs without mass are left out: their friction is part of a static
+/// balance.
 pub(crate) fn friction_jumps<'c, T: Real>(
     constraints: &'c Constraints<'_, T>,
     g: &'c ContactJacobian<T>,
@@ -55,11 +55,11 @@ pub(crate) fn friction_jumps<'c, T: Real>(
 
 /// Whether contacts that have closed or opened in a step of size h, from `start` to `new`, make the motion jump.
 ///
-/// Bodies that touch without force come apart, and together, by the sign of the last bit, and so do rows whose force
-/// others hold. Nothing of the motion may follow from that. A contact counts that exerts a force, or has exerted one at
-/// the start of the step or within it, and along whose row the velocity has changed in the step, or h times the
-/// acceleration, by more than ε^⅔ of what it is the sum of, and of what moves the gap in a step. Rows that are
-/// multiples of each other are one contact: which of them has its force is the solver's choice.
+/// Bodies that touch without force open and close by rounding, and so do rows whose force is carried by other rows.
+/// This must not affect the motion. A contact counts if it exerts a force, or has exerted one at the start of the
+/// step or within it, and if along its row the velocity, or h times the acceleration, has changed in the step by more
+/// than ε^⅔ of its terms and of the terms of the gap over h. Rows that are multiples of each other are one contact:
+/// which of them has its force is the solver's choice.
 pub(crate) fn jumps<T: Real>(
     constraints: &Constraints<'_, T>,
     g: &ContactJacobian<T>,
@@ -78,7 +78,7 @@ pub(crate) fn jumps<T: Real>(
         if !(exerting_at_start[row] || exerts(row) || trial.impulse[row] != T::zero()) {
             return false;
         }
-        // (The change of the one and of the other, and what they are sums of.)
+        // The changes of v and of a, and the magnitudes of their terms.
         let [of_v, of_a] = [(&start.v, &new.v), (&start.a, &new.a)].map(|(before, now)| {
             let change = g.product(row, now) - g.product(row, before);
             (change.abs(), g.magnitude(row, now) + g.magnitude(row, before))
@@ -89,7 +89,7 @@ pub(crate) fn jumps<T: Real>(
         let stays = of_v.0.max(h * of_a.0) <= least;
         !stays
     };
-    // (All rows are looked at for those alone that seem to jump, up to the first that does.)
+    // All rows are compared only with rows that seem to jump, up to the first that does.
     let held = |row: usize, holds: &dyn Fn(usize) -> bool| {
         holds(row) || (0..trial.closed.len()).any(|other| holds(other) && g.are_multiples(row, other))
     };

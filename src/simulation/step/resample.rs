@@ -19,8 +19,8 @@ use crate::simulation::watch::stability::{self, StepLimit};
 use crate::state::{History, Motion, Pace, State, Trail};
 use crate::system::Linearity;
 
-/// The past is not extrapolated farther than to so many times its age: polynomials grow beyond it. (Not at all where a
-/// scheme reads accelerations of the past: those of stiff motions are the larger the faster they are.)
+/// The past is extrapolated to at most this multiple of its age: polynomials grow beyond it. It is not extrapolated
+/// at all if a scheme reads its accelerations: in stiff motions they grow with the frequency.
 const FARTHEST: f64 = 3.0;
 
 impl<T: Real> Simulation<'_, T> {
@@ -29,24 +29,24 @@ impl<T: Real> Simulation<'_, T> {
         self.history.clock.h
     }
 
-    /// Changes the step size from here on. Effective matrices are factorized anew (their analysis is kept), and the
+    /// Changes the step size from here on. Effective matrices are factorized again (their analysis is kept), and the
     /// past of a multistep scheme is resampled at the new spacing: u by the cubic through (u, v) of two states, v by
     /// the cubic through (v, a), a linearly. States from before a contact closed or opened are not used: the past is
     /// then extrapolated from the newer ones, or from the newest alone by Taylor's expansion, and projected on the
     /// closed contacts.
     ///
     /// Every scheme keeps its order when the step changes by factors up to 3, even at every step (`docs/schemes.md`).
-    /// A step so much larger that the past would be extrapolated to more than three times its age (beyond its age,
-    /// where the scheme reads accelerations of it) makes it anew instead, by steps of the trapezoidal rule, as at the
-    /// start of a run, so that fast motions gain no energy to speak of. The velocity of the state becomes that of the
-    /// scheme's momentum then, from which it differs by O(h²): a run with one such change keeps its order, one that
-    /// goes back and forth by such factors all the time is of order 1.
+    /// If a larger step would extrapolate the past to more than three times its age (beyond its age, if the scheme
+    /// reads its accelerations), the past is computed again by steps of the trapezoidal rule, as at the start of a
+    /// run, so that fast motions gain hardly any energy. The velocity of the state is then replaced by the velocity
+    /// of the scheme's momentum, from which it differs by O(h²): a run with one such change keeps its order, a run
+    /// that goes back and forth by such factors all the time is of order 1.
     ///
-    /// The velocities of the state stay as they are. [`momentum`](Self::momentum), in which schemes may look a part p of
-    /// the step ahead, becomes that of the new step: under a force F, for instance of a contact that presses, it changes
-    /// by p (h' − h) F, which no impulse accounts for (central differences: half of it, p = ½). Without force it is
-    /// conserved. The impulse of one contact agrees with the change of a body's momentum across a change of h only to
-    /// the order of the scheme.
+    /// Otherwise the velocities of the state do not change. [`momentum`](Self::momentum), which schemes may evaluate
+    /// a part p of the step ahead, belongs to the new step: under a force F, for instance of a contact, it changes by
+    /// p (h' − h) F, which no impulse accounts for (central differences: p = ½). Without force it is conserved. The
+    /// impulse of one contact agrees with the change of a body's momentum across a change of h only to the order of
+    /// the scheme.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -80,7 +80,7 @@ impl<T: Real> Simulation<'_, T> {
         })
     }
 
-    /// Changes the step size, whatever the nominal one is.
+    /// Changes the step size, and not the nominal one.
     pub(crate) fn change_step_size(&mut self, h: f64) -> Result<()> {
         let result = self.change_step_size_together(h);
         self.together.finish(result)
@@ -94,8 +94,8 @@ impl<T: Real> Simulation<'_, T> {
         step_size::<T>(h)?;
         let clock = self.history.clock.with_step_size(h);
         clock.check()?;
-        // (Steps of a system that may stiffen are looked at as they are taken: they grow back to the nominal size
-        // whatever was found of them where the run was built, or resumed.)
+        // Steps of a system that may stiffen are checked as they are taken: they grow back to the nominal size,
+        // whatever the check has found where the run was built or resumed.
         let grows_back = self.system.linearity() == Linearity::Nonlinear && h <= self.history.pace.nominal;
         if let StepLimit::Cleared(cleared) = self.limit
             && h > cleared
@@ -140,8 +140,8 @@ impl<T: Real> Simulation<'_, T> {
         Ok(())
     }
 
-    /// Whether the past that the scheme reads with steps of this size would be extrapolated farther than is stable:
-    /// beyond [`FARTHEST`] times what was computed of it. It is then made anew, by steps of the one-step scheme that
+    /// Whether steps of this size would extrapolate the past that the scheme reads farther than is stable, beyond
+    /// [`FARTHEST`] times its computed age. The past is then computed again, by steps of the one-step scheme that
     /// also begins a run.
     fn is_beyond_past(&self, h: f64) -> bool {
         let Self { state, history, scheme, .. } = self;
@@ -149,13 +149,13 @@ impl<T: Real> Simulation<'_, T> {
         let farthest = if reads.iter().skip(1).any(|reads| reads[2]) { 1.0 } else { FARTHEST };
         let needed = (history.known - 1) as f64 * h;
         let computed = computed(state, history).last().map_or(0.0, |oldest| oldest.age);
-        // (Behind an impact nothing is known but the newest state: what counts then is the step that made it.)
+        // After an impact only the newest state is known: then the size of the step that made it counts.
         needed > farthest * (1.0 + 1e-9) * computed.max((history.known - 1) as f64 * history.made_with)
     }
 
-    /// The velocity with which the newest state has the momentum of the scheme alone, without its past: the stored one
-    /// errs by O(h²), which does not matter as long as the scheme does not go on from it. Closed contacts keep their
-    /// gap rates.
+    /// The velocity with which the newest state alone, without its past, has the momentum of the scheme. The stored
+    /// velocity has an error O(h²), which matters only if the scheme continues from it alone. Closed contacts keep
+    /// their gap rates.
     fn velocity_of_momentum(&mut self) -> Result<Vec<T>> {
         let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
         let h = history.clock.h;
@@ -209,8 +209,8 @@ impl<T: Real> Simulation<'_, T> {
         }
         conserve_momentum(scheme, state, history, h, &mut past);
         let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        // Rows whose law reads the gap where a stage starts may hold it anywhere; those on dofs without mass have
-        // nothing to correct, and would move the other side alone.
+        // Rows whose law reads the gap at the start of a stage may hold it anywhere. Rows on dofs without mass have
+        // nothing to correct, and would move the other side only.
         let tangents = constraints.tangents();
         let corrected =
             |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
@@ -225,9 +225,9 @@ impl<T: Real> Simulation<'_, T> {
         Ok(past)
     }
 
-    /// Starts again from the displacements and velocities of the present state, after a discontinuity that the host
-    /// knows of (a load or a support that jumps): accelerations follow from the balance after it, contacts at rest are
-    /// found anew, and the past is made anew as at the start.
+    /// Starts again from the displacements and velocities of the present state, after a discontinuity known to the
+    /// host (a load or a support that jumps): accelerations are computed from the balance after it, contacts at rest
+    /// are found again, and the past is computed as at the start.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -246,7 +246,7 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// Those of building a simulation from this state. The simulation is then as it was.
+    /// Errors of building a simulation from this state. The simulation is then as it was.
     pub fn restart(&mut self) -> Result<()> {
         self.guarded(|run| {
             let result = run.begin_anew();
@@ -300,19 +300,19 @@ impl<T: Real> Simulation<'_, T> {
     }
 }
 
-/// A computed motion, and its age, the time from it to the newest one: a sum of step sizes, since differences of
+/// A computed motion, and its age, the time from it to the newest one: a sum of step sizes, as differences of
 /// absolute times would have their rounding.
 struct Node<'h, T> {
     motion: &'h Motion<T>,
     age: f64,
 }
 
-/// The motions as they were computed since a contact last closed or opened, newest first.
+/// The motions computed since a contact last closed or opened, newest first.
 fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<Node<'h, T>> {
     let newest = std::iter::once((&state.motion, history.made_with));
     let smooth = history.smooth;
     let known: Vec<(&Motion<T>, f64)> = match history.trail.is_empty() {
-        // Until the step changes for the first time, the past that the scheme reads is as it was computed.
+        // Until the step changes for the first time, the past that the scheme reads is the computed one.
         true => {
             let past = history.slots[1..history.known].iter().map(|motion| (motion, history.made_with));
             newest.chain(past).take(smooth).collect()
@@ -328,7 +328,7 @@ fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<No
     known.into_iter().map(node).collect()
 }
 
-/// Number of computed motions that are kept: enough of them for ratios of step sizes up to 3.
+/// Number of computed motions to keep: enough for ratios of step sizes up to 3.
 pub(crate) fn trail_length(scheme: &Scheme<'_>) -> usize {
     let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
     if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) }
@@ -345,12 +345,12 @@ fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut Hist
     }
 }
 
-/// Moves stored v and a of schemes that store those δ steps away from the state: δ steps are another time with the new
-/// step size. Values there are on the line through the last two that were computed.
+/// Moves stored v and a of schemes that store them δ steps away from the state: δ steps are another time with the new
+/// step size. The moved values are on the line through the last two computed values.
 fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
     let History { trail, unmoved, made_with, smooth, .. } = history;
     let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
-    // (A line that is prolonged far is no estimate: what was stored stays, as at the start.)
+    // Far extrapolation along a line is no estimate: stored values stay, as at the start.
     let moved = if h <= FARTHEST * (1.0 + 1e-9) * *made_with { h - *made_with } else { 0.0 };
     for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
         if shift == 0.0 {
@@ -367,8 +367,8 @@ fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mu
     }
 }
 
-/// The motion of an age on the polynomials through two others, beyond the older one too: u by Hermite's cubic through
-/// (u, v), v by the one through (v, a), a linearly.
+/// The motion at an age on the polynomials through two others, beyond the older one too: u by Hermite's cubic through
+/// (u, v), v by the cubic through (v, a), a linearly.
 fn interpolate<T: Real>(newer: &Node<'_, T>, older: &Node<'_, T>, age: f64, out: &mut Motion<T>) {
     let length = older.age - newer.age;
     let s = (age - newer.age) / length;
@@ -399,16 +399,16 @@ fn shifted(psi: &[[f64; 3]]) -> [f64; 2] {
     [older().map(|(psi, k)| -k * psi[0]).sum(), older().map(|(psi, _)| psi[1]).sum()]
 }
 
-/// A ψ that reads only accelerations of the past (Adams formulas) needs no shift: these enter with h a.
+/// Whether ψ reads only accelerations of the past (Adams formulas) and needs no shift: these enter with h a.
 fn reads_accelerations_alone(psi: &[[f64; 3]]) -> bool {
     shifted(psi).into_iter().all(|by| by.abs() < 1e-6)
 }
 
-/// Shifts the resampled past so that the scheme's momentum is that before the change.
+/// Shifts the resampled past so that the scheme's momentum continues from before the change.
 ///
-/// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h makes it p (h' − h) a more.
-/// Interpolation errs in ψ by O(h²) at every change. Without this shift, changes at every step would reduce the order
-/// to 1.
+/// In smooth motion the functional ψ of a scheme is v + p h a + O(h²), so a change of h adds p (h' − h) a.
+/// Interpolation has an error of O(h²) in ψ at every change. Without this shift, changes at every step would reduce
+/// the order to 1.
 fn conserve_momentum<T: Real>(
     scheme: &Scheme<'_>,
     state: &State<T>,
