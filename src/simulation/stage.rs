@@ -1,4 +1,4 @@
-//! The data with which a stage is solved, and the solution of its contact.
+//! The data with which a stage is solved, and its contact.
 //!
 //! In the order of execution:
 //!

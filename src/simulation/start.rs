@@ -346,8 +346,8 @@ impl<T: Real> Start<'_, T> {
     }
 }
 
-/// Solves contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0. Then solves for friction that
-/// acts on dofs with mass only, as the normal force is known.
+/// Solves contacts on dofs without mass, where the balance is algebraic: f + Gᵀ λ = 0; then friction on dofs with
+/// mass only, as the normal force is known.
 fn press_static<T: Real>(
     constraints: &mut Constraints<'_, T>,
     (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),

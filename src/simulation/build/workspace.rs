@@ -171,7 +171,7 @@ impl<T: Real> Workspace<T> {
         Ok(())
     }
 
-    /// Reserves memory for `rows` contacts with `entries` weights in all.
+    /// Memory for `rows` contacts with `entries` weights in all.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.rows = rows;
         self.contact.rows.make_room(rows, entries);

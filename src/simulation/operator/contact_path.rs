@@ -26,7 +26,7 @@ const DEAR_KEPT: f64 = 2.0;
 const TRIANGLE: f64 = 0.1;
 
 /// Analyzes with the interface eliminated last, if the solver condenses; in a free order if the factor would
-/// otherwise be much larger. For instance, a whole surface in the interface, eliminated last, fills a dense triangle.
+/// otherwise be much larger: a whole surface, eliminated last, fills a dense triangle.
 pub(crate) fn analyze<T: Real>(
     solver: &dyn LinearSolver<T>,
     pattern: SymbolicSparseColMatRef<'_, usize>,

@@ -1,5 +1,5 @@
-//! The Delassus operator of the active rows. When rows join or leave, the couplings of the other rows are moved and
-//! not formed again: they stay the same to the bit.
+//! The Delassus operator of the active rows. When rows join or leave, the couplings of the others are moved and not
+//! formed again: they stay the same to the bit.
 
 use crate::contact_solver::FORESEEN;
 use crate::error::Result;
@@ -50,7 +50,7 @@ impl<T: Real> Delassus<T> {
         }
     }
 
-    /// Reserves memory for W of some rows, all of which have joined.
+    /// Memory for W of some rows, all of which have joined.
     pub(crate) fn begin(&mut self, rows: &[usize]) -> Result<()> {
         self.values.clear();
         memory::grow(&mut self.values, rows.len(), rows.len(), WHAT)?;
@@ -59,8 +59,8 @@ impl<T: Real> Delassus<T> {
         Ok(())
     }
 
-    /// Reserves memory for W of some rows, and moves the entries of rows that stay to their new places, without
-    /// compliances. Rows and columns of joined rows are to be filled.
+    /// Memory for W of some rows, with the entries of rows that stay moved to their new places, without compliances.
+    /// Rows and columns of joined rows are to be filled.
     pub(crate) fn rearrange(&mut self, rows: &[usize]) -> Result<()> {
         if !self.compare(rows) {
             return self.begin(rows);
@@ -211,8 +211,8 @@ mod tests {
         assert!(w.joined.is_empty());
     }
 
-    /// Couplings that decay from row to row are zero where they are below rounding beside the diagonal, in any unit
-    /// and for any order in which the rows have joined.
+    /// Couplings that decay from row to row are zero below the rounding of the diagonal, in any unit and for any
+    /// order in which the rows have joined.
     #[test]
     fn what_no_sum_can_see_is_zero() {
         let n = 30;

@@ -1,8 +1,7 @@
 //! Responses of the interface to unit forces, kept for the dofs or rows that contact has used.
 //!
-//! If the matrix is constant and rows change, responses belong to dofs: rows that turn then cost products, and no
-//! solve. If the matrix changes with every iteration, or rows never do, responses belong to rows, of which there are
-//! fewer.
+//! Responses of a constant matrix with changing rows belong to dofs: rows that turn then cost products, and no solve.
+//! Otherwise responses belong to rows, of which there are fewer.
 
 mod tiles;
 
@@ -64,18 +63,17 @@ struct Column {
 /// Number of dofs of an interface whose responses take little memory altogether.
 const SMALL: usize = 256;
 
-/// Mean number of entries of a row up to which the response to each row is formed as a whole, as for nodes on
-/// obstacles.
+/// Mean number of entries of a row up to which whole responses to rows are formed, as for nodes on obstacles.
 const SHORT: usize = 8;
 
 const WHAT: &str = "the responses of contact";
 
-/// Marks of a dof or row without a column, and of one that is about to get one.
+/// Marks of a dof or row without a column, and of one about to get one.
 const NONE: usize = usize::MAX;
 const MISSING: usize = usize::MAX - 1;
 
 impl<T: Real> Responses<T> {
-    /// For an interface of `size` dofs. Memory for all columns of a small interface is reserved at once.
+    /// For an interface of `size` dofs. All columns of a small one have memory at once.
     pub(crate) fn new(unit: Unit, size: usize) -> Self {
         let small = if size <= SMALL { size } else { 0 };
         Self {

@@ -33,8 +33,7 @@ impl Part {
     }
 }
 
-/// Buffers of the contact problem, one entry per row of G unless said otherwise: candidates first, then tangential
-/// rows.
+/// Buffers of the contact problem, one entry per row of G unless said otherwise: candidates, then tangential rows.
 pub(crate) struct ContactRowsWork<T> {
     pub(crate) rates: Vec<GapRates<T>>,
     /// The same for slips, one per tangential row.
@@ -57,14 +56,14 @@ pub(crate) struct ContactRowsWork<T> {
     pub(crate) approach: Vec<T>,
     pub(crate) curved: CurvedRowsWork<T>,
     /// The quantity that each row constrains in this stage. For laws that read the gap at the start of the stage:
-    /// this gap, and the gap below which the row counts as closed there.
+    /// this gap, and the gap below which the row counts as closed.
     pub(crate) measure: Vec<Measure>,
     pub(crate) start_gap: Vec<T>,
     pub(crate) start_tolerance: Vec<T>,
     /// Rows that may carry a force in this stage; at velocity level, rows whose forecast gap is closed.
     pub(crate) enabled: Vec<bool>,
-    /// Offset of closed rows that constrain a rate or an increment: the gap beyond rounding, by which they may still
-    /// close. Without this offset, rounding would slowly lift a resting contact until it counts as open.
+    /// Gap beyond rounding of closed rows that constrain a rate or an increment: they may close by it. Without this
+    /// offset, rounding would slowly lift a resting contact until it counts as open.
     pub(crate) hover: Vec<T>,
     /// Rows in the contact problem.
     pub(crate) in_problem: Vec<bool>,
@@ -72,7 +71,7 @@ pub(crate) struct ContactRowsWork<T> {
     pub(crate) on_massless: Vec<bool>,
     /// Rows of the problem. The data of the problem have one entry per row of it.
     pub(crate) problem: Vec<usize>,
-    /// Compliances of these rows, and magnitude of the diagonal of W, for problems whose W is applied and not formed.
+    /// Compliances of these rows, and magnitude of the diagonal of W, if W is applied and not formed.
     pub(crate) own: Vec<T>,
     pub(crate) scale: Vec<T>,
     /// The same rows, ascending.
@@ -140,7 +139,7 @@ impl<T: Real> ContactRowsWork<T> {
         work
     }
 
-    /// Reserves memory for `rows` rows with `entries` weights.
+    /// Memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         let Self { rates, y, tolerance, weight, compliance, shift, balance_gap, approach, .. } = self;
         for values in [y, tolerance, weight, compliance, shift, balance_gap, approach] {
@@ -360,8 +359,8 @@ impl<T: Real> KnownForces<T> {
         let (Self { delassus, offset }, size) = (self, problem.size());
         delassus.clear();
         offset.clear();
-        // The diagonal of an uncoupled row is arbitrary. The diagonal for a force found by a static balance is not in
-        // the unit of W, so the largest of the other diagonals is used.
+        // The diagonal of an uncoupled row is arbitrary, and forces of a static balance are in another unit than W:
+        // the largest of the other diagonals is used.
         let unknown = (0..size).filter(|&i| force(i).is_none());
         let largest = unknown.fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
         let own = |i: usize| if largest > T::zero() { largest } else { problem.delassus(i, i) };

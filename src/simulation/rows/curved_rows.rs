@@ -11,11 +11,11 @@ use crate::real::Real;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::contact::mixing::Mixing;
 
-/// Maximum number of linearizations of curved rows in a contact problem.
+/// Maximum number of linearizations of curved rows.
 pub(crate) const FOLLOWED: usize = 48;
 
 /// Number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
-/// other, and either normal force pushes it to the other side.
+/// other, and either pushes it to the other side.
 const LONG: usize = 12;
 
 /// Number of linearizations after which Anderson mixing starts. Nearly all stages converge or alternate before that.
@@ -24,27 +24,26 @@ pub(crate) const SLOW: usize = 18;
 /// The relative [`Miss`] of gaps and forces at which the iteration has converged, in units of the rounding.
 const FIT: f64 = 64.0;
 
-/// The relative miss that is accepted once it no longer decreases.
+/// The relative miss accepted once it no longer decreases.
 pub(crate) const NEAR: f64 = 1e-8;
 
-/// The miss of a gap, in multiples of its tolerance, that is accepted once it no longer decreases.
+/// The miss of a gap, in multiples of its tolerance, accepted once it no longer decreases.
 pub(crate) const NOISE: f64 = 8.0;
 
-/// The relative miss of the forces that is accepted after [`LONG`] linearizations if gaps miss by at most [`NEAR`].
+/// The relative miss of forces accepted after [`LONG`] linearizations if gaps miss by at most [`NEAR`].
 const TIRED: f64 = 1e-5;
 
-/// The relative miss of alternating forces that is accepted then: the angle between two sides whose normals are both
-/// valid.
+/// The relative miss of alternating forces accepted then: the angle between the two normals, which are both valid.
 const EDGE: f64 = 0.1;
 
-/// Rows alternate if they miss by at least this share of the miss two linearizations before. Otherwise they converge.
+/// Rows alternate, and do not converge, if they miss by at least this share of the miss two linearizations before.
 const AGAIN: f64 = 0.999;
 
-/// The relative miss of gaps up to which alternating rows belong to a node on an edge. Rows that do not converge on a
-/// curved surface miss gaps as much as forces.
+/// The relative miss of gaps up to which rows alternate at an edge. Rows that do not converge on a curved surface
+/// miss gaps as much as forces.
 const AT_EDGE: f64 = 1e-6;
 
-/// Differences between the gaps and forces of rows linearized at the result and the gaps and forces solved for.
+/// Differences of gaps and forces between rows linearized at the result and the rows solved for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Miss {
     /// Difference of the gaps, relative to their change by d.
@@ -56,10 +55,9 @@ pub(crate) struct Miss {
 /// The largest difference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Worst {
-    /// Row of the contact.
     pub(crate) row: usize,
     pub(crate) what: &'static str,
-    /// The relative difference, and the difference that is accepted once it no longer decreases.
+    /// The relative difference, and the difference accepted once it no longer decreases.
     pub(crate) change: f64,
     pub(crate) tolerance: f64,
 }
@@ -74,16 +72,16 @@ impl Worst {
 }
 
 impl Miss {
-    /// The miss before the first solution.
+    /// Before the first solution.
     pub(crate) const ALL: Self = Self { gap: f64::INFINITY, force: f64::INFINITY };
 
     pub(crate) fn largest(self) -> f64 {
         self.gap.max(self.force)
     }
 
-    /// Whether the iteration may end after `passes` linearizations. The miss is within rounding; or small and no
+    /// Whether the iteration may end after `passes` linearizations: the miss is within rounding; or small and no
     /// longer decreasing; or alternating; or small at the last linearization of a step that cannot be halved.
-    /// `before` is the miss of the last linearization, `earlier` the miss of the one before.
+    /// `before` and `earlier` are the misses of the last two linearizations.
     pub(crate) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], may_halve: bool) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
@@ -132,7 +130,7 @@ impl<T: Real> CurvedRowsWork<T> {
         }
     }
 
-    /// Reserves memory for `rows` rows with `entries` weights.
+    /// Memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.gaps.resize(rows, T::zero());
         self.foreseen.resize(rows, T::zero());

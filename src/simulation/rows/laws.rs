@@ -24,7 +24,7 @@ pub(crate) struct Laws {
 }
 
 impl Laws {
-    /// Reserves memory for `rows` rows.
+    /// Memory for `rows` rows.
     pub(crate) fn with_capacity(rows: usize) -> Self {
         Self { list: Vec::with_capacity(rows), ..Self::default() }
     }

@@ -32,9 +32,9 @@ fn shares<T: Real>() -> [f64; 2] {
 }
 
 impl<T: Real> RateDifferences<T> {
-    /// Central differences of the gaps at t ± δ: with u held for the rate ∂g/∂t, along u ± δ v for the acceleration Ġ
-    /// v + ∂ġ/∂t. Differences within rounding are set to zero. `home` is where the rows are linearized, if they
-    /// follow u. They are linearized there again afterwards.
+    /// Central differences of the gaps at t ± δ: with u held for the rate ∂g/∂t, along u ± δ v for the acceleration
+    /// Ġ v + ∂ġ/∂t. Differences within rounding are zero. `home` is where the rows are linearized before and after,
+    /// if they follow u.
     pub(crate) fn find(
         &mut self,
         constraint: &mut dyn ContactConstraint<T>,

@@ -54,7 +54,6 @@ impl<T: Real> Impulses<T> {
         }
     }
 
-    /// Accepts the step.
     pub(crate) fn accept(&mut self) {
         std::mem::swap(&mut self.trial, &mut self.last);
         std::mem::swap(&mut self.trial_pushes, &mut self.last_pushes);

@@ -1,4 +1,4 @@
-//! Results of a run for observers and its caller: work counts, energies, and why it ended.
+//! Results of a run: work counts, energies, and why it ended.
 
 use crate::error::{Error, Result};
 use crate::real::Real;

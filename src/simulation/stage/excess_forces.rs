@@ -14,7 +14,7 @@ use crate::simulation::stage::vectors::{StageVectors, predict};
 use crate::state::{ContactState, Motion};
 use crate::system::{Linearity, System};
 
-/// Maximum number of times that a stage is solved again.
+/// Maximum number of repeated solutions of a stage.
 const PASSES: usize = 8;
 
 /// The share of the work of all closing and opening contacts that may be left to the velocities.
@@ -35,10 +35,10 @@ pub(crate) struct ExcessForces<T: Real> {
     /// statically. One entry a dof, as all below.
     way: Vec<T>,
     followed: Vec<T>,
-    /// −G̃ᵀ δ: forces on the dofs with mass, and forces on dofs without mass, which pass them on.
+    /// −G̃ᵀ δ: forces on all dofs. Dofs without mass pass them on.
     forces: Vec<T>,
-    /// The change of the acceleration at the start of the stage by these forces, and the change of the stage before;
-    /// the latter is empty if a step has one stage.
+    /// Changes of the acceleration at the start of this stage by these forces, and of the stage before; the latter is
+    /// empty if a step has one stage.
     change: Vec<T>,
     carried: Vec<T>,
     /// Whether there is a change in this stage, and whether there was one in the stage before.
@@ -48,7 +48,7 @@ pub(crate) struct ExcessForces<T: Real> {
     impulse_weight: T,
 }
 
-/// The weights of a change of the acceleration at the start of a stage in u and v at its end: v changes by the mean
+/// The weights in u and v of a change of the acceleration at the start of a stage: v changes by the mean
 /// acceleration, u by the mean of v.
 fn shares<T: Real>(stage: &CompiledStage<T>, h: f64) -> [T; 2] {
     let length = h * (stage.end - stage.start);
@@ -102,7 +102,7 @@ impl<T: Real> ExcessForces<T> {
         })))
     }
 
-    /// Reserves memory for `rows` rows.
+    /// Memory for `rows` rows.
     pub(crate) fn make_room(&mut self, rows: usize) {
         for values in [&mut self.gaps, &mut self.misses] {
             values.reserve(rows.saturating_sub(values.len()));
@@ -134,7 +134,7 @@ impl<T: Real> ExcessForces<T> {
     }
 
     /// Solves a stage again until contacts that close or open in it leave the energy nearly unchanged. Returns the
-    /// change of the energy by the forces that they do not exert.
+    /// change of energy by the forces not exerted.
     pub(crate) fn solve_again(
         &mut self,
         solve: &mut StageSolve<'_, '_, T>,
@@ -195,8 +195,7 @@ impl<T: Real> ExcessForces<T> {
             values.resize(constraints.len(), T::zero());
         }
         constraints.finite_gaps(new.t, &new.u, gaps)?;
-        // The work of a constant force is its work along the mean velocity; for β = ¼ this is the displacement
-        // itself.
+        // The work of a constant force is its work along the mean velocity, for β = ¼ along the displacement itself.
         let half = T::of(0.5 * clock.h * (stage.end - stage.start));
         way.fill(T::zero());
         T::axpy(half, &start.v, way);

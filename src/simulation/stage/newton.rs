@@ -12,8 +12,8 @@ pub(crate) enum TangentUpdate {
 }
 
 impl TangentUpdate {
-    /// A residual above rounding stagnates if it does not fall to this share of its value within this number of
-    /// iterations. With a constant tangent it may fall by only a fiftieth in each.
+    /// A residual above rounding stagnates if it does not fall to this share in this number of iterations. With a
+    /// constant tangent it may fall by only a fiftieth in each.
     pub(crate) fn falls(self) -> (usize, f64) {
         match self {
             Self::Iteration => (2, 0.5),

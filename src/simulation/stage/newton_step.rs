@@ -112,8 +112,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let met = norms.residual <= force * norms.scale() && size * contraction <= displacement * whole;
         // Where forces cancel, the residual has no scale. Then increments must be small, and the residual must
         // stagnate or have fallen far; or the increment must be below the resolution of the displacements. Far from
-        // the origin many increments are small compared with the displacements: a slowly falling residual is not
-        // enough.
+        // the origin increments are small beside the displacements: a slowly falling residual is not enough.
         newton.residuals.push(norms.residual);
         let (within, share) = newton.settings.tangent.falls();
         let earlier = newton.residuals.len().checked_sub(within + 1);
@@ -343,7 +342,6 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 }
 
-/// The Euclidean norm.
 fn norm<T: Real>(x: &[T]) -> f64 {
     square(x).sqrt()
 }

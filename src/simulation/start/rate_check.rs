@@ -28,7 +28,7 @@ impl<T: Real> RateCheck<T> {
         check
     }
 
-    /// Reserves memory for `rows` rows.
+    /// Memory for `rows` rows.
     pub(crate) fn make_room(&mut self, rows: usize) {
         self.before.resize(rows, T::zero());
         self.now.resize(rows, T::zero());

@@ -118,8 +118,7 @@ impl<T: Real> Ledger<T> {
         state: &State<T>,
         rows: Rows<'_, '_, T>,
     ) -> Result<()> {
-        // Without supports a state is evaluated neither in a step nor here: a run continues with the data of its last
-        // step.
+        // Without supports a state is evaluated neither in a step nor here: a run continues with stored data.
         let reactions = if self.is_supported { reactions(system, state, rows)? } else { Vec::new() };
         let power = self.damping_power(system, state.displacement(), state.velocity())?;
         system.external_load(state.time(), &mut self.old_load)?;
@@ -223,7 +222,7 @@ impl<T: Real> Ledger<T> {
             };
             books.forces.scatter(row, force, forces);
         }
-        // The force in the middle of the step, interpolated linearly between the forces of two steps.
+        // The force in the middle of the step, on the line through the forces of two steps.
         let newest = T::of(1.5 - books.load);
         let work = |old: &[T], new: &[T]| match new.is_empty() {
             true => T::zero(),

@@ -91,8 +91,8 @@ pub(crate) fn highest_square<T: Real>(
     Ok(Some([highest.at_least, highest.at_most]))
 }
 
-/// Refuses a step beyond the limit of the scheme, as far as the limit is known. Returns the step up to which it is
-/// known.
+/// Refuses a step beyond the limit of the scheme, as far as that is known. Returns the largest step known to be
+/// stable.
 ///
 /// Gershgorin's circles bound the highest frequency from above: a step that this bound admits is stable. Otherwise
 /// Lanczos' iteration on M⁻¹ K decides: Ritz values never exceed the highest frequency, so a step that they refuse is
@@ -316,8 +316,7 @@ impl<T: Real> Lanczos<T> {
     fn new(system: &dyn System<T>) -> Result<Self> {
         let (mass, dofs) = (system.mass(), system.dofs());
         let inverse = InverseMass::new(mass, system.prescribed(), &[])?;
-        // Each dof contributes equally in the inner product of M, so that light dofs, which are the fastest, are
-        // included.
+        // Equal components of all dofs in the inner product of M: light dofs are the fastest.
         let start = match (&inverse, mass) {
             (InverseMass::Lumped(inverse), _) => inverse.iter().map(|inverse| inverse.sqrt()).collect(),
             (_, Mass::Consistent(mass)) => {

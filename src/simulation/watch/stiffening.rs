@@ -371,8 +371,7 @@ impl<T: Real> Stiffening<T> {
         let [there, here] = &mut self.force;
         self.sums.copy_from_slice(&new.u);
         T::axpy(T::one(), &self.way, &mut self.sums);
-        // A refusal there is no error of this step. The state of the step comes last, as hosts keep their last
-        // evaluation.
+        // A refusal there is no error of this step. The state of the step comes last, as hosts keep it.
         let known = system.force(new.t, &self.sums, &new.v, there);
         let known = known.and(system.force(new.t, &new.u, &new.v, here));
         self.sums.fill(T::zero());

@@ -19,8 +19,8 @@ pub(crate) struct AppliedRows<'p, T> {
 }
 
 impl<T: Real> AppliedRows<'_, T> {
-    /// Solves for the multipliers, and writes their forces and response to the vectors on the interface. Returns the
-    /// number of iterations, or nothing if the solver needs a formed W. `scale` is scratch.
+    /// Solves for the multipliers, and leaves their forces and response in the vectors on the interface. Returns the
+    /// iterations, or nothing if the solver needs a formed W. `scale` is scratch.
     pub(crate) fn solve(
         &self,
         operator: &mut Operator<T>,

@@ -43,8 +43,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let impulse_weight = T::of(clock.h * booking.impulse_weight);
         impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
         if rows.curved.apart {
-            // Turns the multipliers from the rows of the balance to the rows of the state, which are used from here
-            // on.
+            // Turns multipliers from the rows of the balance to the rows of the state, which are used from here on.
             let tangents = constraints.tangents();
             tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
         }

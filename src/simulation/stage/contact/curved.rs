@@ -172,8 +172,8 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 tolerance = constraints.gap_rounding(row, g.magnitude(row, &new.u), y);
                 scale = scale.max(y.abs());
             }
-            // The rounding of the displacement undone by the force: no other term contains it if gap and coordinates
-            // are zero.
+            // Rounding of the displacement undone by the force, which no other term contains at zero gap and
+            // coordinates.
             tolerance += rounding(rows.weight[row].abs() * forces.interface_magnitude(row, &interface.free));
             let pressed = lambda > T::zero() || law.is_equality();
             let miss = match pressed {

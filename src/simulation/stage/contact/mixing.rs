@@ -3,13 +3,13 @@
 //!
 //! Rows are linearized at d, and the contact problem solved with them has the result r(d). Rows turn with d, and so
 //! do forces, whose change the problem does not contain. So the iteration approaches the fixed point r(d) = d by a
-//! constant factor only, which may be nearly one, or below minus one. Anderson's mixing (J. ACM 12, 1965; Walker and
-//! Ni, SIAM J. Numer. Anal. 49, 2011) computes the combination of the last iterates in which r − d is least, if it is
-//! linear in d.
+//! factor only, which may be nearly one, or below minus one. Anderson's mixing (J. ACM 12, 1965; Walker and Ni, SIAM
+//! J. Numer. Anal. 49, 2011) takes the combination of the last iterates in which r − d is least, if it is linear in
+//! d.
 
 use crate::real::Real;
 
-/// The number of differences of iterates that are mixed.
+/// Number of differences of iterates that are mixed.
 const DEPTH: usize = 4;
 
 /// A difference is rounding if its component orthogonal to newer differences is below this share of it.

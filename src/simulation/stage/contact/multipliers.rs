@@ -194,7 +194,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                 for group in 0..operator.groups().len() {
                     let range = operator.groups().range(group);
                     if range.len() > *most {
-                        // Beside W solvers need two matrices as large, and cannot report that there is no memory.
+                        // Beside W solvers need two matrices as large, and cannot report missing memory.
                         let rows = if range.len() > *reserved { range.len().next_power_of_two() } else { range.len() };
                         memory::probe::<T>(rows, 3 * rows, "the contact solver")?;
                         *most = rows;
@@ -235,7 +235,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
             }
             statistics.contact_solves += 1;
             let mut grown = false;
-            // An upper bound of the response of each row, over its weight.
+            // An upper bound of all responses, over the weights of their rows.
             let reach = forces.largest_row() * T::largest(&interface.response);
             for row in 0..count {
                 let near = y[row] - weight[row] * reach < -tolerance[row];
