@@ -11,7 +11,7 @@ use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::vectors::StageVectors;
 use crate::state::Motion;
 
-/// Maximum number of linearizations at the displacements of the dofs without mass.
+/// Maximum number of linearizations of rows.
 const LINEARIZATIONS: usize = 20;
 
 impl<T: Real> StageSolve<'_, '_, T> {
