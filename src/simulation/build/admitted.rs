@@ -23,11 +23,11 @@ pub(crate) struct Admitted {
     pub(crate) no_switch: Option<&'static str>,
     /// The correction that cannot act on the persistency switch, and why not.
     pub(crate) uncorrected_switch: Option<(String, &'static str)>,
-    /// The correction that does not let contacts leave with a share of their approach, and why not.
+    /// The correction that does not let contacts rebound, and why not.
     pub(crate) unrestored: Option<(String, &'static str)>,
     /// Why friction is refused, if it is.
     pub(crate) no_friction: Option<&'static str>,
-    /// The contact solver, if there are sets that it does not take, and these.
+    /// The contact solver, if it does not accept some sets, and these sets.
     pub(crate) solver: String,
     pub(crate) no_sets: Vec<AdmissibleSet>,
 }
@@ -61,8 +61,8 @@ impl Admitted {
         }
     }
 
-    /// Refuses friction that is no number, that has no direction, or that law, contact solver, scheme or corrections
-    /// cannot serve.
+    /// Refuses friction coefficients that are negative or not finite, friction without a direction, and friction that
+    /// law, contact solver, scheme or corrections cannot serve.
     pub(crate) fn check_friction(
         &self,
         contact: ContactId,
@@ -98,14 +98,14 @@ pub(crate) fn admitted<T: Real>(
     solver: &dyn ContactSolver<T>,
     (correctors, by_default): (&[Box<dyn Corrector<T> + '_>], bool),
 ) -> Admitted {
-    // (Corrections ask for contacts that do not open.)
+    // Corrections pose problems with contacts that do not open.
     let corrects = (by_default || !correctors.is_empty())
         && tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION);
     let kinds: &[bool] = if corrects { &[false, true] } else { &[false] };
     let cone = |tangents| kinds.iter().map(move |&held| AdmissibleSet::with_friction(0.0, tangents, held));
     let sets = AdmissibleSet::OF_LAWS.into_iter().chain((1..=2).flat_map(cone));
     let no_sets: Vec<_> = sets.filter(|&set| !solver.admits(set)).collect();
-    // (Written out it takes longer than a step of a small system.)
+    // Formatting it takes longer than a step of a small system.
     let solver = if no_sets.is_empty() { String::new() } else { format!("{solver:?}") };
     let mut admitted = Admitted { integrator: integrator.name(), solver, no_sets, ..Admitted::default() };
     admitted.no_friction = correctors.iter().find_map(|corrector| corrector.requirements(tableau).friction.err());
@@ -127,8 +127,8 @@ pub(crate) fn admitted<T: Real>(
     for stage in &tableau.stages {
         if stage.contact_row().z == 0.0 && admitted.no_friction.is_none() {
             admitted.no_friction = Some(
-                "the scheme's displacements do not contain the unknown, so that no multiplier holds what sticks; choose \
-                 another scheme",
+                "the scheme's displacements do not contain the unknown, so that no multiplier holds what sticks; \
+                 choose another scheme",
             );
         }
         match stage.contact {
