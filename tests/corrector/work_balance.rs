@@ -376,6 +376,6 @@ fn schemes_of_which_it_knows_no_work_are_refused() {
         Box::new(NohBathe::new(0.54).unwrap()),
     ];
     for scheme in others {
-        assert!(Corrector::<f64>::check(&WorkBalance, &scheme.tableau()).is_err(), "{}", scheme.name());
+        assert!(Corrector::<f64>::requirements(&WorkBalance, &scheme.tableau()).scheme.is_err(), "{}", scheme.name());
     }
 }
